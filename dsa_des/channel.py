@@ -1,0 +1,91 @@
+"""The buffer at the receiving end of one wire.
+
+Rows are kept in order of arrival. A look-ahead sender may deposit rows long before they arrive; a
+reader only ever sees those that have arrived by the instant it asks about.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from dsa_des.message import Message
+from dsa_des.types import IntArray
+
+
+class Channel:
+    """Rows on their way to one input.
+
+    Parameters
+    ----------
+    source : str
+        Name of the sending block.
+    delay_ticks : int
+        Time on the wire.
+    keep_last : bool
+        Whether the last arrived row stays readable (sampled and trigger inputs).
+    """
+
+    def __init__(self, source: str, delay_ticks: int = 0, *, keep_last: bool = True) -> None:
+        self.source = source
+        self.delay_ticks = delay_ticks
+        self._keep_last = keep_last
+        self._waiting: deque[tuple[IntArray, Message]] = deque()
+        self._last: tuple[IntArray, Message] | None = None
+
+    def hold(self, message: Message, tick: int) -> None:
+        """Make `message` the last arrived one, as if it had come at `tick`."""
+        self._last = (np.array([tick], dtype=np.int64), message)
+
+    def push(self, message: Message) -> IntArray:
+        """Deposit a message and return the ticks at which its rows arrive."""
+        arrivals = message.tick + self.delay_ticks if self.delay_ticks else message.tick
+        self._waiting.append((arrivals, message))
+        return arrivals
+
+    def take_until(self, end: int) -> tuple[IntArray, Message] | None:
+        """Remove and return the rows that arrive before `end`, or None."""
+        taken: list[tuple[IntArray, Message]] = []
+        while self._waiting:
+            arrivals, message = self._waiting[0]
+            if arrivals[-1] < end:
+                taken.append(self._waiting.popleft())
+                continue
+            count = int(np.searchsorted(arrivals, end, side="left"))
+            if count:
+                taken.append((arrivals[:count], message.take(slice(0, count))))
+                self._waiting[0] = (arrivals[count:], message.take(slice(count, len(message))))
+            break
+        return _joined(taken)
+
+    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return what the input holds at each of `ticks` (all before `end`).
+
+        Returns
+        -------
+        (message, rows) or None
+            ``rows[i]`` is the row of `message` held at ``ticks[i]``; -1 when none has arrived.
+        """
+        new = self.take_until(end)
+        last = self._last
+        if new is not None and len(ticks) and new[0][0] <= ticks[0]:
+            last = None  # superseded before the first instant asked about: spare the copy
+        parts = [part for part in (last, new) if part is not None]
+        held = _joined(parts)
+        if held is None:
+            return None
+        arrivals, message = held
+        if self._keep_last and new is not None:
+            self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
+        if new is not None and len(parts) == 1 and arrivals is ticks:
+            return message, np.arange(len(ticks))
+        return message, np.searchsorted(arrivals, ticks, side="right") - 1
+
+
+def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+    if not parts:
+        return None
+    if len(parts) == 1:
+        return parts[0]
+    arrivals = np.concatenate([part[0] for part in parts])
+    message = type(parts[0][1]).concatenate([part[1] for part in parts])
+    return arrivals, message

@@ -1,0 +1,235 @@
+"""What a block is: declared ports, declared parameters, and what it does when it wakes.
+
+A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
+scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a
+`dsa_des.wake.Wake`; rows of its messages are scans, so the same array code serves both.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+
+from dsa_des.clock import ClockSpec, parse_rational
+from dsa_des.message import Message
+from dsa_des.ports import Input, Output
+from dsa_des.randomness import Stream, Streams
+
+if TYPE_CHECKING:
+    from dsa_des.process import BlockEnvironment
+    from dsa_des.wake import Wake
+
+
+def _as_written(value: Fraction) -> int | float | str:
+    if value.denominator == 1:
+        return int(value)
+    return float(value) if Fraction(repr(float(value))) == value else str(value)
+
+
+def _positive(value: Fraction) -> Fraction:
+    if value <= 0:
+        raise ValueError("must be greater than 0")
+    return value
+
+
+def _not_negative(value: Fraction) -> Fraction:
+    if value < 0:
+        raise ValueError("must be 0 or greater")
+    return value
+
+
+_Exact = (BeforeValidator(parse_rational), PlainSerializer(_as_written))
+#: An exact rate or time: a number or text such as "30000/1001".
+Rational = Annotated[Fraction, *_Exact]
+PositiveRational = Annotated[Fraction, *_Exact, AfterValidator(_positive)]
+NonNegativeRational = Annotated[Fraction, *_Exact, AfterValidator(_not_negative)]
+
+
+class SourcedText(str):
+    """Text that remembers the folder of the file it was written in."""
+
+    __slots__ = ("folder",)
+    folder: Path
+
+    @classmethod
+    def of(cls, text: str, folder: Path) -> "SourcedText":
+        """Return `text` as written in a file of `folder`."""
+        result = cls(text)
+        result.folder = folder
+        return result
+
+
+def _resolve_path(value: object) -> Path:
+    if not isinstance(value, str | Path) or not str(value):
+        raise ValueError("must be a path, as text")
+    path = Path(str(value)).expanduser()
+    if isinstance(value, SourcedText) and not path.is_absolute():
+        path = value.folder / path
+    return path
+
+
+#: A path; a relative one is taken from the folder of the file that holds the key.
+ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(str)]
+
+
+class Parameters(BaseModel):
+    """Parameters of a block: every field has its unit in its name, bounds and a description."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+class ClockedParameters(Parameters):
+    """Parameters of a block with a scan clock of its own."""
+
+    scan_rate_hz: PositiveRational = Field(description="Scans per second; number or '30000/1001'.")
+    offset_s: NonNegativeRational = Field(
+        default=Fraction(0), description="Time of the first scan, s."
+    )
+    rate_error_ppm: Rational = Field(
+        default=Fraction(0), description="Error of the scan rate, parts per million."
+    )
+    jitter_s: float = Field(
+        default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."
+    )
+
+    def clock_spec(self) -> ClockSpec:
+        """Return the clock these parameters describe."""
+        return ClockSpec(self.scan_rate_hz, self.offset_s, self.rate_error_ppm, self.jitter_s)
+
+
+@dataclass(frozen=True)
+class Consumer:
+    """A block fed by one of our outputs, and what it asks of us.
+
+    Parameters
+    ----------
+    block : str
+        Its name in the scene.
+    port : str
+        Its input.
+    request : object
+        What its `Component.request` returned for that input.
+    """
+
+    block: str
+    port: str
+    request: Any
+
+
+@dataclass
+class Context:
+    """What the engine tells a block about the run it is part of.
+
+    Parameters
+    ----------
+    streams : Streams
+        The run's keyed random numbers.
+    ticks_per_s : int
+    duration_s : Fraction
+        Length of the run; infinite sources may cut their work at it.
+    consumers : list of Consumer
+        Blocks that our outputs feed, sorted by name; known when `Component.setup` is called.
+    """
+
+    streams: Streams
+    ticks_per_s: int = 10**9
+    duration_s: Fraction = Fraction(0)
+    consumers: list[Consumer] = field(default_factory=list)
+
+
+class Component:
+    """A block. Subclass it, declare ports and parameters, and write `run`.
+
+    Invariants kept by the engine: at one instant a block runs at most once, after every block
+    upstream over undelayed wires; `run` sees each message once; instants never go backwards.
+    """
+
+    #: Inputs and outputs by name.
+    inputs: ClassVar[Mapping[str, Input]] = {}
+    outputs: ClassVar[Mapping[str, Output]] = {}
+    #: Model of the block's parameters.
+    Parameters: ClassVar[type[Parameters]] = Parameters
+    #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
+    windowed: ClassVar[bool] = False
+    #: "own": runs on the clock of its parameters (or only when triggered);
+    #: "demand": runs at the scan instants of the clocked blocks downstream.
+    clocked: ClassVar[Literal["own", "demand"]] = "own"
+
+    def __init__(self, name: str, parameters: Any, context: Context) -> None:
+        self.name = name
+        self.p = parameters
+        self.context = context
+
+    def clock_spec(self) -> ClockSpec | None:
+        """Return the block's own clock, or None when it runs only on demand or when triggered."""
+        if isinstance(self.p, ClockedParameters):
+            return self.p.clock_spec()
+        return None
+
+    def request(self, port: str) -> Any:
+        """Return what this block asks of whoever feeds `port`, or None."""
+        return None
+
+    def setup(self) -> None:
+        """Prepare for the run; called once, after every block downstream was set up."""
+
+    def natural_duration_s(self) -> Fraction | None:
+        """Return how long this block's data lasts, for scenes that give no ``duration_s``."""
+        return None
+
+    @property
+    def width(self) -> int:
+        """Number of targets per row this block emits, for sizing windows."""
+        return 1
+
+    def run(self, wake: "Wake") -> Message | Mapping[str, Message] | None:
+        """Handle the instants of `wake` and return the messages to send.
+
+        Parameters
+        ----------
+        wake : Wake
+            The instants (one, or a window of many) and the messages that have arrived.
+
+        Returns
+        -------
+        Message, mapping from output name to Message, or None
+            A lone message goes to the only output.
+        """
+        raise TypeError(f"{type(self).__name__} declares neither run nor process")
+
+    #: A block that wants its own SimPy generator overrides this with a method ``(self, env)``.
+    process: Any = None
+
+    def report(self) -> dict[str, Any]:
+        """Return sections of the run's summary that only this block knows."""
+        return {}
+
+    def stream(self, purpose: str) -> Stream:
+        """Return this block's keyed random numbers for one purpose."""
+        return self.context.streams.stream(self.name, purpose)
+
+    @classmethod
+    def path(cls) -> str:
+        """Return ``module:Class``."""
+        return f"{cls.__module__}:{cls.__qualname__}"
+
+
+ProcessGenerator = Iterator[Any]
+__all__ = [
+    "BlockEnvironment",
+    "ClockedParameters",
+    "Component",
+    "Consumer",
+    "Context",
+    "NonNegativeRational",
+    "Parameters",
+    "PositiveRational",
+    "Rational",
+    "ScenePath",
+    "SourcedText",
+]

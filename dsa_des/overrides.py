@@ -1,0 +1,108 @@
+"""Changes from the command line: ``--set key=value`` and ``--swap block=type``.
+
+They are two verbs: `--set` changes one value; `--swap` puts another type into a block, keeps its
+name, its wires and the parameters the new type knows, and lists those it dropped.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from dsa_des.component import SourcedText
+from dsa_des.errors import Problem, did_you_mean
+from dsa_des.registry import UnknownType, find
+from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile
+
+
+def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
+    """Split ``key=value``; a Problem when there is no ``=`` or an empty side."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip() or not value.strip():
+        form = "BLOCK=TYPE" if option == "--swap" else "KEY=VALUE"
+        return Problem(COMMAND_LINE, option, f"must have the form {form}", text)
+    return key.strip(), value.strip()
+
+
+def parse_value(text: str) -> Any:
+    """Return a value as TOML would read it; what is not TOML is text."""
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text
+    return _sourced(value)
+
+
+def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
+    """Apply one ``--set`` to the scene's tables and return what is wrong with it."""
+    parsed = parse_assignment(assignment, "--set")
+    if isinstance(parsed, Problem):
+        return [parsed]
+    text, value = parsed
+    parts = text.replace("[", ".").replace("]", "").split(".")
+    container: Any = scene.data
+    key: list[str | int] = []
+    for position, part in enumerate(parts):
+        last = position == len(parts) - 1
+        step = _step(container, part)
+        if isinstance(step, str) and isinstance(container, list):
+            message = f"there is no item {part!r}: the list has {len(container)} (from 0)"
+            return [Problem(COMMAND_LINE, text, message)]
+        if key == ["blocks"] and step not in container:
+            hint = did_you_mean(str(step), container)
+            return [Problem(COMMAND_LINE, text, f"the scene has no block {part!r}{hint}")]
+        key.append(step)
+        if last:
+            container[step] = parse_value(value)
+        elif isinstance(container, dict) and step not in container:
+            container[step] = {}
+        elif not isinstance(container[step], dict | list):
+            return [Problem(COMMAND_LINE, text, f"{'.'.join(parts[: position + 1])} is no table")]
+        container = container[step]
+    for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
+        del scene.sources[source_key]
+    scene.sources[tuple(key)] = COMMAND_LINE
+    return []
+
+
+def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[str]]:
+    """Apply one ``--swap`` and return (what is wrong with it, dropped parameters as dotted keys)."""
+    parsed = parse_assignment(assignment, "--swap")
+    if isinstance(parsed, Problem):
+        return [parsed], []
+    name, type_name = parsed
+    blocks = scene.data.get("blocks", {})
+    if name not in blocks or not isinstance(blocks[name], dict):
+        hint = did_you_mean(name, blocks)
+        return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
+    try:
+        cls = find(type_name)
+    except UnknownType as error:
+        return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
+    block = blocks[name]
+    known = {"type", *cls.Parameters.model_fields}
+    dropped = sorted(key for key in block if key not in known)
+    for parameter in dropped:
+        del block[parameter]
+    block["type"] = _sourced(type_name)
+    scene.sources[_type_key(name)] = COMMAND_LINE
+    return [], [f"blocks.{name}.{parameter}" for parameter in dropped]
+
+
+def _type_key(name: str) -> Key:
+    return ("blocks", name, "type")
+
+
+def _step(container: Any, part: str) -> str | int:
+    if isinstance(container, list) and part.isdecimal() and int(part) < len(container):
+        return int(part)
+    return part
+
+
+def _sourced(value: Any) -> Any:
+    if isinstance(value, str):
+        return SourcedText.of(value, Path.cwd())
+    if isinstance(value, list):
+        return [_sourced(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _sourced(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,357 @@
+"""From a scene file to a scene that can be run, with every problem reported at once."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+from pydantic import ValidationError
+
+from dsa_des.clock import MAX_TICK, parse_rational, resolution
+from dsa_des.component import ClockedParameters, Component, Parameters
+from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
+from dsa_des.graph import build_graph, check_graph
+from dsa_des.overrides import apply_set, apply_swap
+from dsa_des.registry import UnknownType, find
+from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, read_scene_file
+from dsa_des.wiring import Wire, read_wires
+
+_TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires")
+_MAX_SEED = 2**63
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a scene: its name, its type as written, its class and its parameters."""
+
+    name: str
+    type: str
+    cls: type[Component]
+    parameters: Parameters
+
+
+@dataclass
+class Scene:
+    """A checked scene.
+
+    Parameters
+    ----------
+    path : Path
+    title : str
+    description : str
+    seed : int
+    duration_s : Fraction or None
+        None when the scene leaves it to its sources.
+    blocks : dict
+        Blocks by name, sorted.
+    wires : list of Wire
+        Sorted.
+    graph : networkx.DiGraph
+    ticks_per_s : int
+        The resolution in which every clock, offset and delay of the scene is exact.
+    dropped : list of str
+        Dotted keys of parameters that a swap dropped.
+    """
+
+    path: Path
+    title: str
+    description: str
+    seed: int
+    duration_s: Fraction | None
+    blocks: dict[str, Block]
+    wires: list[Wire]
+    graph: nx.DiGraph
+    ticks_per_s: int
+    dropped: list[str] = field(default_factory=list)
+
+    @property
+    def classes(self) -> dict[str, type[Component]]:
+        """Class of each block."""
+        return {name: block.cls for name, block in self.blocks.items()}
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the scene with every parameter written out, as plain TOML values."""
+        tables: dict[str, Any] = {"title": self.title}
+        if self.description:
+            tables["description"] = self.description
+        if self.duration_s is not None:
+            tables["duration_s"] = _plain(self.duration_s)
+        tables["seed"] = self.seed
+        tables["wires"] = [_wire_table(wire) for wire in self.wires]
+        tables["blocks"] = {
+            name: {
+                "type": block.type,
+                **block.parameters.model_dump(mode="json", exclude_none=True),
+            }
+            for name, block in self.blocks.items()
+        }
+        return tables
+
+
+def load_scene(
+    path: Path | str,
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+    duration_s: object = None,
+) -> Scene:
+    """Read, override and check a scene.
+
+    Parameters
+    ----------
+    path : path of the TOML file
+    sets, swaps : texts ``key=value`` and ``block=type``
+    seed, duration_s : override the scene's own
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    """
+    scene_file = read_scene_file(path)
+    problems: list[Problem] = []
+    dropped: list[str] = []
+    for swap in swaps:
+        found, gone = apply_swap(scene_file, swap)
+        problems += found
+        dropped += gone
+    for assignment in sets:
+        problems += apply_set(scene_file, assignment)
+    if seed is not None:
+        _override(scene_file, "seed", seed)
+    if duration_s is not None:
+        _override(scene_file, "duration_s", duration_s)
+    scene = check_scene(scene_file, problems)
+    scene.dropped = dropped
+    return scene
+
+
+def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) -> Scene:
+    """Validate merged tables into a `Scene`.
+
+    Raises
+    ------
+    SceneError
+        With every problem found, after those given.
+    """
+    problems = [] if problems is None else problems
+    data = scene_file.data
+    for key in data:
+        if key not in _TOP_LEVEL:
+            hint = did_you_mean(key, _TOP_LEVEL)
+            problems.append(scene_file.problem((key,), f"unknown key of a scene{hint}"))
+    title = _text(scene_file, "title", problems) or Path(scene_file.path).stem
+    description = _text(scene_file, "description", problems)
+    seed = _seed(scene_file, problems)
+    duration = _duration(scene_file, problems)
+    classes, blocks = _blocks(scene_file, problems)
+    wires = read_wires(scene_file, classes, problems)
+    graph = build_graph(list(classes), wires)
+    check_graph(scene_file, graph, classes, problems)
+    ticks_per_s = _resolution(scene_file, blocks, wires, duration, problems)
+    if problems:
+        raise SceneError(problems)
+    return Scene(
+        Path(scene_file.path),
+        title,
+        description,
+        seed,
+        duration,
+        blocks,
+        wires,
+        graph,
+        ticks_per_s,
+    )
+
+
+def _override(scene_file: SceneFile, key: str, value: object) -> None:
+    scene_file.data[key] = value
+    scene_file.sources[(key,)] = COMMAND_LINE
+
+
+def _text(scene_file: SceneFile, key: str, problems: list[Problem]) -> str:
+    value = scene_file.data.get(key, "")
+    if not isinstance(value, str):
+        problems.append(scene_file.problem((key,), "must be text", value))
+        return ""
+    return str(value)
+
+
+def _seed(scene_file: SceneFile, problems: list[Problem]) -> int:
+    seed = scene_file.data.get("seed", 0)
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < _MAX_SEED:
+        message = f"must be a whole number from 0 to {_MAX_SEED - 1}"
+        problems.append(scene_file.problem(("seed",), message, seed))
+        return 0
+    return seed
+
+
+def _duration(scene_file: SceneFile, problems: list[Problem]) -> Fraction | None:
+    if "duration_s" not in scene_file.data:
+        return None
+    value = scene_file.data["duration_s"]
+    try:
+        duration = parse_rational(value)
+        if duration <= 0:
+            raise ValueError("must be greater than 0")
+    except ValueError as error:
+        problems.append(scene_file.problem(("duration_s",), str(error), value))
+        return None
+    return duration
+
+
+def _blocks(
+    scene_file: SceneFile, problems: list[Problem]
+) -> tuple[dict[str, Any], dict[str, Block]]:
+    tables = scene_file.data.get("blocks", {})
+    classes: dict[str, Any] = {}
+    blocks: dict[str, Block] = {}
+    if not isinstance(tables, dict) or not tables:
+        problems.append(scene_file.problem(("blocks",), "a scene needs at least one block"))
+        return classes, blocks
+    for name in sorted(tables):
+        key: Key = ("blocks", name)
+        table = tables[name]
+        classes[name] = None
+        if not isinstance(table, dict):
+            problems.append(scene_file.problem(key, "must be a table", table))
+            continue
+        type_name = table.get("type")
+        if not isinstance(type_name, str):
+            message = 'needs a type, for example type = "radar.swerling"'
+            problems.append(scene_file.problem((*key, "type"), message))
+            continue
+        try:
+            cls = find(type_name)
+        except UnknownType as error:
+            problems.append(scene_file.problem((*key, "type"), str(error), str(type_name)))
+            continue
+        classes[name] = cls
+        given = {k: v for k, v in table.items() if k != "type"}
+        try:
+            parameters = cls.Parameters.model_validate(given)
+        except ValidationError as error:
+            problems += _explain(scene_file, key, str(type_name), cls, error)
+            continue
+        blocks[name] = Block(name, str(type_name), cls, parameters)
+    return classes, blocks
+
+
+def _explain(
+    scene_file: SceneFile, key: Key, type_name: str, cls: type[Component], error: ValidationError
+) -> list[Problem]:
+    problems = []
+    for item in error.errors(include_url=False):
+        at = _existing_path(scene_file, key, item["loc"])
+        if item["type"] == "extra_forbidden":
+            allowed = _sibling_names(cls.Parameters, item["loc"])
+            hint = did_you_mean(str(item["loc"][-1]), allowed)
+            problems.append(scene_file.problem(at, f"unknown parameter of {type_name}{hint}"))
+        elif item["type"] == "missing":
+            given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
+            close = nearest(str(item["loc"][-1]), given)
+            hint = f" ({close!r} is given)" if close else ""
+            problems.append(
+                scene_file.problem(at, f"is required by {type_name} and missing{hint}")
+            )
+        else:
+            message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+            message = message.replace("Input should be", "must be", 1)
+            message = message.replace("a valid number, unable to parse string as a number", "a number")
+            problems.append(scene_file.problem(at, message, _shown(item["input"])))
+    return problems
+
+
+def _shown(value: Any) -> Any:
+    return str(value) if isinstance(value, str) else value
+
+
+def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
+    """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
+    value: Any = scene_file.data
+    for part in key:
+        value = value[part]
+    path: list[str | int] = list(key)
+    for position, part in enumerate(loc):
+        if isinstance(value, Mapping) and part in value:
+            value = value[part]
+        elif isinstance(value, list) and isinstance(part, int) and part < len(value):
+            value = value[part]
+        elif position < len(loc) - 1:
+            continue
+        elif isinstance(value, list) or not isinstance(value, Mapping):
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
+    """Return the names allowed where `loc` points, following nested models as far as they go."""
+    names = list(model.model_fields)
+    for part in loc[:-1]:
+        found = model.model_fields.get(part) if isinstance(part, str) else None
+        if found is not None:
+            nested = _nested_model(found.annotation)
+            if nested is None:
+                return []
+            model, names = nested, list(nested.model_fields)
+    return names
+
+
+def _nested_model(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, Parameters):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        nested = _nested_model(argument)
+        if nested is not None:
+            return nested
+    return None
+
+
+def _resolution(
+    scene_file: SceneFile,
+    blocks: Mapping[str, Block],
+    wires: Iterable[Wire],
+    duration: Fraction | None,
+    problems: list[Problem],
+) -> int:
+    times: list[Fraction] = [wire.delay_s for wire in wires]
+    clocks: list[str] = []
+    for name, block in blocks.items():
+        if isinstance(block.parameters, ClockedParameters):
+            spec = block.parameters.clock_spec()
+            times += spec.exact_times()
+            clocks.append(f"{name} {_plain(spec.rate_hz)} Hz + {_plain(spec.offset_s)} s")
+    ticks_per_s = resolution(times)
+    if ticks_per_s * (1 + (duration or Fraction(86400))) >= MAX_TICK:
+        message = (
+            "these clocks have no common tick that fits 64 bits for the whole run: "
+            f"{', '.join(clocks)}; give offsets to fewer digits or rates as simpler fractions"
+        )
+        problems.append(scene_file.problem(("blocks",), message))
+    return ticks_per_s
+
+
+def _plain(value: Fraction) -> int | float | str:
+    if value.denominator == 1:
+        return int(value)
+    return float(value) if Fraction(repr(float(value))) == value else str(value)
+
+
+def _wire_table(wire: Wire) -> dict[str, Any] | str:
+    if not wire.delayed and wire.holds is None:
+        return str(wire)
+    table: dict[str, Any] = {
+        "from": f"{wire.source}.{wire.output}",
+        "to": f"{wire.target}.{wire.input}",
+    }
+    if wire.delay_scans:
+        table["delay"] = f"{wire.delay_scans} scan{'s' if wire.delay_scans > 1 else ''}"
+    elif wire.delay_s:
+        table["delay_s"] = _plain(wire.delay_s)
+    if wire.holds is not None:
+        table["holds"] = wire.holds
+    return table

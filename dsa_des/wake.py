@@ -1,0 +1,94 @@
+"""What a block sees when it runs: its instants and its inputs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsa_des.message import Message
+from dsa_des.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """The rows that came over one wire since the block's last run.
+
+    Parameters
+    ----------
+    source : str
+        Name of the sending block.
+    tick : ndarray of int64
+        When each row arrived.
+    message : Message
+        The rows; ``message.tick`` says what instants they speak of.
+    """
+
+    source: str
+    tick: IntArray
+    message: Message
+
+
+class Wake:
+    """One run of a block: an instant, or a window of instants in order.
+
+    Parameters
+    ----------
+    ticks : ndarray of int64, shape (rows,)
+    scans : ndarray of int64, shape (rows,)
+        Scan numbers of the block's own clock; -1 at instants that are not its own scans.
+    ticks_per_s : int
+    held : mapping
+        For sampled and trigger inputs: ``(message, rows)`` as `Channel.sample` gives them.
+    arrived : mapping
+        For queued inputs, and for inputs with many writers: the new rows of each wire.
+    demand : mapping
+        For each clocked block downstream: the rows of this wake at which it scans.
+    """
+
+    def __init__(
+        self,
+        ticks: IntArray,
+        scans: IntArray,
+        ticks_per_s: int,
+        held: Mapping[str, tuple[Message, IntArray]],
+        arrived: Mapping[str, list[Arrivals]],
+        demand: Mapping[str, IntArray] | None = None,
+    ) -> None:
+        self.ticks = ticks
+        self.scans = scans
+        self.ticks_per_s = ticks_per_s
+        self._held = held
+        self._arrived = arrived
+        self.demand = demand or {}
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Time of each row since the start of the run, s."""
+        return self.ticks / self.ticks_per_s
+
+    def held(self, port: str) -> tuple[Message, IntArray] | None:
+        """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""
+        return self._held.get(port)
+
+    def __getitem__(self, port: str) -> Message | None:
+        """Return the message held at each instant, row by row, or None when nothing came yet."""
+        held = self._held.get(port)
+        if held is None:
+            return None
+        message, rows = held
+        count = len(rows)
+        if len(message) == count and rows[0] == 0 and rows[-1] == count - 1:
+            if count == 1 or bool(np.all(rows[1:] > rows[:-1])):
+                return message
+        if rows[0] < 0:
+            if rows[-1] < 0:
+                return None
+            raise LookupError(f"nothing has arrived at {port!r} at the first instants; use held()")
+        return message.take(rows)
+
+    def arrivals(self, port: str) -> list[Arrivals]:
+        """Return the new rows of each wire into `port`, sorted by source name."""
+        return self._arrived.get(port, [])

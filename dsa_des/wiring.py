@@ -1,0 +1,197 @@
+"""Reading the ``wires`` of a scene: ``"gate -> radar"`` or a table with a delay.
+
+A wire names blocks, and ports where a block has several that fit::
+
+    wires = [
+      "traffic -> transform -> gate",
+      "gate.targets -> radar.targets",
+      {from = "tracker.cue", to = "radar.cue", delay = "1 scan", holds = "nothing"},
+    ]
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from dsa_des.clock import parse_rational
+from dsa_des.component import Component
+from dsa_des.errors import Problem, did_you_mean
+from dsa_des.scene_file import Key, SceneFile
+
+_END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
+_SCANS = re.compile(r"(\d+) scans?")
+_KEYS = ("from", "to", "delay_s", "delay", "holds")
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One connection between an output and an input.
+
+    Parameters
+    ----------
+    source, output, target, input : str
+        Block and port names.
+    delay_s : Fraction
+        Time on the wire; 0 for the same instant.
+    delay_scans : int
+        Delay counted in scans of the receiving block's clock (of the sender's when it has none).
+    holds : None, "nothing" or mapping
+        What the input holds before the first message; required of a feedback wire.
+    """
+
+    source: str
+    output: str
+    target: str
+    input: str
+    delay_s: Fraction = Fraction(0)
+    delay_scans: int = 0
+    holds: Any = None
+
+    @property
+    def delayed(self) -> bool:
+        """Whether messages take time on this wire."""
+        return self.delay_s > 0 or self.delay_scans > 0
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.output} -> {self.target}.{self.input}"
+
+
+def read_wires(
+    scene: SceneFile, classes: Mapping[str, type[Component]], problems: list[Problem]
+) -> list[Wire]:
+    """Return the wires of a scene, sorted; what is wrong is added to `problems`.
+
+    Parameters
+    ----------
+    scene : SceneFile
+    classes : mapping
+        The class of each block; blocks whose type is unknown map to None and their wires are
+        not judged.
+    problems : list of Problem
+    """
+    entries = scene.data.get("wires", [])
+    if not isinstance(entries, list):
+        problems.append(scene.problem(("wires",), "must be a list of wires", entries))
+        return []
+    wires: list[Wire] = []
+    for position, entry in enumerate(entries):
+        key: Key = ("wires", position)
+        try:
+            for source, target, options in _hops(entry):
+                wire = _connect(source, target, options, classes)
+                if wire is not None:
+                    wires.append(wire)
+        except _WireError as error:
+            problems.append(scene.problem(key, str(error), *error.value))
+    _two_writers(scene, wires, classes, problems)
+    return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
+
+
+class _WireError(Exception):
+    def __init__(self, message: str, *value: Any) -> None:
+        self.value = value
+        super().__init__(message)
+
+
+def _hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
+    if isinstance(entry, str):
+        ends = [end.strip() for end in entry.split("->")]
+        if len(ends) < 2 or not all(_END.fullmatch(end) for end in ends):
+            raise _WireError('must read "block -> block" or "block.output -> block.input"', entry)
+        if len(ends) > 2 and any("." in end for end in ends):
+            raise _WireError("ports can be named only in a wire between two blocks", entry)
+        return [(a, b, {}) for a, b in zip(ends, ends[1:], strict=False)]
+    if not isinstance(entry, dict):
+        raise _WireError('must be text such as "gate -> radar", or a table', entry)
+    for name in entry:
+        if name not in _KEYS:
+            raise _WireError(f"unknown key {name!r}{did_you_mean(name, _KEYS)}")
+    source, target = entry.get("from"), entry.get("to")
+    for name, end in (("from", source), ("to", target)):
+        if not isinstance(end, str) or not _END.fullmatch(end.strip()):
+            raise _WireError(f'needs {name} = "block" or "block.port"', entry)
+    return [(str(source).strip(), str(target).strip(), _options(entry))]
+
+
+def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    if "delay" in entry and "delay_s" in entry:
+        raise _WireError("give delay or delay_s, not both", dict(entry))
+    if "delay" in entry:
+        match = _SCANS.fullmatch(str(entry["delay"]).strip())
+        if not match or int(match[1]) == 0:
+            raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
+        options["delay_scans"] = int(match[1])
+    if "delay_s" in entry:
+        try:
+            options["delay_s"] = parse_rational(entry["delay_s"])
+        except ValueError as error:
+            raise _WireError(f"delay_s {error}", entry["delay_s"]) from None
+        if options["delay_s"] < 0:
+            raise _WireError("delay_s must be 0 or greater", entry["delay_s"])
+    if "holds" in entry:
+        holds = entry["holds"]
+        if holds != "nothing" and not isinstance(holds, dict):
+            raise _WireError("holds must be 'nothing' or a table of the message's fields", holds)
+        options["holds"] = holds
+    return options
+
+
+def _connect(
+    source_end: str,
+    target_end: str,
+    options: dict[str, Any],
+    classes: Mapping[str, type[Component]],
+) -> Wire | None:
+    source, _, output = source_end.partition(".")
+    target, _, input_name = target_end.partition(".")
+    for name in (source, target):
+        if name not in classes:
+            raise _WireError(f"the scene has no block {name!r}{did_you_mean(name, classes)}")
+    source_class, target_class = classes[source], classes[target]
+    if source_class is None or target_class is None:
+        return None
+    outputs, inputs = source_class.outputs, target_class.inputs
+    if output and output not in outputs:
+        raise _WireError(f"{source} has no output {output!r}{did_you_mean(output, outputs)}")
+    if input_name and input_name not in inputs:
+        raise _WireError(f"{target} has no input {input_name!r}{did_you_mean(input_name, inputs)}")
+    fitting = [
+        (o, i)
+        for o in sorted(outputs)
+        for i in sorted(inputs)
+        if output in ("", o)
+        and input_name in ("", i)
+        and issubclass(outputs[o].message, inputs[i].message)
+    ]
+    if len(fitting) == 1:
+        return Wire(source, fitting[0][0], target, fitting[0][1], **options)
+    sends = ", ".join(f"{o} ({p.message.__name__})" for o, p in sorted(outputs.items())) or "none"
+    takes = ", ".join(f"{i} ({p.message.__name__})" for i, p in sorted(inputs.items())) or "none"
+    what = "does not fit" if not fitting else "fits in several ways; name the ports"
+    raise _WireError(
+        f"{source_end} -> {target_end} {what}: outputs of {source}: {sends}; "
+        f"inputs of {target}: {takes}"
+    )
+
+
+def _two_writers(
+    scene: SceneFile,
+    wires: list[Wire],
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+) -> None:
+    writers: dict[tuple[str, str], list[Wire]] = {}
+    for wire in wires:
+        writers.setdefault((wire.target, wire.input), []).append(wire)
+    for (target, input_name), found in sorted(writers.items()):
+        ends = [f"{w.source}.{w.output}" for w in found]
+        if len(set(ends)) < len(ends):
+            twice = sorted({end for end in ends if ends.count(end) > 1})
+            message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
+            problems.append(scene.problem(("wires",), message))
+        elif len(found) > 1 and not classes[target].inputs[input_name].many:
+            message = f"{target}.{input_name} has {len(found)} writers: {', '.join(sorted(ends))}"
+            problems.append(scene.problem(("wires",), message))
