@@ -21,14 +21,11 @@ class Channel:
         Name of the sending block.
     delay_ticks : int
         Time on the wire.
-    keep_last : bool
-        Whether the last arrived row stays readable (sampled and trigger inputs).
     """
 
-    def __init__(self, source: str, delay_ticks: int = 0, *, keep_last: bool = True) -> None:
+    def __init__(self, source: str, delay_ticks: int = 0) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
-        self._keep_last = keep_last
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
 
@@ -42,7 +39,12 @@ class Channel:
         self._waiting.append((arrivals, message))
         return arrivals
 
-    def take_until(self, end: int) -> tuple[IntArray, Message] | None:
+    def next_arrivals(self, end: int) -> IntArray:
+        """Return the ticks of the rows that arrive before `end` and were not collected yet."""
+        ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
+        return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
+
+    def collect(self, end: int) -> tuple[IntArray, Message] | None:
         """Remove and return the rows that arrive before `end`, or None."""
         taken: list[tuple[IntArray, Message]] = []
         while self._waiting:
@@ -50,7 +52,7 @@ class Channel:
             if arrivals[-1] < end:
                 taken.append(self._waiting.popleft())
                 continue
-            count = int(np.searchsorted(arrivals, end, side="left"))
+            count = int(np.searchsorted(arrivals, end))
             if count:
                 taken.append((arrivals[:count], message.take(slice(0, count))))
                 self._waiting[0] = (arrivals[count:], message.take(slice(count, len(message))))
@@ -58,26 +60,23 @@ class Channel:
         return _joined(taken)
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
-        """Return what the input holds at each of `ticks` (all before `end`).
+        """Return what the input holds at each of `ticks` (in order, all before `end`).
 
         Returns
         -------
         (message, rows) or None
             ``rows[i]`` is the row of `message` held at ``ticks[i]``; -1 when none has arrived.
         """
-        new = self.take_until(end)
+        new = self.collect(end)
         last = self._last
-        if new is not None and len(ticks) and new[0][0] <= ticks[0]:
-            last = None  # superseded before the first instant asked about: spare the copy
-        parts = [part for part in (last, new) if part is not None]
-        held = _joined(parts)
+        if new is not None:
+            self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
+            if new[0][0] <= ticks[0]:
+                last = None  # superseded before the first instant asked about: spare the copy
+        held = _joined([part for part in (last, new) if part is not None])
         if held is None:
             return None
         arrivals, message = held
-        if self._keep_last and new is not None:
-            self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
-        if new is not None and len(parts) == 1 and arrivals is ticks:
-            return message, np.arange(len(ticks))
         return message, np.searchsorted(arrivals, ticks, side="right") - 1
 
 

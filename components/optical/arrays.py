@@ -31,7 +31,8 @@ def as_finite(name: str, value: ArrayLike) -> FloatArray:
     finite = np.isfinite(array)
     if not finite.all():
         raise ValueError(
-            f"{name} is {_first(array, ~finite)}: it must be finite in every element (not NaN, not inf)"
+            f"{name} is {_first(array, ~finite)}: it must be finite (no NaN, no infinity) in every "
+            "element"
         )
     return array
 
@@ -84,12 +85,18 @@ def flatten_together(**arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatA
     strides of the array it came in.
     """
     try:
-        broadcast = np.broadcast_arrays(*arrays.values())
-    except ValueError as error:
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"the shapes do not broadcast together: {shapes}") from error
-    shape = broadcast[0].shape
-    return shape, [np.ascontiguousarray(array).reshape(-1) for array in broadcast]
+        raise ValueError(f"the shapes do not broadcast together: {shapes}") from None
+    flat = []
+    for array in arrays.values():
+        if array.shape != shape:
+            filled = np.empty(shape)
+            filled[...] = array
+            array = filled
+        flat.append(np.ascontiguousarray(array).reshape(-1))
+    return shape, flat
 
 
 def unflatten(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:

@@ -12,8 +12,9 @@ from components.optical.silhouette_exact import front_and_back_area, line_of_sig
 # and the Boeing 787 of Table 3.1, the range that errata 9 quotes.
 PLATE_ASPECT_RATIO = 3.0
 
-# Plates seen flatter than this hide nothing that a double could hold.
+# Plates seen flatter than this, or bodies thinner, hide nothing that matters in a double.
 _SMALLEST_PLATE_TILT = 1e-18
+_SMALLEST_ROUND_M2 = 1e-30
 
 
 def union_area(
@@ -86,7 +87,9 @@ def _overlap(
 ) -> FloatArray:
     """Integrate what the capsule and the plate cover twice; slant = |u_x u_y|, tilt = |u_z|."""
     # Where nothing can overlap, harmless stand-ins keep the arithmetic finite.
-    overlaps = (tilt > _SMALLEST_PLATE_TILT) & (round_m2 > 0.0) & (horizontal_m2 > 0.0)
+    overlaps = (
+        (tilt > _SMALLEST_PLATE_TILT) & (round_m2 > _SMALLEST_ROUND_M2) & (horizontal_m2 > 0.0)
+    )
     tilt = np.where(overlaps, tilt, 1.0)
     across = np.where(overlaps, sin_off_nose, 1.0)
     radius = np.sqrt(np.where(overlaps, round_m2, 1.0) / np.pi)

@@ -54,9 +54,8 @@ def line_of_sight_in_target_axes(
     leaving = np.sin(pitch_rad - elevation_rad) - (
         2.0 * sin_pitch * cos_elevation * np.square(np.sin(half_yaw))
     )
-    approaching = (
-        2.0 * sin_pitch * cos_elevation * np.square(np.cos(half_yaw))
-        - np.sin(pitch_rad + elevation_rad)
+    approaching = 2.0 * sin_pitch * cos_elevation * np.square(np.cos(half_yaw)) - np.sin(
+        pitch_rad + elevation_rad
     )
     m = np.where(cos_yaw >= 0.0, leaving, approaching)
     n = sin_yaw * cos_elevation

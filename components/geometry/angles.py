@@ -1,0 +1,194 @@
+"""Wrapping angles and taking sines in degrees without losing digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.inputs import FloatArray, common_shape, finite, shaped
+
+TWO_PI = 2.0 * np.pi
+RAD_PER_DEG = np.pi / 180.0
+
+# Below this size 360·n and longitude - 360·n are exact in doubles; above it fmod does the work.
+_LARGE_LONGITUDE_DEG = 1e12
+
+
+def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
+    """Wrap angles into (-pi, pi]; an angle already there keeps its bits.
+
+    Parameters
+    ----------
+    angle_rad : array_like
+        Any shape, radians.
+
+    Returns
+    -------
+    ndarray
+        The same shape, radians, reduced by the true 2 pi (not the double nearest to it), so that
+        many turns lose nothing beyond what the input itself had lost.
+
+    Raises
+    ------
+    ValueError
+        NaN or infinity.
+    """
+    angle = finite("angle_rad", angle_rad)
+    (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
+    return wrapped
+
+
+def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
+    """`wrap_pi` for a contiguous array that is known to be finite."""
+    inside = (angle > -np.pi) & (angle <= np.pi)
+    if inside.all():
+        return angle + 0.0
+    # The library's sin and cos reduce by the true pi, for any size of argument.
+    wrapped = np.arctan2(np.sin(angle), np.cos(angle))
+    wrapped = np.where(wrapped <= -np.pi, np.pi, wrapped)
+    return np.where(inside, angle, wrapped) + 0.0
+
+
+def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
+    """Wrap angles into [0, 2 pi); rounding never gives 2 pi itself.
+
+    Parameters
+    ----------
+    angle_rad : array_like
+        Any shape, radians.
+
+    Returns
+    -------
+    ndarray
+        The same shape, radians. An angle already there keeps its bits.
+
+    Raises
+    ------
+    ValueError
+        NaN or infinity.
+    """
+    angle = finite("angle_rad", angle_rad)
+    flat = np.atleast_1d(angle)
+    inside = (flat >= 0.0) & (flat < TWO_PI)
+    wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
+    (wrapped,) = shaped(angle.shape, wrapped)
+    return wrapped
+
+
+def positive_turn(angle: FloatArray) -> FloatArray:
+    """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
+    turned = np.where(angle < 0.0, angle + TWO_PI, angle)
+    # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
+    return np.where(turned >= TWO_PI, 0.0, turned) + 0.0
+
+
+def longitude_difference_deg(
+    lon1_deg: npt.ArrayLike, lon2_deg: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Find lon2 - lon1 in degrees, wrapped and without any rounding error.
+
+    Parameters
+    ----------
+    lon1_deg, lon2_deg : array_like
+        Degrees, any size (359.9 and 540 are fine), broadcast.
+
+    Returns
+    -------
+    difference_deg : ndarray
+        The double nearest to the exact difference, in [-180, 180).
+    error_deg : ndarray
+        What that rounding left out: modulo 360, `difference_deg + error_deg` is lon2 - lon1
+        exactly. Below 1.5e-14 in size.
+
+    Raises
+    ------
+    ValueError
+        NaN or infinity.
+
+    Notes
+    -----
+    Knuth's two-sum gives lon2 - lon1 and its rounding error; taking off whole turns is exact.
+    The idea is that of `AngDiff` in GeographicLib (C. F. F. Karney, "Algorithms for geodesics",
+    Journal of Geodesy 87, 2013).
+    """
+    lon1, lon2 = finite("lon1_deg", lon1_deg), finite("lon2_deg", lon2_deg)
+    shape = common_shape(lon1_deg=lon1, lon2_deg=lon2)
+    difference, error = _longitude_difference(np.atleast_1d(lon1), np.atleast_1d(lon2))
+    difference, error = shaped(shape, difference, error)
+    return difference, error
+
+
+def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArray:
+    """Give the double nearest to lon2 - lon1 in [-180, 180), for checked arrays of one axis up."""
+    return _add_wrapped(*_two_difference(_reduced(lon1), _reduced(lon2)))[0]
+
+
+def _longitude_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:
+    turn, low = _two_difference(_reduced(lon1), _reduced(lon2))
+    difference, rest = _add_wrapped(turn, low)
+    # |rest| >= |low| or rest = 0, so this fast two-sum leaves the exact error.
+    unwrapped = rest + low
+    return difference, low - (unwrapped - rest)
+
+
+def _reduced(lon: FloatArray) -> FloatArray:
+    """Take whole turns off absurdly large longitudes, exactly, and leave all others alone."""
+    if lon.size == 0 or max(lon.max(), -lon.min()) <= _LARGE_LONGITUDE_DEG:
+        return lon
+    return np.where(np.abs(lon) > _LARGE_LONGITUDE_DEG, np.fmod(lon, 360.0), lon)
+
+
+def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Knuth's two-sum of lon2 and -lon1: the rounded sum and what rounding left out."""
+    total = lon2 - lon1
+    part1 = total - lon2
+    part2 = total - part1
+    part2 = lon2 - part2
+    part1 += lon1
+    part2 -= part1
+    return total, part2
+
+
+def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Wrap total + low; returns the wrapped double and total less its whole turns."""
+    rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
+    difference = rest + low
+    over = (difference >= 180.0) | (difference < -180.0)
+    if over.any():
+        difference = np.where(
+            over, difference - np.where(difference > 0.0, 360.0, -360.0), difference
+        )
+    return difference, rest
+
+
+def sincosd(angle_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Take sine and cosine of an angle in degrees, reduced to one quadrant before rounding.
+
+    Parameters
+    ----------
+    angle_deg : array_like
+        Any shape, degrees, any size.
+
+    Returns
+    -------
+    sine, cosine : ndarray
+        The same shape. Exactly 0 and ±1 at whole quadrants; near a zero all digits are kept
+        (the cosine of 89.9999999999999 degrees, where radians keep one digit).
+
+    Raises
+    ------
+    ValueError
+        NaN or infinity.
+    """
+    angle = finite("angle_deg", angle_deg)
+    rest = np.fmod(np.atleast_1d(angle), 360.0)
+    quadrant = np.rint(rest / 90.0)
+    rest = (rest - 90.0 * quadrant) * RAD_PER_DEG
+    sine, cosine = np.sin(rest), np.cos(rest)
+    turn = quadrant.astype(np.int64) & 3
+    odd = (turn & 1).astype(bool)
+    # + 0.0 turns a negative zero into zero.
+    sin_out = np.where(odd, cosine, sine) * np.where(turn >= 2, -1.0, 1.0) + 0.0
+    cos_out = np.where(odd, sine, cosine) * np.where((turn == 1) | (turn == 2), -1.0, 1.0) + 0.0
+    sin_out, cos_out = shaped(angle.shape, sin_out, cos_out)
+    return sin_out, cos_out

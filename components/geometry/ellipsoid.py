@@ -1,0 +1,244 @@
+"""The exact line of sight between two positions on the WGS-84 ellipsoid."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.angles import (
+    RAD_PER_DEG,
+    longitude_difference_rounded,
+    positive_turn,
+)
+from components.geometry.inputs import FloatArray, positions, shaped
+
+SEMI_MAJOR_AXIS_M = 6378137.0
+"""WGS-84 equatorial radius (NIMA TR8350.2)."""
+FLATTENING = 1.0 / 298.257223563
+"""WGS-84 flattening (NIMA TR8350.2)."""
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+
+
+def line_of_sight(
+    own_lat_deg: npt.ArrayLike,
+    own_lon_deg: npt.ArrayLike,
+    own_alt_m: npt.ArrayLike,
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    *,
+    validate: bool = True,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Find azimuth, elevation and slant range of a target, exact on the WGS-84 ellipsoid.
+
+    Parameters
+    ----------
+    own_lat_deg, own_lon_deg, own_alt_m : array_like
+        The observer: geodetic latitude in [-90, 90] degrees, longitude in degrees (any number of
+        turns), height above the ellipsoid in metres.
+    lat_deg, lon_deg, alt_m : array_like
+        The target, likewise. All six broadcast.
+    validate : bool
+        False skips the checks of values, for a caller that has done them.
+
+    Returns
+    -------
+    azimuth_rad : ndarray
+        Clockwise from true north, in [0, 2 pi); 0 straight up, straight down and at the same point.
+    elevation_rad : ndarray
+        Above the observer's local horizontal (perpendicular to the ellipsoid normal), in
+        [-pi/2, pi/2]; 0 at the same point.
+    range_m : ndarray
+        Slant range, the length of the straight line (through the Earth if need be).
+
+    Raises
+    ------
+    ValueError
+        A latitude outside [-90, 90], an altitude outside [-6e6, 1e9] m, or NaN.
+
+    Notes
+    -----
+    See `line_of_sight_ned` for the formula and the error.
+    """
+    arrays, shape = positions(
+        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+    )
+    # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
+    with np.errstate(under="ignore"):
+        azimuth, elevation, slant_range = spherical_from_enu(*_north_east_up(*arrays))
+    azimuth, elevation, slant_range = shaped(shape, azimuth, elevation, slant_range)
+    return azimuth, elevation, slant_range
+
+
+def line_of_sight_ned(
+    own_lat_deg: npt.ArrayLike,
+    own_lon_deg: npt.ArrayLike,
+    own_alt_m: npt.ArrayLike,
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    *,
+    validate: bool = True,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Find the target's north, east and down offsets in the observer's local NED frame.
+
+    Parameters
+    ----------
+    own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+        As for `line_of_sight`.
+
+    Returns
+    -------
+    north_m, east_m, down_m : ndarray
+        Metres, the broadcast shape. Down is along the ellipsoid normal, positive downwards.
+
+    Raises
+    ------
+    ValueError
+        As for `line_of_sight`.
+
+    Notes
+    -----
+    The straightforward way, subtracting ECEF coordinates of 6e6 m, leaves 1e-9 m of rounding at
+    any range. Here every term is a product of a sine of a *difference* of coordinates, each
+    accurate to its last digits, so the error shrinks with the range. The difference of
+    longitudes is taken exactly before it is wrapped, and the distance of a latitude from its
+    pole is taken in degrees, where it is exact. With s, c sine and cosine of latitude,
+    w = sqrt(1 - e² s²) and N = a/w::
+
+        ds    = 2 cos((lat1 + lat2)/2) sin(dlat/2)
+        dN    = a e² ds (s1 + s2) / (w1 w2 (w1 + w2))
+        dNs   = N2 ds + dN s1
+        k     = 2 (N2 + h2) c2 sin²(dlon/2)
+        north = (N2 + h2) sin(dlat) - e² c1 dNs + s1 k
+        east  = (N2 + h2) c2 sin(dlon)
+        up    = dN + (h2 - h1) - 2 (N2 + h2) sin²(dlat/2) - e² s1 dNs - c1 k
+
+    Measured against 40-digit arithmetic over 15,000 hard pairs (poles, antimeridian, several
+    turns of longitude, across the pole, antipodes; 1 mm to 13,000 km of slant range, -400 m to
+    40 km of altitude): vector error at most 1.1e-15 of the range through azimuth, elevation and
+    range, 8e-16 in NED. About 0.1 us per pair in blocks of 10,000; 50-60 us for a call with a
+    few targets, which is why sensors evaluate windows of scans.
+    """
+    arrays, shape = positions(
+        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+    )
+    with np.errstate(under="ignore"):
+        north, east, up = _north_east_up(*arrays)
+    north, east, down = shaped(shape, north, east, 0.0 - up)
+    return north, east, down
+
+
+def radii_of_curvature(lat_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Find the radii of curvature of the WGS-84 ellipsoid at a latitude.
+
+    Parameters
+    ----------
+    lat_deg : array_like
+        Geodetic latitude, degrees.
+
+    Returns
+    -------
+    meridian_m, prime_vertical_m : ndarray
+        M (north-south) and N (east-west), metres, on the ellipsoid.
+    """
+    sine = np.sin(np.asarray(lat_deg, dtype=np.float64, order="C") * RAD_PER_DEG)
+    w_squared = 1.0 - ECCENTRICITY_SQUARED * sine * sine
+    prime_vertical = SEMI_MAJOR_AXIS_M / np.sqrt(w_squared)
+    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / w_squared, prime_vertical
+
+
+def spherical_from_enu(
+    north: FloatArray, east: FloatArray, up: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Turn north, east, up offsets into azimuth in [0, 2 pi), elevation and range.
+
+    Parameters
+    ----------
+    north, east, up : ndarray
+        Metres, broadcast, at least one axis.
+
+    Returns
+    -------
+    azimuth_rad, elevation_rad, range_m : ndarray
+        Azimuth is 0 where there is no horizontal offset.
+    """
+    north, east, up = (np.ascontiguousarray(x) for x in np.broadcast_arrays(north, east, up))
+    level_squared = north * north
+    level_squared += east * east
+    level = np.sqrt(level_squared)
+    elevation = np.arctan2(up, level)
+    level_squared += up * up
+    slant_range = np.sqrt(level_squared, out=level_squared)
+    return positive_turn(np.arctan2(east, north)), elevation, slant_range
+
+
+def _north_east_up(
+    lat1: FloatArray,
+    lon1: FloatArray,
+    alt1: FloatArray,
+    lat2: FloatArray,
+    lon2: FloatArray,
+    alt2: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Difference form of the WGS-84 line of sight; 1 is the observer, 2 the target."""
+    e2 = ECCENTRICITY_SQUARED
+    sin1, cos1 = np.sin(lat1 * RAD_PER_DEG), _cos_deg(lat1)
+    dlat = lat2 - lat1  # rounds, but relative to itself: nothing is wrapped afterwards
+    sin_half, cos_half = np.sin(dlat * (0.5 * RAD_PER_DEG)), _cos_deg(0.5 * dlat)
+
+    # sin(lat2) - sin(lat1); the cosine of the mean latitude may lose relative accuracy at the
+    # pole, but here it is only ever multiplied by something of the size of the offset.
+    dsin = cos1 * cos_half
+    dsin -= sin1 * sin_half
+    dsin *= sin_half
+    dsin *= 2.0
+    sin2 = sin1 + dsin
+
+    w1 = np.sqrt(1.0 - e2 * sin1 * sin1)
+    w2 = sin2 * sin2
+    w2 *= -e2
+    w2 += 1.0
+    np.sqrt(w2, out=w2)
+    n2 = SEMI_MAJOR_AXIS_M / w2
+
+    # N2 - N1, then N2 sin(lat2) - N1 sin(lat1)
+    sin2 += sin1
+    dn = dsin * sin2
+    dn *= n2
+    w2 += w1
+    w2 *= w1 * (1.0 / e2)
+    dn /= w2
+    dsin *= n2
+    dsin += dn * sin1
+    dsin *= e2
+
+    n2 = n2 + alt2
+    dlon = longitude_difference_rounded(lon1, lon2)
+    dlon *= 0.5
+    cos_half_lon = _cos_deg(dlon)
+    dlon *= RAD_PER_DEG
+    sin_half_lon = np.sin(dlon, out=dlon)
+
+    across = n2 * _cos_deg(lat2)
+    across = across * sin_half_lon
+    across *= 2.0
+    east = across * cos_half_lon
+    across *= sin_half_lon  # the bulge of the parallel, towards the Earth's axis
+
+    n2 *= sin_half
+    n2 *= 2.0
+    north = n2 * cos_half
+    north -= dsin * cos1
+    north = north + across * sin1
+    n2 *= sin_half
+    up = dn - n2
+    up -= dsin * sin1
+    up = up - across * cos1
+    up = up + (alt2 - alt1)
+    return north, east, up
+
+
+def _cos_deg(angle_deg: FloatArray) -> FloatArray:
+    """Cosine of degrees in ±90, all digits kept near the ends: 90 - |x| is exact there."""
+    return np.sin((90.0 - np.abs(angle_deg)) * RAD_PER_DEG)

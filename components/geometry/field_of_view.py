@@ -1,0 +1,136 @@
+"""Whether a direction lies in a sensor's field of view, and a range in its reach."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.angles import TWO_PI, wrap_pi_unchecked
+from components.geometry.inputs import FloatArray, common_shape, finite
+
+BoolArray = npt.NDArray[np.bool_]
+
+_EPS = float(np.finfo(np.float64).eps)
+# Rounding of two angles near 2 pi, of 2 pi itself and of their sum.
+_WRAP_TOLERANCE_RAD = 8.0 * _EPS
+
+
+def inside(
+    p_rad: npt.ArrayLike,
+    q_rad: npt.ArrayLike,
+    *,
+    azimuth_min_rad: float,
+    azimuth_max_rad: float,
+    elevation_min_rad: float,
+    elevation_max_rad: float,
+) -> BoolArray:
+    """Tell which directions lie inside a field of view.
+
+    Parameters
+    ----------
+    p_rad, q_rad : array_like
+        Azimuth and elevation in the sensor's body axes, broadcast. Any number of turns of azimuth.
+    azimuth_min_rad, azimuth_max_rad : float
+        The field runs clockwise from min to max, each in [-2 pi, 2 pi]. It may be wider than pi
+        and may cross ±pi: 170 to 190 degrees and 170 to -170 degrees are the same field. A width
+        of 2 pi is the full circle.
+    elevation_min_rad, elevation_max_rad : float
+        In [-pi/2, pi/2], min not above max.
+
+    Returns
+    -------
+    ndarray of bool
+        The bounds belong to the field. An azimuth that is compared without adding a turn is
+        compared exactly; one that is a whole turn off the bounds, to within its rounding (2e-15 rad
+        and more for many turns), which cannot put a bound outside its own field.
+
+    Raises
+    ------
+    ValueError
+        A bound out of place, or NaN or infinity in the angles.
+    """
+    low, high = _azimuth_bounds(azimuth_min_rad, azimuth_max_rad)
+    _require("elevation_min_rad", elevation_min_rad, 0.5 * math.pi, "[-pi/2, pi/2]")
+    _require("elevation_max_rad", elevation_max_rad, 0.5 * math.pi, "[-pi/2, pi/2]")
+    if elevation_min_rad > elevation_max_rad:
+        raise ValueError(
+            f"elevation_min_rad is {elevation_min_rad}: it must not exceed elevation_max_rad, "
+            f"{elevation_max_rad}"
+        )
+    p, q = finite("p_rad", p_rad), finite("q_rad", q_rad)
+    shape = common_shape(p_rad=p, q_rad=q)
+    in_elevation = (q >= elevation_min_rad) & (q <= elevation_max_rad)
+    if high - low >= TWO_PI:
+        return np.array(np.broadcast_to(in_elevation, shape))[()]
+    in_azimuth = _in_sector(np.atleast_1d(p), low, high).reshape(p.shape)
+    return np.asarray(in_azimuth & in_elevation)[()]
+
+
+def within_range(
+    range_m: npt.ArrayLike, *, range_min_m: float = 0.0, range_max_m: float = math.inf
+) -> BoolArray:
+    """Tell which ranges lie between a sensor's nearest and farthest range, bounds included.
+
+    Parameters
+    ----------
+    range_m : array_like
+        Slant range, metres, not negative.
+    range_min_m, range_max_m : float
+        Metres; the farthest may be infinite.
+
+    Returns
+    -------
+    ndarray of bool
+        The shape of `range_m`.
+
+    Raises
+    ------
+    ValueError
+        A range that is negative or not finite, or bounds that are negative or out of order.
+    """
+    if not 0.0 <= range_min_m < math.inf:
+        raise ValueError(f"range_min_m is {range_min_m}: it must be finite and not negative")
+    if not range_max_m >= range_min_m:
+        raise ValueError(
+            f"range_max_m is {range_max_m}: it must not be less than range_min_m, {range_min_m}"
+        )
+    distance = finite("range_m", range_m)
+    if distance.size and distance.min() < 0.0:
+        raise ValueError(f"range_m is {distance.min()}: it must not be negative")
+    return (distance >= range_min_m) & (distance <= range_max_m)
+
+
+def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
+    _require("azimuth_min_rad", azimuth_min_rad, TWO_PI, "[-2 pi, 2 pi]")
+    _require("azimuth_max_rad", azimuth_max_rad, TWO_PI, "[-2 pi, 2 pi]")
+    low, high = float(azimuth_min_rad), float(azimuth_max_rad)
+    if high < low:
+        high += TWO_PI
+    if high < low:
+        raise ValueError(
+            f"azimuth_min_rad is {azimuth_min_rad}: it must be at most one turn above "
+            f"azimuth_max_rad, {azimuth_max_rad}"
+        )
+    return low, high
+
+
+def _in_sector(azimuth: FloatArray, low: float, high: float) -> BoolArray:
+    """Compare azimuths with bounds, at every whole turn that the bounds can reach."""
+    p = wrap_pi_unchecked(azimuth)
+    slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
+    slack_here = np.where(p == azimuth, 0.0, slack)
+    result = (p >= low - slack_here) & (p <= high + slack_here)
+    for turns in (-2.0, -1.0, 1.0, 2.0):
+        shift = turns * TWO_PI
+        # A margin of 1 rad only decides whether the comparison is worth doing.
+        if shift - math.pi <= high + 1.0 and shift + math.pi >= low - 1.0:
+            turned = p + shift
+            result |= (turned >= low - slack) & (turned <= high + slack)
+    return result
+
+
+def _require(name: str, value: float, limit: float, allowed: str) -> None:
+    if not abs(value) <= limit:
+        raise ValueError(f"{name} is {value}: it must lie in {allowed}")

@@ -1,0 +1,140 @@
+"""How much does a target stand out against its background, and how much of that reaches us?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.optical.arrays import flatten_together, non_negative, positive, unflatten
+from components.optical.line_of_sight_rate import angle_between
+from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
+
+# ln 50, as meteorologists round it: visibility is where a black object's contrast falls to 2 %.
+KOSCHMIEDER = 3.912
+
+
+def contrast_gain(
+    *,
+    model: str = "constant",
+    contrast: ArrayLike = 1.0,
+    azimuth_rad: ArrayLike = 0.0,
+    elevation_rad: ArrayLike = 0.0,
+    range_m: ArrayLike = 0.0,
+    visibility_m: ArrayLike | None = None,
+    sun_azimuth_rad: ArrayLike = 0.0,
+    sun_elevation_rad: ArrayLike = 0.25 * np.pi,
+    sun_exclusion_rad: ArrayLike = 0.0,
+    paint_reflectance: ArrayLike = 0.5,
+    ground_reflectance: ArrayLike = 0.2,
+    sky: str = "clear",
+    background: str = "auto",
+) -> Any:
+    """Give the factor P by which contrast multiplies the static signature (thesis eq. 18).
+
+    - ``constant``: `contrast` itself, the thesis's P.
+    - ``daylight``: `contrast` times the target's own contrast |Lt - Lb| / Lb against its
+      background (`target_luminance`, `background_luminance`); 0 closer to the sun than
+      `sun_exclusion_rad`, where it blinds the camera.
+
+    Either is multiplied by Koschmieder's exp(-3.912 range / visibility) if a visibility is given.
+    P is not limited to 1: a sunlit aircraft may be several times brighter than the forest behind
+    it.
+
+    Parameters
+    ----------
+    model : {"constant", "daylight"}
+    contrast : array_like
+        P of the thesis; under ``daylight`` a calibration factor.
+    azimuth_rad, elevation_rad : array_like, rad
+        Line of sight from us to the target, in the horizon's frame (north-east-down).
+    range_m : array_like, m
+        Slant range, for the visibility.
+    visibility_m : array_like, m, optional
+        Meteorological visibility (2 % contrast). None: the air is perfectly clear.
+    sun_azimuth_rad, sun_elevation_rad : array_like, rad
+        Direction of the sun, same frame; the sun must be up.
+    sun_exclusion_rad : array_like, rad
+        Half angle of the cone round the sun in which the camera sees nothing; 0 for none.
+    paint_reflectance, ground_reflectance : array_like
+        Diffuse reflectances, paint in [0, 1], ground in (0, 1]. The defaults 0.5 (grey) and 0.2
+        (grass, forest) are assumptions.
+    sky : {"clear", "partly_cloudy", "overcast"}
+    background : {"sky", "ground", "auto"}
+        What lies behind the target; ``auto`` is sky from elevation 0 up, ground below.
+
+    Returns
+    -------
+    array of the broadcast shape
+        P, 0 or more.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite, or a name is unknown.
+    """
+    if model not in ("constant", "daylight"):
+        raise ValueError(f"model is {model!r}: it must be 'constant' or 'daylight'")
+    gain = non_negative("contrast", contrast)
+    if model == "daylight":
+        target = target_luminance(
+            azimuth_rad,
+            elevation_rad,
+            sun_azimuth_rad,
+            sun_elevation_rad,
+            paint_reflectance=paint_reflectance,
+            ground_reflectance=ground_reflectance,
+            sky=sky,
+        )
+        behind = background_luminance(
+            azimuth_rad,
+            elevation_rad,
+            sun_azimuth_rad,
+            sun_elevation_rad,
+            ground_reflectance=ground_reflectance,
+            sky=sky,
+            background=background,
+        )
+        from_sun = angle_between(azimuth_rad, elevation_rad, sun_azimuth_rad, sun_elevation_rad)
+        blinded = from_sun < non_negative("sun_exclusion_rad", sun_exclusion_rad)
+        gain = gain * np.where(blinded, 0.0, inherent_contrast(target, behind))
+    shape = np.broadcast_shapes(
+        np.shape(gain), np.shape(azimuth_rad), np.shape(elevation_rad), np.shape(range_m)
+    )
+    gain = np.broadcast_to(gain, shape)
+    if visibility_m is None:
+        return gain.copy()[()]
+    return gain * visibility_transmission(range_m, visibility_m)
+
+
+def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
+    """Give the share of a contrast that is left after a path through haze.
+
+    exp(-3.912 range / visibility), Koschmieder's law. Exact for a target against the horizon sky
+    in even haze; used for every background here.
+
+    Parameters
+    ----------
+    range_m : array_like, m
+        0 or more.
+    visibility_m : array_like, m
+        Above 0: range at which 2 % of the contrast is left.
+
+    Returns
+    -------
+    array of the broadcast shape, in [0, 1]
+
+    Raises
+    ------
+    ValueError
+        If the range is negative, the visibility not above 0, or either not finite.
+    """
+    shape, (distance, visibility) = flatten_together(
+        range_m=non_negative("range_m", range_m),
+        visibility_m=positive("visibility_m", visibility_m),
+    )
+    # From 200 visibilities on nothing is left that a double could hold.
+    gone = distance * (1.0 / 200.0) >= visibility
+    depth = np.where(gone, 0.0, distance) / np.where(gone, 1.0, visibility)
+    return unflatten(np.where(gone, 0.0, np.exp(-KOSCHMIEDER * depth)), shape)

@@ -1,0 +1,139 @@
+"""How large does an aircraft look to an infrared camera: front, back and exhaust plume?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.optical.arrays import angle, flatten_together, non_negative, unflatten
+from components.optical.silhouette import visible_area
+from components.optical.silhouette_exact import line_of_sight_in_target_axes
+
+# Assumption: the plume seen from dead astern, as a share of the back area. Table 4.5 only ranks the
+# engines: a propeller's airflow is cold, a turbofan mixes much cold with little hot air, a
+# turbojet's is hot; §4.3.2 draws the same order.
+PLUME_SHARE_OF_BACK = {"propeller": 0.0, "turbofan": 0.25, "turbojet": 1.0}
+
+
+def plume_area(
+    relative_heading_rad: ArrayLike,
+    pitch_rad: ArrayLike,
+    roll_rad: ArrayLike,
+    elevation_rad: ArrayLike,
+    *,
+    back_m2: ArrayLike,
+    engine: str,
+    plume_share_of_back: ArrayLike | None = None,
+) -> Any:
+    """Give the extra area that the hot exhaust plume adds, growing from nose to tail aspect.
+
+    share · back · (1 + cos g)/2, with g the angle between the target's nose and the line of sight
+    from us to it: 0 head-on, where the airframe hides the plume, half abeam, all of it from
+    astern. The law and the shares are assumptions (the thesis gives the order of the engines and
+    folds the plume into the areas of Tables 3.2 and 4.6).
+
+    Parameters
+    ----------
+    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
+        As in `components.optical.silhouette.visible_area`.
+    back_m2 : array_like, m²
+        Back sphere.
+    engine : {"propeller", "turbofan", "turbojet"}
+        Selects the share; see `PLUME_SHARE_OF_BACK`.
+    plume_share_of_back : array_like, optional
+        Used instead of the engine's own share.
+
+    Returns
+    -------
+    array of the broadcast shape, m²
+
+    Raises
+    ------
+    ValueError
+        If the engine is unknown, or an argument is negative or not finite.
+    """
+    if engine not in PLUME_SHARE_OF_BACK:
+        raise ValueError(
+            f"engine is {engine!r}: it must be one of {', '.join(PLUME_SHARE_OF_BACK)}"
+        )
+    share = PLUME_SHARE_OF_BACK[engine] if plume_share_of_back is None else plume_share_of_back
+    shape, (heading, pitch, roll, elevation, back, shares) = flatten_together(
+        relative_heading_rad=angle("relative_heading_rad", relative_heading_rad),
+        pitch_rad=angle("pitch_rad", pitch_rad),
+        roll_rad=angle("roll_rad", roll_rad),
+        elevation_rad=angle("elevation_rad", elevation_rad),
+        back_m2=non_negative("back_m2", back_m2),
+        plume_share_of_back=non_negative("plume_share_of_back", share),
+    )
+    cos_off_nose, _, _, _ = line_of_sight_in_target_axes(heading, pitch, roll, elevation)
+    return unflatten(shares * back * np.clip(0.5 + 0.5 * cos_off_nose, 0.0, 1.0), shape)
+
+
+def infrared_area(
+    relative_heading_rad: ArrayLike,
+    pitch_rad: ArrayLike,
+    roll_rad: ArrayLike,
+    elevation_rad: ArrayLike,
+    *,
+    front_m2: ArrayLike,
+    back_m2: ArrayLike,
+    side_m2: ArrayLike,
+    horizontal_m2: ArrayLike,
+    engine: str | None = None,
+    plume_share_of_back: ArrayLike | None = None,
+    model: str = "exact",
+) -> Any:
+    """Give the area that radiates towards an infrared camera (thesis eq. 20-21).
+
+    The silhouette with separate front and back, plus the plume if an engine is named. Without an
+    engine this is the thesis's model, whose tables already hold the doubled back (errata 23c):
+    naming an engine adds to it, so pair it with a back that is not doubled.
+
+    Parameters
+    ----------
+    relative_heading_rad, pitch_rad, roll_rad, elevation_rad : array_like, rad
+        As in `components.optical.silhouette.visible_area`.
+    front_m2, back_m2, side_m2, horizontal_m2 : array_like, m²
+        Table 3.2 (first) or Table 4.6 (refined), in `configs/aircraft/`.
+    engine : {"propeller", "turbofan", "turbojet"}, optional
+        Adds `plume_area`.
+    plume_share_of_back : array_like, optional
+        Used instead of the engine's own share.
+    model : {"exact", "thesis", "convex_hull"}
+        Rung of the silhouette.
+
+    Returns
+    -------
+    array of the broadcast shape, m²
+
+    Raises
+    ------
+    ValueError
+        As `visible_area` and `plume_area`, or if a share is given without an engine.
+    """
+    area = visible_area(
+        relative_heading_rad,
+        pitch_rad,
+        roll_rad,
+        elevation_rad,
+        front_m2=front_m2,
+        side_m2=side_m2,
+        horizontal_m2=horizontal_m2,
+        back_m2=back_m2,
+        model=model,
+    )
+    if engine is None:
+        if plume_share_of_back is not None:
+            raise ValueError("engine is None: it must be named for plume_share_of_back to be used")
+        return area
+    return area + plume_area(
+        relative_heading_rad,
+        pitch_rad,
+        roll_rad,
+        elevation_rad,
+        back_m2=back_m2,
+        engine=engine,
+        plume_share_of_back=plume_share_of_back,
+    )

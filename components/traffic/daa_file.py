@@ -1,0 +1,224 @@
+"""Read DAIDALUS `.daa` and `.xyz` encounter files."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from components.traffic.enu import enu_to_geodetic
+from components.traffic.normals import FloatArray, local_axes
+from components.traffic.sample_table import (
+    UNITS,
+    Column,
+    SampleTable,
+    enu_velocity,
+    unit_factor,
+)
+from components.traffic.text_rows import cell_count, cells, read_lines, tokens
+from components.traffic.traffic_file import Problems, TrafficFile, TrafficFileError, did_you_mean
+from components.traffic.units import ALL_TOKENS, clean_token
+
+__all__ = ["TrafficFile", "TrafficFileError", "read_daa"]
+
+_HEADERS = {
+    "name": ("name", "id", "aircraft", "acid", "callsign", "ident"),
+    "time": ("time", "t", "clock"),
+    "lat": ("lat", "latitude"),
+    "lon": ("lon", "long", "longitude", "lng"),
+    "alt": ("alt", "altitude"),
+    "sx": ("sx", "x"),
+    "sy": ("sy", "y"),
+    "sz": ("sz", "z"),
+    "trk": ("trk", "track"),
+    "gs": ("gs", "groundspeed", "ground_speed"),
+    "vs": ("vs", "verticalspeed", "vertical_speed"),
+    "vx": ("vx",),
+    "vy": ("vy",),
+    "vz": ("vz",),
+}
+# What DAIDALUS itself assumes where a file has no row of units.
+_DEFAULT_UNITS = {
+    "time": "s",
+    "lat": "deg",
+    "lon": "deg",
+    "alt": "ft",
+    "sx": "nmi",
+    "sy": "nmi",
+    "sz": "ft",
+    "trk": "deg",
+    "gs": "knot",
+    "vs": "fpm",
+    "vx": "knot",
+    "vy": "knot",
+    "vz": "fpm",
+}
+_VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
+
+
+def read_daa(
+    path: str | PathLike[str],
+    *,
+    reference_lat_deg: float = 0.0,
+    reference_lon_deg: float = 0.0,
+    reference_alt_m: float = 0.0,
+) -> TrafficFile:
+    """Read a `.daa` or `.xyz` file: one row of names, one of units, then samples.
+
+    Parameters
+    ----------
+    path : path-like
+        The file. Which of the two kinds it is shows in its columns, not in its name.
+    reference_lat_deg, reference_lon_deg, reference_alt_m : float
+        Where on Earth the origin of an `.xyz` file (sx sy sz: east, north, up) is put. The
+        tangent frame there is kept exactly, so distances between aircraft are those of the file.
+
+    Returns
+    -------
+    TrafficFile
+        The first aircraft named is the ownship. Times count from the earliest sample.
+
+    Raises
+    ------
+    TrafficFileError
+        With all problems of the file (up to 20): line, column, value, what is allowed.
+
+    Notes
+    -----
+    Columns may come in any order; only name, time and position are required. Velocity is taken
+    from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there; all other columns
+    are ignored. Commas, semicolons, tabs and blanks separate, also mixed. A file without a row
+    of units is read with those of DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the
+    notes. Altitudes are taken as heights above the ellipsoid.
+    """
+    problems = Problems(str(path))
+    lines = read_lines(Path(path), problems)
+    header_line, header_text = lines[0]
+    headers = tokens(header_text)
+    places = _find_columns(problems, headers, header_line)
+    notes: list[str] = []
+    units, body = _find_units(problems, headers, places, lines[1:], notes)
+    columns = {}
+    for quantity in _wanted(places):
+        index = places[quantity]
+        line, token = units[quantity]
+        factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
+        columns[quantity] = Column(index, headers[index], factor)
+    ignored = [
+        h
+        for i, h in enumerate(headers)
+        if i != places["name"] and i not in {c.index for c in columns.values()}
+    ]
+    if ignored:
+        notes.append(f"columns ignored: {', '.join(ignored)}")
+    table = SampleTable(problems, places["name"], columns)
+    table.notes = notes
+    for number, text in body:
+        row = cells(text, len(headers), places["name"])
+        if row is None:
+            problems.add(
+                f"the row has {cell_count(text)} values: the header names {len(headers)} columns",
+                line=number,
+            )
+        else:
+            table.add_row(number, row)
+    reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
+    if "sx" in columns:
+        notes.append(
+            f"positions are offsets from a reference point, put at latitude {reference[0]:g}, "
+            f"longitude {reference[1]:g}, altitude {reference[2]:g} m"
+        )
+    return table.finish(None, lambda samples: _geodetic(samples, reference))
+
+
+def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str, int]:
+    """Find which column holds what; a missing required one ends the reading."""
+    plain = [header.lower() for header in headers]
+    places: dict[str, int] = {}
+    for quantity, names in _HEADERS.items():
+        for name in names:
+            if name in plain and quantity not in places:
+                places[quantity] = plain.index(name)
+    offsets = any(q in places for q in ("sx", "sy", "sz")) and "lat" not in places
+    required = ("name", "time", *(("sx", "sy", "sz") if offsets else ("lat", "lon", "alt")))
+    unused = [h for i, h in enumerate(plain) if i not in places.values()]
+    for quantity in required:
+        if quantity not in places:
+            hint = did_you_mean(quantity, unused).replace("did you mean", "is it")
+            problems.add(
+                f"there is no column {quantity!r} among {', '.join(headers)}{hint}", line=line
+            )
+    problems.raise_if_any()
+    for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):
+        places.pop(quantity, None)
+    return places
+
+
+def _wanted(places: dict[str, int]) -> list[str]:
+    """List the quantities to read: time, position and one complete velocity."""
+    wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in places]
+    for velocity in _VELOCITIES:
+        if all(q in places for q in velocity):
+            return wanted + list(velocity)
+    return wanted
+
+
+def _find_units(
+    problems: Problems,
+    headers: list[str],
+    places: dict[str, int],
+    lines: list[tuple[int, str]],
+    notes: list[str],
+) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
+    """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
+    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in _DEFAULT_UNITS.items()}
+    if not lines:
+        problems.fail("there are no samples after the row of column names")
+    line, text = lines[0]
+    row = tokens(text)
+    bracketed = "[" in text
+    known = sum(clean_token(token) in ALL_TOKENS for token in row)
+    if not bracketed and known < max(2, len(row) // 2):
+        used = [f"{headers[places[q]]} [{u}]" for q, u in _DEFAULT_UNITS.items() if q in places]
+        notes.append(f"there is no row of units; assumed {', '.join(used)}")
+        return defaults, lines
+    if len(row) != len(headers):
+        problems.fail(
+            f"the row of units has {len(row)} entries: the header names {len(headers)} columns",
+            line=line,
+        )
+    units: dict[str, tuple[int | None, str]] = {
+        q: (line, row[places[q]]) for q in places if q in UNITS
+    }
+    return units, lines[1:]
+
+
+def _geodetic(
+    samples: dict[str, FloatArray], reference: tuple[float, float, float]
+) -> dict[str, FloatArray]:
+    """Turn one aircraft's columns into geodetic positions and local velocities."""
+    velocity = enu_velocity(samples)
+    if "sx" not in samples:
+        return {**samples, **velocity}
+    lat, lon, alt = enu_to_geodetic(
+        samples["sx"],
+        samples["sy"],
+        samples["sz"],
+        reference_lat_deg=reference[0],
+        reference_lon_deg=reference[1],
+        reference_alt_m=reference[2],
+    )
+    if velocity:
+        # The file's axes are the reference point's; the aircraft's own have turned a little.
+        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
+        parts = [velocity[key] for key in ("ve", "vn", "vu")]
+        x, y, z = (
+            parts[0] * origin[0][i] + parts[1] * origin[1][i] + parts[2] * origin[2][i]
+            for i in range(3)
+        )
+        velocity = {
+            key: x * axis[0] + y * axis[1] + z * axis[2]
+            for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
+        }
+    return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity}

@@ -1,0 +1,193 @@
+"""Many aircraft at once: arrays of scans by aircraft."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from components.traffic.geodesic_motion import geodesic_state
+from components.traffic.leg_builder import hold_state
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.normals import FloatArray
+from components.traffic.trajectory import (
+    SampledTrajectory,
+    TrajectoryState,
+    evaluate_segments,
+    locate,
+)
+
+CELLS_AT_ONCE = 16_384
+"""Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
+
+
+class ScriptedFleet:
+    """Scripted aircraft evaluated together, bit for bit as each would be alone.
+
+    All aircraft with a single straight leg are one array expression, all that stand still
+    another; the others are evaluated one by one.
+
+    Parameters
+    ----------
+    trajectories : sequence of ScriptedTrajectory
+        Any number.
+    """
+
+    def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
+        self.trajectories = list(trajectories)
+        self.names = [trajectory.name for trajectory in self.trajectories]
+        kinds = [t.segments[0].kind if len(t.segments) == 1 else "" for t in self.trajectories]
+        self._groups = [
+            _Group([i for i, k in enumerate(kinds) if k == kind], self.trajectories, formula)
+            for kind, formula in (("geodesic", geodesic_state), ("hold", hold_state))
+            if kind in kinds
+        ]
+        self._single = [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")]
+
+    def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
+        """Give every aircraft's state at some times.
+
+        Parameters
+        ----------
+        time_s : array_like, shape (S,)
+            Seconds.
+
+        Returns
+        -------
+        TrajectoryState
+            Arrays of shape (S, T), aircraft in the order given.
+        """
+        times = _times(time_s)
+        state = _empty_state(len(times), len(self.trajectories))
+        for group in self._groups:
+            group.fill(state, times)
+        for i in self._single:
+            alone = self.trajectories[i].at(times)
+            for out, column in zip(state.arrays(), alone.arrays(), strict=True):
+                out[:, i] = column
+        return state
+
+
+class _Group:
+    """Aircraft of one segment each that share a formula."""
+
+    def __init__(
+        self,
+        members: list[int],
+        trajectories: list[ScriptedTrajectory],
+        formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]],
+    ) -> None:
+        chosen = [trajectories[i] for i in members]
+        self._formula = formula
+        everyone = len(members) == len(trajectories)
+        self._columns: slice | list[int] = slice(None) if everyone else members
+        self._table = np.stack([t.segments[0].parameters for t in chosen], axis=-1)[:, np.newaxis]
+        self._start = np.array([t.start_time_s for t in chosen])
+        self._end = np.array([t.end_time_s for t in chosen])
+        self._until = np.array([t.evaluated_until_s for t in chosen])
+        derived = [(np.nan, t.segments[0].pitch_rad, t.segments[0].roll_rad) for t in chosen]
+        self._attitude = np.array(
+            [
+                [d if f is None else f for f, d in zip(t.fixed_attitude_rad, angles, strict=True)]
+                for t, angles in zip(chosen, derived, strict=True)
+            ]
+        ).T
+        self._yaw_is_fixed = np.array([t.fixed_attitude_rad[0] is not None for t in chosen])
+
+    def fill(self, state: TrajectoryState, times: FloatArray) -> None:
+        """Write the group's columns of the state."""
+        rows = max(1, CELLS_AT_ONCE // len(self._start))
+        fixed_yaw, pitch, roll = self._attitude
+        for first in range(0, len(times), rows):
+            block = slice(first, first + rows)
+            t = times[block, np.newaxis]
+            inside = np.where(t > self._start, t, self._start)
+            inside = np.where(inside < self._until, inside, self._until)
+            lat, lon, alt, yaw = self._formula(self._table, inside - self._start)
+            if self._yaw_is_fixed.any():
+                yaw = np.where(self._yaw_is_fixed, fixed_yaw, yaw)
+            present = (t >= self._start) & (t <= self._end)
+            values = (lat, lon, alt, yaw, pitch, roll, present)
+            for out, value in zip(state.arrays(), values, strict=True):
+                out[block, self._columns] = value
+
+
+class SampledFleet:
+    """Sampled aircraft evaluated together, bit for bit as each would be alone.
+
+    Aircraft with the same sample times are looked up once for all of them.
+
+    Parameters
+    ----------
+    trajectories : sequence of SampledTrajectory
+        Any number.
+    """
+
+    def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
+        self.trajectories = list(trajectories)
+        self.names = [trajectory.name for trajectory in self.trajectories]
+        self._bases: list[tuple[FloatArray, list[int]]] = []
+        by_bytes: dict[bytes, list[int]] = {}
+        for i, trajectory in enumerate(self.trajectories):
+            base = trajectory.sample_times_s
+            columns = by_bytes.setdefault(base.tobytes(), [])
+            if not columns:
+                self._bases.append((base, columns))
+            columns.append(i)
+        lengths = [len(trajectory.sample_times_s) for trajectory in self.trajectories]
+        self._first_segment = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.intp)
+        self._table = np.ascontiguousarray(
+            np.concatenate([t.coefficients for t in self.trajectories], axis=1)
+            if self.trajectories
+            else np.zeros((25, 0))
+        )
+
+    def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
+        """Give every aircraft's state at some times.
+
+        Parameters
+        ----------
+        time_s : array_like, shape (S,)
+            Seconds.
+
+        Returns
+        -------
+        TrajectoryState
+            Arrays of shape (S, T), aircraft in the order given; `present` is False outside an
+            aircraft's samples.
+        """
+        times = _times(time_s)
+        count = len(self.trajectories)
+        state = _empty_state(len(times), count)
+        rows = max(1, CELLS_AT_ONCE // max(1, count))
+        for first in range(0, len(times), rows) if count else ():
+            block = slice(first, first + rows)
+            t = times[block]
+            shape = (len(t), count)
+            index, elapsed = np.empty(shape, dtype=np.intp), np.empty(shape)
+            present = np.empty(shape, dtype=bool)
+            for base, columns in self._bases:
+                segment, since, there = locate(base, t)
+                index[:, columns] = segment[:, np.newaxis] + self._first_segment[columns]
+                elapsed[:, columns] = since[:, np.newaxis]
+                present[:, columns] = there[:, np.newaxis]
+            values = evaluate_segments(
+                self._table[:, index.reshape(-1)], elapsed.reshape(-1), present.reshape(-1)
+            ).reshaped(shape)
+            for out, value in zip(state.arrays(), values.arrays(), strict=True):
+                out[block] = value
+        return state
+
+
+def _times(time_s: npt.ArrayLike) -> FloatArray:
+    times = np.asarray(time_s, dtype=np.float64, order="C")
+    if times.ndim != 1:
+        raise ValueError(f"time_s has shape {times.shape}: it must have one axis")
+    return times
+
+
+def _empty_state(rows: int, columns: int) -> TrajectoryState:
+    shape = (rows, columns)
+    lat, lon, alt, yaw, pitch, roll = (np.empty(shape) for _ in range(6))
+    return TrajectoryState(lat, lon, alt, yaw, pitch, roll, np.empty(shape, dtype=bool))

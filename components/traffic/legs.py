@@ -1,0 +1,222 @@
+"""A scripted flight: a start and a list of legs, each with an exact closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from components.traffic.enu import enu_to_geodetic
+from components.traffic.leg_builder import LegBuilder, Segment, segment_state
+from components.traffic.leg_types import (
+    AnyLeg,
+    Climb,
+    Leg,
+    Stationary,
+    Straight,
+    Turn,
+    Waypoint,
+    Waypoints,
+    require,
+)
+from components.traffic.normals import wrap_longitude_deg
+from components.traffic.trajectory import TrajectoryState
+
+__all__ = [
+    "AnyLeg",
+    "Climb",
+    "Leg",
+    "ScriptedTrajectory",
+    "Stationary",
+    "Straight",
+    "Turn",
+    "Waypoint",
+    "Waypoints",
+]
+
+LONGEST_FLIGHT_S = 1e12
+"""Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
+
+
+class ScriptedTrajectory:
+    """An aircraft that flies a script; every position is computed from its leg's start.
+
+    Nothing is integrated, so there is no drift. Straight legs follow the geodesic of the WGS-84
+    ellipsoid (error below 2e-8 m at 12,000 km) with constant altitude when level; ground speed
+    is measured at the flight's own altitude. Turns are circles (see `turn_motion`).
+
+    Parameters
+    ----------
+    name : str
+        The aircraft's name.
+    lat_deg, lon_deg, alt_m : float
+        Where it is at `start_time_s`.
+    heading_deg : float
+        Clockwise from true north.
+    speed_mps : float
+        Ground speed; 0 stands still.
+    climb_mps : float
+        Rate of climb of every leg that does not give its own.
+    legs : sequence of legs
+        `Straight`, `Turn`, `Climb`, `Stationary`, `Waypoints`. None means straight on. The last
+        leg goes on for ever: a turn keeps turning, a climb without `to_alt_m` keeps climbing.
+    yaw_deg, pitch_deg, roll_deg : float, optional
+        Fixed attitude. What is not given follows the path: yaw is the track, pitch the
+        flight-path angle, roll the bank of a coordinated turn, atan(V·rate/g).
+    reference : tuple of three float, optional
+        Latitude, longitude and altitude from which waypoints given as offsets are measured:
+        the ownship's start. Left out: this aircraft's own start.
+    start_time_s, end_time_s : float
+        The aircraft is there from the one to the other, both included.
+
+    Raises
+    ------
+    ValueError
+        A value that is not allowed, naming it.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        lat_deg: float,
+        lon_deg: float,
+        alt_m: float,
+        heading_deg: float = 0.0,
+        speed_mps: float = 0.0,
+        climb_mps: float = 0.0,
+        legs: Sequence[AnyLeg] = (),
+        yaw_deg: float | None = None,
+        pitch_deg: float | None = None,
+        roll_deg: float | None = None,
+        reference: tuple[float, float, float] | None = None,
+        start_time_s: float = 0.0,
+        end_time_s: float | None = None,
+    ) -> None:
+        given = {
+            "lat_deg": lat_deg,
+            "lon_deg": lon_deg,
+            "alt_m": alt_m,
+            "heading_deg": heading_deg,
+            "speed_mps": speed_mps,
+            "climb_mps": climb_mps,
+            "yaw_deg": yaw_deg,
+            "pitch_deg": pitch_deg,
+            "roll_deg": roll_deg,
+            "start_time_s": start_time_s,
+        }
+        for key, value in given.items():
+            if value is not None:
+                require(math.isfinite(value), f"{name}: {key}", value, "be finite")
+        require(abs(lat_deg) <= 90.0, f"{name}: lat_deg", lat_deg, "lie in [-90, 90] degrees")
+        require(abs(alt_m) <= 1e6, f"{name}: alt_m", alt_m, "lie within ±1e6 metres")
+        require(speed_mps >= 0.0, f"{name}: speed_mps", speed_mps, "be 0 or more")
+        end = math.inf if end_time_s is None else float(end_time_s)
+        require(end >= start_time_s, f"{name}: end_time_s", end, f"be {start_time_s} or more")
+        self.name = name
+        self.start_time_s, self.end_time_s = float(start_time_s), end
+        self.evaluated_until_s = min(end, self.start_time_s + LONGEST_FLIGHT_S)
+        self.fixed_attitude_rad = tuple(
+            None if angle is None else math.radians(angle)
+            for angle in (None if yaw_deg is None else yaw_deg % 360.0, pitch_deg, roll_deg)
+        )
+        start = (float(lat_deg), float(wrap_longitude_deg(np.array([lon_deg]))[0]), float(alt_m))
+        self.segments: list[Segment] = LegBuilder(
+            name=name,
+            start=start,
+            heading_rad=math.radians(heading_deg % 360.0),
+            speed_mps=float(speed_mps),
+            climb_mps=float(climb_mps),
+            reference=start if reference is None else reference,
+        ).build(legs)
+        self._segment_starts_s = np.array([segment.start_s for segment in self.segments])
+
+    @classmethod
+    def from_offset(
+        cls,
+        name: str,
+        *,
+        east_m: float,
+        north_m: float,
+        up_m: float,
+        reference: tuple[float, float, float],
+        **others: object,
+    ) -> ScriptedTrajectory:
+        """Start at an offset from a reference point, usually the ownship's start.
+
+        Parameters
+        ----------
+        name : str
+            The aircraft's name.
+        east_m, north_m, up_m : float
+            Metres in the reference point's tangent frame, so that the slant range at the start
+            is exactly the offset's length. The altitude of a point with up 0 exceeds the
+            reference's by 7.8 m at 10 km, 0.2 m at 1.6 km.
+        reference : tuple of three float
+            Latitude and longitude in degrees, altitude in metres.
+        **others
+            As for `ScriptedTrajectory`.
+
+        Returns
+        -------
+        ScriptedTrajectory
+        """
+        lat, lon, alt = enu_to_geodetic(
+            east_m,
+            north_m,
+            up_m,
+            reference_lat_deg=reference[0],
+            reference_lon_deg=reference[1],
+            reference_alt_m=reference[2],
+        )
+        return cls(
+            name,
+            lat_deg=float(lat),
+            lon_deg=float(lon),
+            alt_m=float(alt),
+            reference=reference,
+            **others,  # type: ignore[arg-type]
+        )
+
+    def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
+        """Give the aircraft's state at some times.
+
+        Parameters
+        ----------
+        time_s : array_like
+            Seconds, any shape. The same time gives the same bits whatever it is asked with.
+
+        Returns
+        -------
+        TrajectoryState
+            Arrays of that shape; `present` is False outside the start and end times.
+        """
+        times = np.asarray(time_s, dtype=np.float64)
+        flat = np.ascontiguousarray(times).reshape(-1)
+        present = (flat >= self.start_time_s) & (flat <= self.end_time_s)
+        elapsed = np.where(flat > self.start_time_s, flat, self.start_time_s)
+        elapsed = np.where(elapsed < self.evaluated_until_s, elapsed, self.evaluated_until_s)
+        elapsed -= self.start_time_s
+        if len(self.segments) == 1:
+            columns = segment_state(self.segments[0], elapsed)
+        else:
+            index = np.searchsorted(self._segment_starts_s, elapsed, side="right") - 1
+            columns = tuple(np.empty_like(flat) for _ in range(6))
+            for k in np.unique(index):
+                chosen = index == k
+                segment = self.segments[k]
+                state = segment_state(segment, elapsed[chosen] - segment.start_s)
+                for column, values in zip(columns, state, strict=True):
+                    column[chosen] = values
+        lat, lon, alt, *attitude = columns
+        yaw, pitch, roll = (
+            derived if fixed is None else np.full_like(flat, fixed)
+            for derived, fixed in zip(attitude, self.fixed_attitude_rad, strict=True)
+        )
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present).reshaped(times.shape)
+
+    def interval_present(self) -> tuple[float, float]:
+        """Return the first and last times the aircraft is there; the last may be infinite."""
+        return self.start_time_s, self.end_time_s

@@ -1,0 +1,107 @@
+"""What a traffic file gives when it is read, and the one error it raises when it cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from components.traffic.trajectory import SampledTrajectory
+
+MOST_PROBLEMS = 20
+"""Problems listed in one error; further ones are only counted."""
+
+
+class TrafficFileError(ValueError):
+    """A traffic file cannot be used; `problems` says everything that is wrong with it.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    problems : list of str
+        Each with line, column, value and what is allowed, as far as they apply.
+    """
+
+    def __init__(self, path: str, problems: Iterable[str]) -> None:
+        self.path = str(path)
+        self.problems = list(problems)
+        # Plain positional arguments: pickling and SimPy rebuild an exception from them.
+        super().__init__(self.path, self.problems)
+
+    def __str__(self) -> str:
+        if len(self.problems) == 1:
+            return f"{self.path}: {self.problems[0]}"
+        lines = [f"{self.path}: {len(self.problems)} problems"]
+        return "\n".join(lines + [f"  {problem}" for problem in self.problems])
+
+
+@dataclass(frozen=True)
+class TrafficFile:
+    """The aircraft of a traffic file.
+
+    Parameters
+    ----------
+    ownship : SampledTrajectory
+        The first aircraft named in the file, or the one asked for.
+    intruders : list of SampledTrajectory
+        All others, in the order in which the file first names them.
+    start_time_s : float
+        The file's own time of its earliest sample. Times in the trajectories count from there.
+    notes : list of str
+        What was assumed, reordered or ignored.
+    """
+
+    ownship: SampledTrajectory
+    intruders: list[SampledTrajectory]
+    start_time_s: float
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def aircraft(self) -> list[SampledTrajectory]:
+        """Ownship first, then the intruders."""
+        return [self.ownship, *self.intruders]
+
+
+class Problems:
+    """Collects what is wrong with one file, to be reported at once.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self._found: list[str] = []
+        self._more = 0
+
+    def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+        """Note a problem, with its line and column where it has them."""
+        place = [f"line {line}"] if line is not None else []
+        place += [f"column {column}"] if column is not None else []
+        if len(self._found) < MOST_PROBLEMS:
+            self._found.append(f"{', '.join(place)}: {problem}" if place else problem)
+        else:
+            self._more += 1
+
+    def raise_if_any(self) -> None:
+        """Raise one `TrafficFileError` with all problems so far."""
+        if not self._found:
+            return
+        found = list(self._found)
+        if self._more:
+            found[-1] += f" (and {self._more} more problems)"
+        raise TrafficFileError(self.path, found)
+
+    def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+        """Note a problem that makes reading on pointless, and raise."""
+        self.add(problem, line=line, column=column)
+        self.raise_if_any()
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return a suggestion for a misspelt name, or an empty string when nothing is close."""
+    close = get_close_matches(name.lower(), sorted(allowed), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else ""

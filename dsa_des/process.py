@@ -1,0 +1,308 @@
+"""Blocks as SimPy processes: when each wakes, what it reads, and where its messages go.
+
+Within an instant SimPy orders events by priority. Blocks in look-ahead windows come first, then
+the others by depth; ties within a depth go by name, or at random under ``shuffle_ties``.
+"""
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import simpy
+
+from dsa_des.channel import Channel
+from dsa_des.clock import ScanClock
+from dsa_des.component import Component
+from dsa_des.message import Message
+from dsa_des.types import IntArray
+from dsa_des.wake import Arrivals, Wake
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+# SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
+WINDOW_PRIORITY = 1.0
+DEPTH_PRIORITY = 1000.0
+
+
+class Abort(Exception):
+    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
+
+    SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
+    original never travels through it.
+    """
+
+
+class WakeUp(simpy.Event):
+    """An event that happens after `delay` ticks with a priority of its own."""
+
+    def __init__(self, env: simpy.Environment, delay: int, priority: float) -> None:
+        super().__init__(env)
+        self._ok = True
+        self._value = None
+        env.schedule(self, priority, delay)
+
+
+class Bell(simpy.Event):
+    """What a block's process waits for; rung from inside a `WakeUp`, so it keeps its priority."""
+
+    def ring(self) -> None:
+        """Resume whoever waits, now, within the current event."""
+        callbacks, self.callbacks = self.callbacks, None
+        self._ok = True
+        self._value = None
+        for callback in callbacks:
+            callback(self)
+
+
+@dataclass
+class Demand:
+    """A clocked block downstream, and how long before its scan it needs our row."""
+
+    block: str
+    clock: ScanClock
+    lead_ticks: int = 0
+
+    def between(self, start: int, end: int) -> IntArray:
+        """Return the ticks in [start, end) at which this block needs a row."""
+        _, ticks = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
+        return ticks - self.lead_ticks if self.lead_ticks else ticks
+
+
+@dataclass
+class Node:
+    """The runtime of one block.
+
+    Invariants: `run_at` is called with increasing ticks; at each of them every undelayed sender
+    has run; a channel's rows are collected by nobody else.
+    """
+
+    simulation: "Simulation"
+    component: Component
+    windowed: bool
+    priority: Callable[[], float]
+    clock: ScanClock | None = None
+    demands: list[Demand] = field(default_factory=list)
+    on_demand: bool = False
+    channels: dict[str, list[Channel]] = field(default_factory=dict)
+    subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
+    cpu_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.name = self.component.name
+        self._scheduled: set[int] = set()
+        self._scan_at: dict[int, int] = {}
+        self._bell = Bell(self.simulation.env)
+        inputs = self.component.inputs
+        self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
+        self._held_ports = [
+            port for port in inputs if inputs[port].mode != "queued" and not inputs[port].many
+        ]
+        self._queue_ports = [port for port in inputs if port not in self._held_ports]
+
+    # -- the life of the process ---------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the block's SimPy process."""
+        env = self.simulation.env
+        own = self.component.process
+        env.process(self._loop() if own is None else self._own_process(own))
+
+    def _loop(self) -> Generator[simpy.Event, None, None]:
+        while True:
+            yield self._bell
+            self._bell = Bell(self.simulation.env)
+            if self.windowed:
+                self._run_window(*self.simulation.window)
+            else:
+                self._run_at(int(self.simulation.env.now))
+
+    def _own_process(self, own: Any) -> Generator[simpy.Event, None, None]:
+        from dsa_des.block_environment import BlockEnvironment
+
+        try:
+            yield from own(BlockEnvironment(self))
+        except Abort:
+            raise
+        except Exception as error:
+            self.simulation.fail(self, int(self.simulation.env.now), error)
+
+    def wake_at(self, tick: int) -> None:
+        """Let the block run at `tick` (once, however often it is asked)."""
+        if tick in self._scheduled:
+            return
+        self._scheduled.add(tick)
+        env = self.simulation.env
+        event = WakeUp(env, tick - int(env.now), self.priority())
+        event.callbacks.append(self._on_wake_up)
+
+    def _on_wake_up(self, event: simpy.Event) -> None:
+        self._scheduled.discard(int(self.simulation.env.now))
+        if self._bell.callbacks:
+            self._bell.ring()
+
+    def wait(self) -> Bell:
+        """Return the event of the next trigger arrival, for a block with its own process."""
+        if self._bell.callbacks is None:
+            self._bell = Bell(self.simulation.env)
+        return self._bell
+
+    # -- when ----------------------------------------------------------------------------------
+
+    def open_window(self, start: int, end: int) -> None:
+        """Schedule everything this block's clock asks for in [start, end)."""
+        if self.windowed:
+            self.wake_at(start)
+            return
+        if self.clock is not None:
+            scans, ticks = self.clock.between(start, end)
+            self._scan_at = dict(zip(ticks.tolist(), scans.tolist(), strict=True))
+            for tick in self._scan_at:
+                self.wake_at(tick)
+        elif self.on_demand:
+            for tick in self._demanded(start, end).tolist():
+                self.wake_at(tick)
+
+    def _demanded(self, start: int, end: int) -> IntArray:
+        ticks = [demand.between(start, end) for demand in self.demands]
+        if len(ticks) == 1:
+            return ticks[0]
+        return np.unique(np.concatenate(ticks)) if ticks else np.empty(0, dtype=np.int64)
+
+    # -- what ----------------------------------------------------------------------------------
+
+    def _run_at(self, tick: int) -> None:
+        scan = self._scan_at.get(tick, -1)
+        ticks = np.array([tick], dtype=np.int64)
+        self._run(ticks, np.array([scan], dtype=np.int64), tick, tick + 1)
+
+    def _run_window(self, start: int, end: int) -> None:
+        if self.clock is not None:
+            scans, ticks = self.clock.between(start, end)
+        else:
+            ticks = self._demanded(start, end) if self.on_demand else np.empty(0, np.int64)
+            scans = np.full(len(ticks), -1, dtype=np.int64)
+        arrivals = [
+            channel.next_arrivals(end)
+            for port in self._trigger_ports
+            for channel in self.channels.get(port, [])
+        ]
+        arrivals = [new for new in arrivals if len(new)]
+        if arrivals:
+            own = ticks
+            if len(own) == 0 and len(arrivals) == 1:
+                ticks = arrivals[0]
+            else:
+                ticks = np.unique(np.concatenate([own, *arrivals]))
+            if len(own):
+                place = np.searchsorted(ticks, own)
+                numbered = np.full(len(ticks), -1, dtype=np.int64)
+                numbered[place] = scans
+                scans = numbered
+            else:
+                scans = np.full(len(ticks), -1, dtype=np.int64)
+        if len(ticks):
+            self._run(ticks, scans, start, end)
+
+    def _run(self, ticks: IntArray, scans: IntArray, start: int, end: int) -> None:
+        held: dict[str, tuple[Message, IntArray]] = {}
+        late = 0
+        for port in self._held_ports:
+            for channel in self.channels.get(port, []):
+                sample = channel.sample(ticks, end)
+                if sample is not None:
+                    held[port] = sample
+                if self.component.inputs[port].required:
+                    missing = len(ticks) if sample is None else int((sample[1] < 0).sum())
+                    late = max(late, missing)
+        if late == len(ticks):
+            return
+        if late:  # rows are in order, so those before the first messages come first
+            ticks, scans = ticks[late:], scans[late:]
+            held = {port: (message, rows[late:]) for port, (message, rows) in held.items()}
+        arrived = {port: self._collect(port, end) for port in self._queue_ports}
+        wake = Wake(
+            ticks, scans, self.simulation.ticks_per_s, held, arrived, self._rows_asked_for(ticks)
+        )
+        if self.simulation.trace is not None:
+            self.simulation.trace += [(int(tick), self.name) for tick in ticks]
+        try:
+            result = self.component.run(wake)
+            self.send(result, int(ticks[0]), end)
+        except Abort:
+            raise
+        except Exception as error:
+            self.simulation.fail(self, int(ticks[0]), error, int(scans[0]))
+
+    def _collect(self, port: str, end: int) -> list[Arrivals]:
+        found = []
+        for channel in self.channels.get(port, []):
+            new = channel.collect(end)
+            if new is not None:
+                found.append(Arrivals(channel.source, *new))
+        return found
+
+    def _rows_asked_for(self, ticks: IntArray) -> Mapping[str, IntArray]:
+        if not self.demands or self.clock is not None:
+            return {}
+        start, end = int(ticks[0]), int(ticks[-1]) + 1
+        rows = {}
+        for demand in self.demands:
+            asked = demand.between(start, end)
+            place = np.searchsorted(ticks, asked)
+            rows[demand.block] = place[ticks[np.minimum(place, len(ticks) - 1)] == asked]
+        return rows
+
+    def receive(self) -> Wake:
+        """Return the inputs as they are now, for a block with its own process."""
+        tick = int(self.simulation.env.now)
+        ticks = np.array([tick], dtype=np.int64)
+        held = {}
+        for port in self._held_ports:
+            for channel in self.channels.get(port, []):
+                sample = channel.sample(ticks, tick + 1)
+                if sample is not None:
+                    held[port] = sample
+        arrived = {port: self._collect(port, tick + 1) for port in self._queue_ports}
+        scans = np.array([-1], dtype=np.int64)
+        return Wake(ticks, scans, self.simulation.ticks_per_s, held, arrived)
+
+    # -- sending -------------------------------------------------------------------------------
+
+    def send(self, result: Any, start: int, end: int) -> None:
+        """Send what a block returned: a message, or messages by output name."""
+        if result is None:
+            return
+        outputs = self.component.outputs
+        if isinstance(result, Message):
+            if len(outputs) != 1:
+                raise TypeError(
+                    f"returned one message but has {len(outputs)} outputs; return a dict of "
+                    f"{', '.join(sorted(outputs)) or 'nothing'}"
+                )
+            result = {next(iter(outputs)): result}
+        for port, message in result.items():
+            declared = outputs.get(port)
+            if declared is None:
+                raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
+            if not isinstance(message, declared.message):
+                raise TypeError(
+                    f"output {port!r} is declared to send {declared.message.__name__}, "
+                    f"not {type(message).__name__}"
+                )
+            if len(message) == 0:
+                continue
+            tick = message.tick
+            if tick.dtype != np.int64 or tick[0] < start or tick[-1] >= end:
+                raise ValueError(
+                    f"output {port!r} has ticks [{tick[0]} ... {tick[-1]}] of type {tick.dtype}; "
+                    f"they must be int64 and lie in the instants it ran at, [{start}, {end})"
+                )
+            if self.simulation.recorder is not None:
+                self.simulation.recorder.record(self.name, message)
+            for channel, node, target_port in self.subscribers.get(port, []):
+                arrivals = channel.push(message)
+                if not node.windowed and target_port in node._trigger_ports:
+                    for arrival in arrivals.tolist():
+                        node.wake_at(arrival)

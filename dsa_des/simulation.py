@@ -1,0 +1,313 @@
+"""One run of one scene: blocks are built, connected, and driven window by window.
+
+The run advances in windows [start, end) of ticks. Blocks that may look ahead handle a whole window
+at its start; all others run at their own ticks inside it. Which grain a block runs at changes
+nothing that is recorded.
+"""
+
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import count
+from typing import Any
+
+import simpy
+
+from dsa_des.channel import Channel
+from dsa_des.clock import ScanClock
+from dsa_des.component import Component, Consumer, Context
+from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.graph import depths, window_order, windowed_blocks
+from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Demand, Node
+from dsa_des.randomness import Streams
+from dsa_des.recording import Recorder
+from dsa_des.scene import Scene
+
+# A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
+CELLS_PER_WINDOW = 32768
+
+
+@dataclass
+class Outcome:
+    """What a run came to.
+
+    Parameters
+    ----------
+    duration_s : float
+        Simulated time.
+    cpu_s : float
+        Processor time of the simulation itself.
+    report : dict
+        Sections of the summary that blocks gave (`Component.report`).
+    windowed : list of str
+        Blocks that ran in look-ahead windows.
+    """
+
+    duration_s: float
+    cpu_s: float
+    report: dict[str, Any] = field(default_factory=dict)
+    windowed: list[str] = field(default_factory=list)
+
+
+class Simulation:
+    """A scene made ready to run once.
+
+    Parameters
+    ----------
+    scene : Scene
+    window : int, optional
+        Most scans (of all clocks together) in a look-ahead window; 1 runs every block scan by
+        scan. By default sized by the number of targets.
+    shuffle_ties : int, optional
+        Seed that randomises the order of blocks within one depth, to show that nothing depends
+        on it.
+    recorder : Recorder, optional
+    trace : list, optional
+        Receives ``(tick, block)`` for every instant a block runs at, in order of execution.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no length, or a block cannot be set up.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        window: int | None = None,
+        shuffle_ties: int | None = None,
+        recorder: Recorder | None = None,
+        trace: list[tuple[int, str]] | None = None,
+    ) -> None:
+        if window is not None and window < 1:
+            raise ValueError(f"window is {window}: it must be 1 or more scans")
+        self.scene = scene
+        self.recorder = recorder
+        self.trace = trace
+        self.ticks_per_s = scene.ticks_per_s
+        self.env = simpy.Environment(initial_time=0)
+        self.window = (0, 0)
+        self._failure: tuple[BlockFailure, BaseException] | None = None
+        self._depth = depths(scene.graph)
+        self.components = self._build_components()
+        self.duration_s = self._duration()
+        self._set_up_components()
+        self.nodes = self._build_nodes(window, shuffle_ties)
+        self._connect()
+        self._window_ticks = self._window_length(window)
+
+    # -- building ------------------------------------------------------------------------------
+
+    def _build_components(self) -> dict[str, Component]:
+        streams = Streams(self.scene.seed)
+        components = {}
+        for name, block in self.scene.blocks.items():
+            context = Context(streams, self.ticks_per_s)
+            with _setting_up(self.scene, name):
+                components[name] = block.cls(name, block.parameters, context)
+        return components
+
+    def _duration(self) -> Fraction:
+        if self.scene.duration_s is not None:
+            return self.scene.duration_s
+        lengths = [component.natural_duration_s() for component in self.components.values()]
+        known = [length for length in lengths if length is not None]
+        if not known:
+            message = "is required: no block of this scene has a length of its own"
+            raise SceneError([Problem(str(self.scene.path), "duration_s", message)])
+        return max(known)
+
+    def _set_up_components(self) -> None:
+        for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
+            component = self.components[name]
+            component.context.duration_s = self.duration_s
+            component.context.consumers = [
+                Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
+                for wire in self.scene.wires
+                if wire.source == name
+            ]
+            with _setting_up(self.scene, name):
+                component.setup()
+
+    def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
+        graph = self.scene.graph
+        windowed = set() if window == 1 else windowed_blocks(graph, self.scene.classes)
+        order = window_order(graph, windowed)
+        shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
+        nodes = {}
+        for number, (name, component) in enumerate(sorted(self.components.items())):
+            base = (
+                WINDOW_PRIORITY + order[name]
+                if name in windowed
+                else DEPTH_PRIORITY + self._depth[name]
+            )
+            by_name = base + number / (len(self.components) + 1)
+            node = Node(
+                self, component, name in windowed, _priority(base, by_name, shuffle)
+            )
+            spec = component.clock_spec()
+            if spec is not None:
+                draw = component.context.streams.scan_normals(name, "clock jitter")
+                node.clock = ScanClock(spec, self.ticks_per_s, draw)
+            node.on_demand = component.clocked == "demand" and spec is None
+            nodes[name] = node
+        return nodes
+
+    def _connect(self) -> None:
+        for wire in self.scene.wires:
+            delay = int(wire.delay_s * self.ticks_per_s) + self._scan_delay(wire)
+            channel = Channel(wire.source, delay)
+            if isinstance(wire.holds, dict):
+                declared = self.nodes[wire.target].component.inputs[wire.input].message
+                try:
+                    channel.hold(declared.initial(wire.holds), 0)
+                except (TypeError, ValueError) as error:
+                    problem = Problem(str(self.scene.path), "wires", f"{wire}: holds: {error}")
+                    raise SceneError([problem]) from error
+            target = self.nodes[wire.target]
+            target.channels.setdefault(wire.input, []).append(channel)
+            self.nodes[wire.source].subscribers.setdefault(wire.output, []).append(
+                (channel, target, wire.input)
+            )
+        for name, node in self.nodes.items():
+            node.demands = self._find_demands(name)
+            if node.on_demand and not node.demands:
+                message = "runs when blocks downstream scan, and none of them has a scan clock"
+                problem = Problem(str(self.scene.path), f"blocks.{name}", message)
+                raise SceneError([problem])
+
+    def _scan_delay(self, wire: Any) -> int:
+        if not wire.delay_scans:
+            return 0
+        clock = self.nodes[wire.target].clock or self.nodes[wire.source].clock
+        if clock is None:
+            message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
+            raise SceneError([Problem(str(self.scene.path), "wires", message)])
+        return wire.delay_scans * round(clock.period)
+
+    def _find_demands(self, name: str) -> list[Demand]:
+        found: dict[tuple[str, int], Demand] = {}
+        seen = {(name, 0)}
+        todo = [(name, 0)]
+        while todo:
+            block, lead = todo.pop()
+            for channel, node, _ in (
+                item for items in self.nodes[block].subscribers.values() for item in items
+            ):
+                reached = (node.name, lead + channel.delay_ticks)
+                if node.clock is not None:
+                    found[reached] = Demand(node.name, node.clock, reached[1])
+                elif reached not in seen and len(seen) < 1000:
+                    seen.add(reached)
+                    todo.append(reached)
+        return [found[key] for key in sorted(found)]
+
+    def _window_length(self, window: int | None) -> int:
+        """Return the ticks of a window that holds about the wanted number of scans."""
+        width = max(component.width for component in self.components.values())
+        scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
+        clocks = [node.clock for node in self.nodes.values() if node.clock is not None]
+        if not clocks:
+            return self.end_tick
+        scans_per_tick = sum(1 / clock.period for clock in clocks)
+        return max(1, int(scans / scans_per_tick))
+
+    # -- running -------------------------------------------------------------------------------
+
+    @property
+    def end_tick(self) -> int:
+        """First tick that is no longer simulated: runs cover [0, T)."""
+        ticks = self.duration_s * self.ticks_per_s
+        return -(-ticks.numerator // ticks.denominator)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Outcome:
+        """Run the scene to its end.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the simulated time in s after each window.
+
+        Raises
+        ------
+        BlockFailure
+            If a block raised an exception.
+        """
+        started = time.process_time()
+        end = self.end_tick
+        for node in self.nodes.values():
+            node.start()
+        for number in count():
+            start = number * self._window_ticks
+            if start >= end:
+                break
+            self.window = (start, min(start + self._window_ticks, end))
+            self._run_window(*self.window)
+            if self.recorder is not None:
+                self.recorder.advance(self.window[1])
+            if progress is not None:
+                progress(self.window[1] / self.ticks_per_s)
+        return Outcome(
+            float(self.duration_s),
+            time.process_time() - started,
+            self._reports(),
+            sorted(name for name, node in self.nodes.items() if node.windowed),
+        )
+
+    def _run_window(self, start: int, end: int) -> None:
+        for node in self.nodes.values():
+            node.open_window(start, end)
+        try:
+            self.env.run(until=end)
+        except Abort:
+            if self._failure is None:
+                raise
+            failure, cause = self._failure
+            raise failure from cause
+
+    def _reports(self) -> dict[str, Any]:
+        sections: dict[str, Any] = {}
+        for component in self.components.values():
+            for section, content in component.report().items():
+                sections.setdefault(section, {}).update(content)
+        return sections
+
+    def fail(self, node: Node, tick: int, error: BaseException, scan: int = -1) -> None:
+        """Note that a block raised, and leave SimPy."""
+        component = node.component
+        reason = f"{type(error).__name__}: {error}"
+        failure = BlockFailure(
+            component.name,
+            type(component).path(),
+            tick / self.ticks_per_s,
+            scan if scan >= 0 else None,
+            reason,
+        )
+        self._failure = (failure, error)
+        raise Abort
+
+
+def _priority(
+    base: float, by_name: float, shuffle: random.Random | None
+) -> Callable[[], float]:
+    if shuffle is None:
+        return lambda: by_name
+    return lambda: base + shuffle.random()
+
+
+class _setting_up:
+    """Turns a ValueError of a block's preparation into a problem of its scene."""
+
+    def __init__(self, scene: Scene, block: str) -> None:
+        self.scene, self.block = scene, block
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, ValueError | OSError):
+            problem = Problem(str(self.scene.path), f"blocks.{self.block}", str(error))
+            raise SceneError([problem]) from error

@@ -1,0 +1,117 @@
+"""Fields of view: narrow, wide, across ±180 degrees, full circle, bounds."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from components.geometry.field_of_view import inside, within_range
+
+GOOD = {
+    "azimuth_min_rad": -1.0,
+    "azimuth_max_rad": 1.0,
+    "elevation_min_rad": -0.5,
+    "elevation_max_rad": 0.5,
+}
+
+
+def seen(p_deg, low_deg, high_deg, q_deg=0.0):
+    return inside(
+        np.radians(p_deg),
+        np.radians(q_deg),
+        azimuth_min_rad=np.radians(low_deg),
+        azimuth_max_rad=np.radians(high_deg),
+        elevation_min_rad=np.radians(-30),
+        elevation_max_rad=np.radians(30),
+    )
+
+
+# field (deg), azimuths inside, azimuths outside
+FIELDS = [
+    ((-10, 10), [-10, 0, 10, 350, 360, -370], [-10.001, 10.001, 180, -180]),
+    ((-110, 110), [-110, -109, 0, 110, 250], [-110.001, 111, 180, -180, 249]),  # Table 2.5, 220°
+    ((170, 190), [170, 180, -180, 190, -170, -175], [169.99, -169.99, 0, 90]),
+    ((170, -170), [170, 180, -180, 190, -170, -175], [169.99, -169.99, 0, 90]),
+    ((-190, -170), [170, 180, -180, -170, 175], [169.99, -169.99, 0]),
+    ((-180, 180), [-180, 180, 0, 179.999, -0.1], []),
+    ((0, 360), [-180, 180, 0, 360, -1e-15, 359], []),
+    ((-180, -90), [180, -180, -90, -135], [-89.99, 0, 179.99]),
+    ((90, 180), [90, 180, -180], [-179.99, 89.99]),
+    ((350, 10), [350, 0, 10, -10, -5, 370], [10.01, -10.01, 180]),
+    ((10, 350), [10, 180, -180, -10, 350], [0, 9.99, -9.99]),
+    ((340, 339), [340, 339, 0, -21, -20, 180], [339.5, -20.5]),
+    ((45, 45), [45, 405], [45.001, 44.999]),
+]
+
+
+@pytest.mark.parametrize(("field", "within", "outside"), FIELDS)
+def test_fields(field, within, outside):
+    for azimuth in within:
+        assert seen(azimuth, *field), azimuth
+    for azimuth in outside:
+        assert not seen(azimuth, *field), azimuth
+
+
+def test_bounds_without_a_turn_are_exact():
+    low, high = np.radians(-50.0), np.radians(50.0)
+    field = GOOD | {"azimuth_min_rad": low, "azimuth_max_rad": high}
+    assert inside(low, -0.5, **field)
+    assert inside(high, 0.5, **field)
+    assert not inside(np.nextafter(low, -1), 0, **field)
+    assert not inside(np.nextafter(high, 1), 0, **field)
+    assert not inside(0, np.nextafter(0.5, 1), **field)
+    assert not inside(0, np.nextafter(-0.5, -1), **field)
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(st.integers(-1440, 1440), st.integers(-360, 360), st.integers(0, 360))
+def test_against_arithmetic_in_whole_degrees(azimuth, low, width):
+    high = low + width
+    if high > 360:
+        low, high = low - 360, high - 360
+    expected = (azimuth - low) % 360 <= width
+    assert seen(azimuth, low, high) == expected
+
+
+def test_shapes():
+    grid = seen([[0.0], [60.0]], -10, 10, [0.0, 20.0, 40.0])
+    assert grid.tolist() == [[True, True, False], [False, False, False]]
+    assert seen([[0.0], [60.0]], -180, 180, 0.0).shape == (2, 1)
+    assert seen([], -10, 10).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("azimuth_min_rad", -7.0),
+        ("azimuth_max_rad", np.nan),
+        ("azimuth_max_rad", 7.0),
+        ("elevation_min_rad", -2.0),
+        ("elevation_max_rad", 1.6),
+        ("elevation_min_rad", 0.6),
+    ],
+)
+def test_bad_bounds_are_named(name, value):
+    with pytest.raises(ValueError, match=f"^{name} is {value}: it must"):
+        inside(0.0, 0.0, **(GOOD | {name: value}))
+
+
+def test_other_bad_input_is_named():
+    with pytest.raises(ValueError, match=r"azimuth_min_rad is 6\.2: it must be at most one turn"):
+        inside(0, 0, **(GOOD | {"azimuth_min_rad": 6.2, "azimuth_max_rad": -1.0}))
+    with pytest.raises(ValueError, match="p_rad is nan"):
+        inside(np.nan, 0, **GOOD)
+    with pytest.raises(ValueError, match="q_rad is inf"):
+        inside(0, np.inf, **GOOD)
+    with pytest.raises(ValueError, match=r"range_m is -1\.0: it must not be negative"):
+        within_range([5, -1.0], range_max_m=3.0)
+    with pytest.raises(ValueError, match=r"range_max_m is 1\.0: it must not be less"):
+        within_range(1.0, range_min_m=2.0, range_max_m=1.0)
+    with pytest.raises(ValueError, match="range_min_m is nan"):
+        within_range(1.0, range_min_m=np.nan)
+
+
+def test_ranges_include_their_bounds():
+    got = within_range([0.0, 99.9, 100.0, 200.0, 200.1], range_min_m=100.0, range_max_m=200.0)
+    assert got.tolist() == [False, False, True, True, False]
+    assert within_range(1e9)

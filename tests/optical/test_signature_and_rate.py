@@ -1,0 +1,136 @@
+"""Pixels covered, line-of-sight rate, confidence and detection range."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from components.optical.line_of_sight_rate import angle_between
+from components.optical.signature import (
+    confidence,
+    detection_range,
+    line_of_sight_rate,
+    pixels_covered,
+    total_signature,
+)
+
+# Table 2.5: 6144 x 2048 pixels over 220 x 60 degrees.
+PIXEL = {
+    "pixel_azimuth_rad": np.radians(220.0) / 6144,
+    "pixel_elevation_rad": np.radians(60.0) / 2048,
+}
+CAMERA = {**PIXEL, "sensor_pixels": 6144 * 2048}
+
+
+def test_pixels_follow_the_square_of_range_up_to_the_sensor():
+    distance = np.array([0.0, 1e-300, 1e-3, 1.0, 100.0, 2000.0, 4000.0, 1e200, 1.7e308])
+    pixels = pixels_covered(42.0, distance, **CAMERA)
+    assert np.all(pixels[:3] == 6144 * 2048)
+    assert pixels[5] == pytest.approx(4.0 * pixels[6], rel=1e-14)
+    footprint = 4000.0**2 * PIXEL["pixel_azimuth_rad"] * PIXEL["pixel_elevation_rad"]
+    assert pixels[6] == pytest.approx(42.0 / footprint, rel=1e-14)
+    assert np.all(np.diff(pixels) <= 0.0) and np.all(np.isfinite(pixels)) and pixels[-1] < 1e-100
+
+
+def test_no_area_covers_no_pixel_even_at_range_zero():
+    assert np.all(pixels_covered(0.0, [0.0, 1e-320, 10.0], **CAMERA) == 0.0)
+
+
+directions = st.tuples(st.floats(-7.0, 7.0), st.floats(-np.pi / 2, np.pi / 2))
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(directions, directions, st.floats(-15.0, 0.0))
+def test_angle_between_against_40_digits(first, step, exponent):
+    # From half a turn down to 1e-15 rad apart.
+    second = (first[0] + step[0] * 10**exponent, first[1] + 0.3 * step[1] * 10**exponent)
+    with mpmath.workdps(40):
+        vectors = []
+        for p, q in (first, second):
+            p, q = mpmath.mpf(p), mpmath.mpf(q)
+            vectors.append(
+                (mpmath.cos(q) * mpmath.cos(p), mpmath.cos(q) * mpmath.sin(p), mpmath.sin(q))
+            )
+        a, b = vectors
+        cross = (
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        )
+        expected = mpmath.atan2(
+            mpmath.sqrt(sum(c * c for c in cross)), sum(x * y for x, y in zip(a, b, strict=True))
+        )
+    angle = angle_between(*first, *second)
+    assert abs(angle - expected) <= 1e-15 + 1e-14 * expected
+    assert angle == pytest.approx(angle_between(*second, *first), rel=1e-13, abs=1e-300)
+
+
+def test_wrap_is_no_jump_in_either_model():
+    for model in ("exact", "thesis"):
+        rate = line_of_sight_rate(-np.pi + 1e-4, 0.0, np.pi - 1e-4, 0.0, 0.05, model=model)
+        assert rate == pytest.approx(2e-4 / 0.05, rel=1e-9)
+
+
+def test_overhead_pass_is_fast_only_by_the_thesis():
+    # Errata, numerical facts: overhead at 89.9 degrees, 20 Hz: azimuth turns by half a circle
+    # between frames, the line of sight by 0.2 degrees.
+    look = (np.pi, np.radians(89.9), 0.0, np.radians(89.9), 0.05)
+    assert line_of_sight_rate(*look, model="thesis") == pytest.approx(np.pi * 20.0, rel=1e-12)
+    assert line_of_sight_rate(*look) == pytest.approx(np.radians(0.2) * 20.0, rel=1e-12)
+    # At 60 degrees elevation the thesis's rate is twice the truth.
+    look = (1e-4, np.radians(60.0), 0.0, np.radians(60.0), 0.05)
+    ratio = line_of_sight_rate(*look, model="thesis") / line_of_sight_rate(*look)
+    assert ratio == pytest.approx(2.0, rel=1e-6)
+
+
+def test_first_look_has_no_rate_and_missed_frames_divide_by_their_time():
+    rate = line_of_sight_rate(
+        [0.1, 0.1, 0.1],
+        0.0,
+        [0.0, np.nan, 0.0],
+        [0.0, np.nan, 0.0],
+        [0.05, np.nan, 0.15],
+        seen_before=[True, False, True],
+    )
+    np.testing.assert_allclose(rate, [2.0, 0.0, 0.1 / 0.15], rtol=1e-14)
+    assert line_of_sight_rate(0.1, 0.0, 9.0, 9.0, 0.0, seen_before=False) == 0.0
+
+
+def test_closed_form_range_is_where_confidence_changes_sign():
+    area = np.array([0.5, 12.0, 42.0, 90.0, 740.0])
+    for b_v in (0.0, 0.4):
+        distance = detection_range(area, **PIXEL, contrast_gain=0.7, dynamic_signature=b_v)
+        for factor, sign in ((1 - 1e-9, 1.0), (1 + 1e-9, -1.0)):
+            pixels = pixels_covered(area, distance * factor, **CAMERA)
+            signature = total_signature(pixels, b_v, contrast_gain=0.7, dynamic_weight=1.0)
+            assert np.all(np.sign(confidence(signature)) == sign)
+
+
+def test_detection_range_at_its_ends():
+    assert detection_range(12.0, **PIXEL, dynamic_signature=1.0) == np.inf
+    assert detection_range(12.0, **PIXEL, threshold=-1.0) == np.inf
+    assert detection_range(0.0, **PIXEL) == 0.0
+    assert detection_range(12.0, **PIXEL, contrast_gain=0.0) == 0.0
+    # A sensor of 3 pixels can reach E = 0.9 at most: never detected, whatever the range.
+    assert detection_range(12.0, **PIXEL, sensor_pixels=3) == 0.0
+    assert detection_range(12.0, **PIXEL, sensor_pixels=4) == detection_range(12.0, **PIXEL)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: pixels_covered(1.0, -1.0, **CAMERA), "range_m is -1.0"),
+        (lambda: pixels_covered([1.0, np.nan], 1.0, **CAMERA), "area_m2 is nan"),
+        (lambda: pixels_covered(1.0, 1.0, **{**CAMERA, "sensor_pixels": 0}), "sensor_pixels is 0"),
+        (lambda: detection_range(1.0, pixel_azimuth_rad=0.0, pixel_elevation_rad=1.0), "pixel_az"),
+        (lambda: line_of_sight_rate(0.0, 0.0, 0.0, 0.0, 0.0), "interval_s is 0.0"),
+        (lambda: line_of_sight_rate(0.0, 0.0, np.nan, 0.0, 1.0), "previous_azimuth_rad is nan"),
+        (lambda: line_of_sight_rate(0.0, 0.0, 0.0, 0.0, 1.0, model="x"), "model is 'x'"),
+        (lambda: total_signature(1.0, contrast_gain=-0.5), "contrast_gain is -0.5"),
+        (lambda: confidence(np.nan), "signature is nan"),
+    ],
+)
+def test_bad_input_is_named(call, says):
+    with pytest.raises(ValueError, match=says):
+        call()

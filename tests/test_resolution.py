@@ -1,0 +1,126 @@
+"""Rounding to a sensor's grid against exact fractions."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from components.resolution import round_to_grid
+
+sizes = st.floats(-1e9, 1e9)
+steps = st.floats(1e-6, 1e6)
+
+
+def exact(value, step):
+    """Round with unlimited precision (Python rounds fractions half to even)."""
+    return float(round(Fraction(value) / Fraction(step)) * Fraction(step))
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(sizes, steps)
+def test_agrees_with_exact_fractions(value, step):
+    assert round_to_grid(value, step) == exact(value, step)
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(st.integers(-(10**6), 10**6), steps, st.integers(-2, 2))
+def test_cell_edges_and_their_neighbours_are_exact(cell, step, places):
+    edge = (cell + 0.5) * step
+    for _ in range(abs(places)):
+        edge = math.nextafter(edge, math.inf if places > 0 else -math.inf)
+    assert round_to_grid(edge, step) == exact(edge, step)
+    assert round_to_grid(-edge, step) == -round_to_grid(edge, step)
+
+
+def test_naive_division_gets_edges_wrong_and_we_do_not():
+    # Values a last place below an edge whose quotient rounds onto the edge.
+    step = 0.1
+    cells = np.arange(1, 20001, 2)
+    below = np.nextafter((cells + 0.5) * step, 0.0)
+    reference = np.array([exact(value, step) for value in below.tolist()])
+    assert np.any(np.rint(below / step) * step != reference)
+    np.testing.assert_array_equal(round_to_grid(below, step), reference)
+
+
+@pytest.mark.parametrize(
+    ("value", "step", "expected"),
+    [
+        (0.5, 1.0, 0.0),
+        (1.5, 1.0, 2.0),
+        (2.5, 1.0, 2.0),
+        (-0.5, 1.0, 0.0),
+        (-2.5, 1.0, -2.0),
+        (0.125, 0.25, 0.0),
+        (0.375, 0.25, 0.5),
+        (0.05, 0.1, 0.0),
+        (7.3, 0.0, 7.3),
+        (1e300, 1e-300, 1e300),
+        (1e-300, 1e300, 0.0),
+        (1.7e308, 1e308, 1.7e308),
+        (5e-324, 5e-324, 5e-324),
+    ],
+)
+def test_ties_go_to_even_and_extremes_pass(value, step, expected):
+    result = round_to_grid(value, step)
+    assert result == expected and math.copysign(1.0, result) == math.copysign(1.0, expected + 0.0)
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(st.floats(-10.0, 10.0), st.floats(1e-3, 2.0), st.floats(0.0, 12.0), st.floats(0.0, 12.0))
+def test_stays_inside_the_field_of_view(value, step, low, high):
+    result = round_to_grid(value, step, limit_low=-low, limit_high=high)
+    assert -low <= result <= high
+    free = round_to_grid(value, step)
+    if -low <= free <= high:
+        assert result == free
+    else:
+        outside = result + step if free > high else result - step
+        slack = 1e-12 * max(low, high, step)
+        assert not (-low + slack <= outside <= high - slack)
+
+
+@pytest.mark.parametrize("degrees", [110, 50, 30, 7, 90, 180])
+def test_limit_that_is_a_grid_point_counts_as_one(degrees):
+    # The field of view's edge and so many times the step may differ in the last bit.
+    step, limit = math.radians(1.0), math.radians(degrees)
+    for value in (limit, math.nextafter(limit, 0.0), limit - 0.4 * step, limit + 0.3):
+        result = round_to_grid(value, step, limit_low=-limit, limit_high=limit)
+        assert result <= limit and result == pytest.approx(limit, rel=1e-15)
+        assert round_to_grid(-value, step, limit_low=-limit, limit_high=limit) == -result
+
+
+def test_limits_that_are_no_grid_points():
+    # 10 degree cells in a field of view of 27 degrees: 27 would round to 30, outside.
+    values = [27.0, 25.1, -26.0, 14.0, 0.2]
+    result = round_to_grid(values, 10.0, limit_low=-27.0, limit_high=27.0)
+    np.testing.assert_array_equal(result, [20.0, 20.0, -20.0, 10.0, 0.0])
+    result = round_to_grid([5.0, 29.0, 95.0], 10.0, limit_low=12.0, limit_high=93.0)
+    np.testing.assert_array_equal(result, [20.0, 30.0, 90.0])
+    result = round_to_grid([-5.0, -29.0, -95.0], 10.0, limit_low=-93.0, limit_high=-12.0)
+    np.testing.assert_array_equal(result, [-20.0, -30.0, -90.0])
+
+
+def test_broadcasts_value_step_and_limits():
+    result = round_to_grid([[1.4], [-2.6]], [1.0, 0.5, 0.0], limit_high=[9.0, 1.2, 9.0])
+    np.testing.assert_array_equal(result, [[1.0, 1.0, 1.4], [-3.0, -2.5, -2.6]])
+    assert np.ndim(round_to_grid(1.2, 1.0)) == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        ({"value": np.nan, "step": 1.0}, "value is nan"),
+        ({"value": 1.0, "step": -1.0}, "step is -1.0"),
+        ({"value": 1.0, "step": np.inf}, "step is inf"),
+        ({"value": "x", "step": 1.0}, "value is 'x'"),
+        ({"value": 1.0, "step": 1.0, "limit_low": 2.0, "limit_high": 1.0}, "limit_low is 2.0"),
+        ({"value": 1.0, "step": 1.0, "limit_high": np.nan}, "limit_high is nan"),
+        ({"value": 14.0, "step": 10.0, "limit_low": 12.0, "limit_high": 18.0}, "step is 10.0"),
+    ],
+)
+def test_bad_input_is_named(call, says):
+    with pytest.raises(ValueError, match=says):
+        round_to_grid(**call)

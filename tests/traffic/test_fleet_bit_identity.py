@@ -1,0 +1,73 @@
+"""A fleet gives each aircraft the bits it would get alone."""
+
+import numpy as np
+import pytest
+
+from components.traffic.fleet import SampledFleet, ScriptedFleet
+from components.traffic.legs import ScriptedTrajectory, Straight, Turn
+from components.traffic.trajectory import SampledTrajectory
+
+
+def scripted(count):
+    rng = np.random.default_rng(7)
+    made = []
+    for k in range(count):
+        made.append(
+            ScriptedTrajectory(
+                f"t{k}",
+                lat_deg=rng.uniform(-90, 90),
+                lon_deg=rng.uniform(-180, 180),
+                alt_m=rng.uniform(0, 9000),
+                heading_deg=rng.uniform(0, 360),
+                speed_mps=0.0 if k % 7 == 3 else rng.uniform(10, 300),
+                climb_mps=rng.uniform(-2, 2) if k % 3 == 0 else 0.0,
+                legs=[Straight(40.0), Turn(rate_deg_s=2)] if k % 5 == 4 else (),
+                roll_deg=3.0 if k % 4 == 1 else None,
+                yaw_deg=10.0 if k % 6 == 5 else None,
+                start_time_s=5.0 * (k % 3),
+                end_time_s=70.0 if k % 2 else None,
+            )
+        )
+    return made
+
+
+def assert_same(fleet, times):
+    together = fleet.at(times)
+    for k, trajectory in enumerate(fleet.trajectories):
+        alone = trajectory.at(times)
+        for a, b in zip(together.arrays(), alone.arrays(), strict=True):
+            assert (a[:, k] == b).all()
+            assert a.shape == (len(times), len(fleet.trajectories))
+        one = trajectory.at(times[-1])
+        assert all(a[-1, k] == b for a, b in zip(together.arrays(), one.arrays(), strict=True))
+
+
+@pytest.mark.parametrize("count", [1, 2, 13, 60])
+@pytest.mark.parametrize("scans", [1, 3, 700])
+def test_scripted_fleet(count, scans):
+    assert_same(ScriptedFleet(scripted(count)), np.linspace(-1, 90, scans))
+
+
+def test_only_straight_flights_in_several_blocks():
+    flights = [t for t in scripted(60) if len(t.segments) == 1 and t.segments[0].kind == "geodesic"]
+    assert_same(ScriptedFleet(flights), np.linspace(0, 50, 1111))
+
+
+@pytest.mark.parametrize("scans", [1, 5, 2000])
+def test_sampled_fleet_with_common_and_own_times(scans):
+    made = []
+    for k, t in enumerate(scripted(13)):
+        times = np.arange(0, 60, 1.0) if k % 2 else np.arange(0, 60, 0.7) + 0.01 * k
+        s = t.at(times)
+        made.append(SampledTrajectory(t.name, times, s.lat_deg, s.lon_deg, s.alt_m))
+    assert_same(SampledFleet(made), np.linspace(-3, 70, scans))
+
+
+@pytest.mark.parametrize("fleet", [ScriptedFleet([]), SampledFleet([])])
+def test_empty_fleet(fleet):
+    assert fleet.at(np.arange(4.0)).lat_deg.shape == (4, 0)
+
+
+def test_times_need_one_axis():
+    with pytest.raises(ValueError, match="time_s has shape"):
+        ScriptedFleet(scripted(1)).at(np.zeros((2, 2)))
