@@ -5,7 +5,7 @@ scans, or as its own SimPy process. In the first two the engine calls `Component
 `dsa_des.wake.Wake`; rows of its messages are scans, so the same array code serves both.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -19,7 +19,6 @@ from dsa_des.ports import Input, Output
 from dsa_des.randomness import Stream, Streams
 
 if TYPE_CHECKING:
-    from dsa_des.process import BlockEnvironment
     from dsa_des.wake import Wake
 
 
@@ -121,6 +120,25 @@ class Consumer:
     request: Any
 
 
+@dataclass(frozen=True)
+class Producer:
+    """A block that feeds one of our inputs, and what it says of itself.
+
+    Parameters
+    ----------
+    block : str
+        Its name in the scene.
+    port : str
+        Our input.
+    offer : object
+        What its `Component.offer` returned for the output it feeds us from.
+    """
+
+    block: str
+    port: str
+    offer: Any
+
+
 @dataclass
 class Context:
     """What the engine tells a block about the run it is part of.
@@ -134,12 +152,15 @@ class Context:
         Length of the run; infinite sources may cut their work at it.
     consumers : list of Consumer
         Blocks that our outputs feed, sorted by name; known when `Component.setup` is called.
+    producers : list of Producer
+        Blocks that feed our inputs, sorted by name; likewise.
     """
 
     streams: Streams
     ticks_per_s: int = 10**9
     duration_s: Fraction = Fraction(0)
     consumers: list[Consumer] = field(default_factory=list)
+    producers: list[Producer] = field(default_factory=list)
 
 
 class Component:
@@ -165,14 +186,19 @@ class Component:
         self.p = parameters
         self.context = context
 
-    def clock_spec(self) -> ClockSpec | None:
-        """Return the block's own clock, or None when it runs only on demand or when triggered."""
-        if isinstance(self.p, ClockedParameters):
-            return self.p.clock_spec()
+    @classmethod
+    def clock_of(cls, parameters: Any) -> ClockSpec | None:
+        """Return the clock that parameters describe, or None: on demand, or when triggered."""
+        if isinstance(parameters, ClockedParameters):
+            return parameters.clock_spec()
         return None
 
     def request(self, port: str) -> Any:
         """Return what this block asks of whoever feeds `port`, or None."""
+        return None
+
+    def offer(self, port: str) -> Any:
+        """Return what this block says of the output `port` to whoever it feeds, or None."""
         return None
 
     def setup(self) -> None:
@@ -219,9 +245,7 @@ class Component:
         return f"{cls.__module__}:{cls.__qualname__}"
 
 
-ProcessGenerator = Iterator[Any]
 __all__ = [
-    "BlockEnvironment",
     "ClockedParameters",
     "Component",
     "Consumer",
@@ -229,6 +253,7 @@ __all__ = [
     "NonNegativeRational",
     "Parameters",
     "PositiveRational",
+    "Producer",
     "Rational",
     "ScenePath",
     "SourcedText",

@@ -99,6 +99,4 @@ class BlockFailure(Exception):
 
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
-        return (
-            f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
-        )
+        return f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"

@@ -48,11 +48,7 @@ def check_graph(
     hop listed), and feedback wires that do not say what they hold before the first message.
     """
     known = {name for name, cls in classes.items() if cls is not None}
-    fed = {
-        (wire.target, wire.input)
-        for _, _, wires in graph.edges(data="wires")
-        for wire in wires
-    }
+    fed = {(wire.target, wire.input) for _, _, wires in graph.edges(data="wires") for wire in wires}
     for name in sorted(known):
         for port, declared in sorted(classes[name].inputs.items()):
             if declared.required and (name, port) not in fed:

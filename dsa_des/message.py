@@ -49,6 +49,23 @@ def _layout(message_type: type["Message"]) -> tuple[tuple[str, ...], tuple[str, 
     return tuple(rows), tuple(entries)
 
 
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text column kept as codes into a tuple of names (code -1 is null).
+
+    Parameters
+    ----------
+    codes : ndarray of int
+    names : tuple of str
+    """
+
+    codes: AnyArray
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+
 @dataclass(eq=False)
 class Message:
     """A batch of rows; subclasses add fields.
@@ -61,8 +78,9 @@ class Message:
 
     tick: IntArray
 
-    #: Number of targets (or other columns) per row, for sizing look-ahead windows.
-    width: ClassVar[int] = 1
+    #: What a recorder writes: table → column → "int64", "float64", "bool" or "text".
+    #: Columns block, tick and time_s are added by the engine.
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {}
 
     def __len__(self) -> int:
         return len(self.tick)
@@ -86,10 +104,10 @@ class Message:
                 setattr(result, name, _pick(getattr(self, name), index))
         return result
 
-    def tables(self) -> dict[str, dict[str, AnyArray | "Text"]]:
-        """Return what a recorder writes of this message: table name → column → values.
+    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+        """Return the rows to record: table → column → values, as declared in `recorded`.
 
-        Every table has a column ``tick``; by default nothing is recorded.
+        Every table has a column ``tick``, in order; by default nothing is recorded.
         """
         return {}
 
@@ -126,23 +144,6 @@ class Message:
             If this message type cannot be written in a scene (the default).
         """
         raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
-
-
-@dataclass(frozen=True, eq=False)
-class Text:
-    """A text column kept as codes into a tuple of names (code -1 is null).
-
-    Parameters
-    ----------
-    codes : ndarray of int
-    names : tuple of str
-    """
-
-    codes: AnyArray
-    names: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.codes)
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:

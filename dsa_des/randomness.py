@@ -99,9 +99,7 @@ class Stream:
         )
         return philox4x32(counter, self._key)
 
-    def uniform(
-        self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0
-    ) -> FloatArray:
+    def uniform(self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0) -> FloatArray:
         """Return uniform draws in [0, 1) with 53 bits, keyed by target, scan and draw number.
 
         Parameters

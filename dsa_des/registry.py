@@ -63,8 +63,7 @@ def _import(type_name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name and (module_name == error.name or module_name.startswith(error.name + ".")):
             raise UnknownType(
-                f"there is no module {module_name!r} in the working directory or on the "
-                "Python path"
+                f"there is no module {module_name!r} in the working directory or on the Python path"
             ) from error
         raise UnknownType(f"module {module_name!r} cannot be imported: {error}") from error
     except Exception as error:

@@ -10,7 +10,7 @@ import networkx as nx
 from pydantic import ValidationError
 
 from dsa_des.clock import MAX_TICK, parse_rational, resolution
-from dsa_des.component import ClockedParameters, Component, Parameters
+from dsa_des.component import Component, Parameters
 from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
 from dsa_des.graph import build_graph, check_graph
 from dsa_des.overrides import apply_set, apply_swap
@@ -254,13 +254,13 @@ def _explain(
             given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
             close = nearest(str(item["loc"][-1]), given)
             hint = f" ({close!r} is given)" if close else ""
-            problems.append(
-                scene_file.problem(at, f"is required by {type_name} and missing{hint}")
-            )
+            problems.append(scene_file.problem(at, f"is required by {type_name} and missing{hint}"))
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)
-            message = message.replace("a valid number, unable to parse string as a number", "a number")
+            message = message.replace(
+                "a valid number, unable to parse string as a number", "a number"
+            )
             problems.append(scene_file.problem(at, message, _shown(item["input"])))
     return problems
 
@@ -276,13 +276,9 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
         value = value[part]
     path: list[str | int] = list(key)
     for position, part in enumerate(loc):
-        if isinstance(value, Mapping) and part in value:
+        if (isinstance(value, Mapping) and part in value) or (isinstance(value, list) and isinstance(part, int) and part < len(value)):
             value = value[part]
-        elif isinstance(value, list) and isinstance(part, int) and part < len(value):
-            value = value[part]
-        elif position < len(loc) - 1:
-            continue
-        elif isinstance(value, list) or not isinstance(value, Mapping):
+        elif position < len(loc) - 1 or isinstance(value, list) or not isinstance(value, Mapping):
             continue
         path.append(part)
     return tuple(path)
@@ -321,8 +317,8 @@ def _resolution(
     times: list[Fraction] = [wire.delay_s for wire in wires]
     clocks: list[str] = []
     for name, block in blocks.items():
-        if isinstance(block.parameters, ClockedParameters):
-            spec = block.parameters.clock_spec()
+        spec = block.cls.clock_of(block.parameters)
+        if spec is not None:
             times += spec.exact_times()
             clocks.append(f"{name} {_plain(spec.rate_hz)} Hz + {_plain(spec.offset_s)} s")
     ticks_per_s = resolution(times)

@@ -17,7 +17,7 @@ import simpy
 
 from dsa_des.channel import Channel
 from dsa_des.clock import ScanClock
-from dsa_des.component import Component, Consumer, Context
+from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order, windowed_blocks
 from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Demand, Node
@@ -98,17 +98,34 @@ class Simulation:
         self.nodes = self._build_nodes(window, shuffle_ties)
         self._connect()
         self._window_ticks = self._window_length(window)
+        if recorder is not None:
+            recorder.open(
+                [
+                    output.message
+                    for component in self.components.values()
+                    for output in component.outputs.values()
+                ],
+                self.ticks_per_s,
+            )
 
     # -- building ------------------------------------------------------------------------------
 
     def _build_components(self) -> dict[str, Component]:
         streams = Streams(self.scene.seed)
-        components = {}
+        components: dict[str, Component] = {}
+        problems: list[Problem] = []
         for name, block in self.scene.blocks.items():
             context = Context(streams, self.ticks_per_s)
-            with _setting_up(self.scene, name):
+            try:
                 components[name] = block.cls(name, block.parameters, context)
+            except (ValueError, OSError) as error:
+                problems.append(self._problem(f"blocks.{name}", error))
+        if problems:
+            raise SceneError(problems)
         return components
+
+    def _problem(self, key: str, what: object) -> Problem:
+        return Problem(str(self.scene.path), key, str(what))
 
     def _duration(self) -> Fraction:
         if self.scene.duration_s is not None:
@@ -117,10 +134,11 @@ class Simulation:
         known = [length for length in lengths if length is not None]
         if not known:
             message = "is required: no block of this scene has a length of its own"
-            raise SceneError([Problem(str(self.scene.path), "duration_s", message)])
+            raise SceneError([self._problem("duration_s", message)])
         return max(known)
 
     def _set_up_components(self) -> None:
+        problems: list[Problem] = []
         for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
             component = self.components[name]
             component.context.duration_s = self.duration_s
@@ -129,8 +147,17 @@ class Simulation:
                 for wire in self.scene.wires
                 if wire.source == name
             ]
-            with _setting_up(self.scene, name):
+            component.context.producers = [
+                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
+                for wire in self.scene.wires
+                if wire.target == name
+            ]
+            try:
                 component.setup()
+            except (ValueError, OSError) as error:
+                problems.append(self._problem(f"blocks.{name}", error))
+        if problems:
+            raise SceneError(problems)
 
     def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
         graph = self.scene.graph
@@ -145,10 +172,8 @@ class Simulation:
                 else DEPTH_PRIORITY + self._depth[name]
             )
             by_name = base + number / (len(self.components) + 1)
-            node = Node(
-                self, component, name in windowed, _priority(base, by_name, shuffle)
-            )
-            spec = component.clock_spec()
+            node = Node(self, component, name in windowed, _priority(base, by_name, shuffle))
+            spec = component.clock_of(component.p)
             if spec is not None:
                 draw = component.context.streams.scan_normals(name, "clock jitter")
                 node.clock = ScanClock(spec, self.ticks_per_s, draw)
@@ -165,7 +190,7 @@ class Simulation:
                 try:
                     channel.hold(declared.initial(wire.holds), 0)
                 except (TypeError, ValueError) as error:
-                    problem = Problem(str(self.scene.path), "wires", f"{wire}: holds: {error}")
+                    problem = self._problem("wires", f"{wire}: holds: {error}")
                     raise SceneError([problem]) from error
             target = self.nodes[wire.target]
             target.channels.setdefault(wire.input, []).append(channel)
@@ -176,8 +201,7 @@ class Simulation:
             node.demands = self._find_demands(name)
             if node.on_demand and not node.demands:
                 message = "runs when blocks downstream scan, and none of them has a scan clock"
-                problem = Problem(str(self.scene.path), f"blocks.{name}", message)
-                raise SceneError([problem])
+                raise SceneError([self._problem(f"blocks.{name}", message)])
 
     def _scan_delay(self, wire: Any) -> int:
         if not wire.delay_scans:
@@ -185,7 +209,7 @@ class Simulation:
         clock = self.nodes[wire.target].clock or self.nodes[wire.source].clock
         if clock is None:
             message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
-            raise SceneError([Problem(str(self.scene.path), "wires", message)])
+            raise SceneError([self._problem("wires", message)])
         return wire.delay_scans * round(clock.period)
 
     def _find_demands(self, name: str) -> list[Demand]:
@@ -250,6 +274,8 @@ class Simulation:
                 self.recorder.advance(self.window[1])
             if progress is not None:
                 progress(self.window[1] / self.ticks_per_s)
+        if self.recorder is not None:
+            self.recorder.close()
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,
@@ -290,24 +316,7 @@ class Simulation:
         raise Abort
 
 
-def _priority(
-    base: float, by_name: float, shuffle: random.Random | None
-) -> Callable[[], float]:
+def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Callable[[], float]:
     if shuffle is None:
         return lambda: by_name
     return lambda: base + shuffle.random()
-
-
-class _setting_up:
-    """Turns a ValueError of a block's preparation into a problem of its scene."""
-
-    def __init__(self, scene: Scene, block: str) -> None:
-        self.scene, self.block = scene, block
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, ValueError | OSError):
-            problem = Problem(str(self.scene.path), f"blocks.{self.block}", str(error))
-            raise SceneError([problem]) from error

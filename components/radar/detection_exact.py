@@ -15,8 +15,13 @@ from components.radar.detection_series import (
 from components.radar.inputs import FloatArray
 from components.radar.threshold import noise_terms, threshold_of
 
-# Side = computes one tail for flat arrays of SNR.
+# Computes one tail for a flat array of SNR.
 Side = Callable[[FloatArray], FloatArray]
+
+# A miss below this leaves Pd = 1 (with room for a bound that is not sharp).
+_NO_TRACE_IN_PD = 1e-22
+# A miss below this is 0.
+_UNDERFLOW = 1e-300
 
 
 def exact_probability(
@@ -35,7 +40,9 @@ def exact_probability(
             exponent = threshold_of(1, pfa) / (1.0 + snr)
             result = -np.expm1(-exponent) if miss else np.exp(-exponent)
         else:
-            gain_side, miss_side = _sides(pulses, pfa, model)
+            gain_side, miss_side = _sides(
+                pulses, pfa, model, _UNDERFLOW if miss else _NO_TRACE_IN_PD
+            )
             high = pulses * (1.0 + snr) >= threshold_of(pulses, pfa)
             result = np.empty_like(snr)
             gained, missed = gain_side(snr[~high]), miss_side(snr[high])
@@ -48,26 +55,19 @@ def exact_probability(
     return result
 
 
-def _sides(pulses: int, pfa: float, model: str) -> tuple[Side, Side]:
-    if model == "swerling2":
-        from scipy.special import gammainc, gammaincc
-
-        v = threshold_of(pulses, pfa)
-        return (
-            lambda snr: np.asarray(gammaincc(pulses, v / (1.0 + snr))),
-            lambda snr: np.asarray(gammainc(pulses, v / (1.0 + snr))),
-        )
+def _sides(pulses: int, pfa: float, model: str, negligible: float) -> tuple[Side, Side]:
     noise = noise_terms(pulses, pfa)
-    shape = {"swerling0": None, "swerling1": 1, "swerling3": 2, "swerling4": 2 * pulses}[model]
+    shapes = {"swerling1": 1, "swerling2": pulses, "swerling3": 2, "swerling4": 2 * pulses}
+    shape = shapes.get(model)
     if shape is not None and shape <= 2:
         return (
             lambda snr: geometric_gain(noise, shape, pulses * snr),
             lambda snr: geometric_miss(noise, shape, pulses * snr),
         )
-    # An echo of 1e15 is missed with probability 0 (Poisson), and 1e80 is as good as infinite for
-    # a negative binomial with K >= 4; the cap keeps the anchor's arithmetic finite.
-    cap = 1e15 if shape is None else 1e80
+    # An echo of 1e15 is missed with probability 0 (Poisson), and 1e100 is as good as infinite for
+    # a negative binomial with K >= 3; the cap keeps the anchor's arithmetic finite.
+    cap = 1e15 if shape is None else 1e100
     return (
         lambda snr: chain_gain(noise, shape, np.minimum(pulses * snr, cap)),
-        lambda snr: chain_miss(noise, shape, np.minimum(pulses * snr, cap)),
+        lambda snr: chain_miss(noise, shape, np.minimum(pulses * snr, cap), negligible=negligible),
     )

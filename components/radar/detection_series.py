@@ -54,9 +54,14 @@ def chain_gain(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatA
     return noise.false_alarm_probability + _chain(noise, noise.gained, shape, echo, gain=True)
 
 
-def chain_miss(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArray:
-    """Return 1 - Pd for any K (None: Poisson), meant for n + echo >= V_T; `echo` is n·SNR."""
-    return _chain(noise, noise.missed, shape, echo, gain=False)
+def chain_miss(
+    noise: NoiseTerms, shape: int | None, echo: FloatArray, *, negligible: float
+) -> FloatArray:
+    """Return 1 - Pd for any K (None: Poisson), meant for n + echo >= V_T; `echo` is n·SNR.
+
+    Sums that are bound to stay below `negligible` are returned as 0 and not worked out.
+    """
+    return _chain(noise, noise.missed, shape, echo, gain=False, negligible=negligible)
 
 
 def _odds(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +91,13 @@ def _polynomial(coefficients: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _chain(
-    noise: NoiseTerms, weight: FloatArray, shape: int | None, echo: FloatArray, *, gain: bool
+    noise: NoiseTerms,
+    weight: FloatArray,
+    shape: int | None,
+    echo: FloatArray,
+    *,
+    gain: bool,
+    negligible: float = -1.0,
 ) -> FloatArray:
     """Sum Pr(N = j) · weight_j over a window around the largest term, for each element.
 
@@ -122,10 +133,12 @@ def _chain(
     else:
         z, _ = _odds(echo / shape)
         first = negative_binomial(anchor, float(shape), echo / shape)
-    order = np.argsort(whole, kind="stable")
-    total = np.empty_like(echo)
-    for start in range(0, echo.size, _BLOCK):
-        chosen = order[start : start + _BLOCK]
+    # The largest term times the number of terms bounds the sum.
+    work = np.flatnonzero(first * weight[whole] * (high - low + 1) > negligible)
+    work = work[np.argsort(whole[work], kind="stable")]
+    total = np.zeros_like(echo)
+    for start in range(0, work.size, _BLOCK):
+        chosen = work[start : start + _BLOCK]
         below = _run_up(weight, shape, z[chosen], low[chosen], whole[chosen])
         total[chosen] = below + _run_down(weight, shape, z[chosen], whole[chosen], high[chosen])
     return first * total

@@ -47,9 +47,9 @@ def table_probability(
 ) -> FloatArray:
     """Return Pd from a table that is built at the first call and remembered.
 
-    Absolute error below 1e-6 over all SNR (worst measured 1.1e-8 over the five models, pulses 1 to
+    Absolute error below 1e-6 over all SNR (worst measured 2.9e-8 over the five models, pulses 1 to
     1000 and Pfa 1e-12 to 0.1), Pfa at SNR 0, rising with SNR up to one rounding, never outside
-    [Pfa, 1]. About 20 ns per element; building takes some 10 ms and 200 kB.
+    [Pfa, 1]. About 30 ns per element; building takes some 10 ms and 200 kB.
 
     Parameters
     ----------

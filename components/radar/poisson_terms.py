@@ -46,7 +46,7 @@ def stirling_error(m: FloatArray) -> FloatArray:
 
 
 def deviance(m: FloatArray, mean: FloatArray) -> FloatArray:
-    """Return m ln(m/mean) + mean - m without cancellation, for m >= 1 and mean > 0 (flat arrays)."""
+    """Return m ln(m/mean) + mean - m without cancellation, for m >= 1, mean >= 0 (flat arrays)."""
     difference = mean - m
     ratio = difference / (mean + m)
     square = ratio * ratio
@@ -55,8 +55,8 @@ def deviance(m: FloatArray, mean: FloatArray) -> FloatArray:
     for odd in range(19, 1, -2):
         near = near * square + 1.0 / odd
     near = difference * ratio - 2.0 * m * ratio * square * near
-    relative = difference / m
-    away = m * (relative - np.log1p(relative))
+    # An SNR of 0 has mean 0, and no term that counts.
+    away = m * (difference / m - np.log(np.maximum(mean, 1e-300) / m))
     return np.where(np.abs(ratio) < 0.1, near, away)
 
 

@@ -1,0 +1,98 @@
+"""What an aircraft is to a sensor: radar cross-section, silhouette areas, contrast."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from dsa_des.component import Parameters
+from dsa_des.randomness import target_keys
+from dsa_des.types import AnyArray, FloatArray
+
+
+class VisibleAreas(Parameters):
+    """The three bodies of the thesis's aircraft model, as an EO camera sees them (§3.5.2)."""
+
+    front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
+    side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
+    horizontal_m2: float = Field(ge=0, description="Area of the horizontal plane, m².")
+
+
+class InfraredAreas(VisibleAreas):
+    """The same for an IR camera, with a back of its own (§3.5.3, Tables 3.2 and 4.6)."""
+
+    back_m2: float = Field(ge=0, description="Area of the sphere seen from behind, m².")
+
+
+# The thesis's general aviation class, so that a scene may leave the aircraft out.
+_EO = VisibleAreas(front_m2=12.0, side_m2=30.0, horizontal_m2=90.0)
+_IR = InfraredAreas(front_m2=4.6, back_m2=4.6, side_m2=11.15, horizontal_m2=35.52)
+
+
+class Aircraft(Parameters):
+    """What sensors need to know of one aircraft; files in ``configs/aircraft`` hold these keys."""
+
+    rcs_dbsm: float = Field(default=3.01, description="Mean radar cross-section, dBsm (Table 4.1).")
+    swerling: Literal[0, 1, 2, 3, 4, 5] = Field(
+        default=1, description="Fluctuation model of the radar cross-section; 0 and 5 are steady."
+    )
+    eo: VisibleAreas = Field(default=_EO, description="Areas seen by EO cameras.")
+    ir: InfraredAreas = Field(default=_IR, description="Areas seen by IR cameras.")
+    contrast: float = Field(default=1.0, ge=0, description="Contrast gain P for EO (eq. 18).")
+    contrast_ir: float = Field(default=1.0, ge=0, description="Contrast gain P for IR (eq. 18).")
+    engine: Literal["propeller", "turbofan", "turbojet"] = Field(
+        default="propeller", description="Propulsion type (Table 4.5)."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Roster:
+    """The targets of a run: their names, their draw keys and what sensors need of them.
+
+    Parameters
+    ----------
+    names : tuple of str
+    aircraft : tuple of Aircraft
+    """
+
+    names: tuple[str, ...]
+    aircraft: tuple[Aircraft, ...]
+
+    @classmethod
+    def of(cls, targets: Sequence[tuple[str, Aircraft]]) -> "Roster":
+        """Return the roster of (name, aircraft) pairs."""
+        return cls(tuple(name for name, _ in targets), tuple(craft for _, craft in targets))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def keys(self) -> AnyArray:
+        """64-bit keys of the targets' random draws, shape (targets,)."""
+        return target_keys(self.names)
+
+    @cached_property
+    def rcs_m2(self) -> FloatArray:
+        """Mean radar cross-section in m², shape (targets,)."""
+        return np.array([10.0 ** (craft.rcs_dbsm / 10.0) for craft in self.aircraft])
+
+    @cached_property
+    def swerling(self) -> AnyArray:
+        """Swerling model of each target, 5 written as 0, shape (targets,)."""
+        return np.array([craft.swerling % 5 for craft in self.aircraft], dtype=np.int64)
+
+    def column(self, path: str) -> FloatArray:
+        """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
+        columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})
+        if path not in columns:
+            values = []
+            for craft in self.aircraft:
+                value: object = craft
+                for name in path.split("."):
+                    value = getattr(value, name)
+                values.append(value)
+            columns[path] = np.array(values, dtype=np.float64)
+        return columns[path]

@@ -1,0 +1,160 @@
+"""Pick-best fusion: radar gives range, optics give the angles (``fusion.pick_best``, §3.6)."""
+
+import numpy as np
+from pydantic import Field
+
+from components.fusion.coincidence import latest_in_gate, same_instant
+from components.messages import Detections, FusedDetections, SensorOffer
+from dsa_des.component import Component, NonNegativeRational, Parameters
+from dsa_des.ports import Input, Output
+from dsa_des.types import FloatArray, IntArray
+from dsa_des.wake import Arrivals, Wake
+
+
+class PickBestParameters(Parameters):
+    """Parameters of pick-best fusion."""
+
+    coincidence_s: NonNegativeRational = Field(
+        default=0,  # type: ignore[arg-type]
+        validate_default=True,
+        description="How old another sensor's detection may be and still count as the same "
+        "look, s; 0 fuses detections of the same instant only (Fig. 4.22).",
+    )
+
+
+class PickBest(Component):
+    """Puts together, per target, the best of what the sensors report.
+
+    Range comes from a sensor that measures it, angles from one that does not (an optical one)
+    where there is one; among equals the finest angular resolution wins, then the name. What is
+    missing is taken from what there is. Output comes at every instant a sensor reports, for the
+    targets detected then.
+    """
+
+    inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
+    outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
+    Parameters = PickBestParameters
+    windowed = True
+
+    def setup(self) -> None:
+        """Rank the sensors."""
+        offers = {
+            producer.block: producer.offer
+            if isinstance(producer.offer, SensorOffer)
+            else SensorOffer(False, 0.0)
+            for producer in self.context.producers
+        }
+        self.sensors = tuple(sorted(offers, key=lambda n: (not offers[n].measures_range, n)))
+        best_angles = sorted(
+            offers, key=lambda n: (offers[n].measures_range, offers[n].resolution_rad, n)
+        )
+        #: Least preferred first, so that better ones overwrite.
+        self._by_angles = [self.sensors.index(name) for name in reversed(best_angles)]
+        self._by_range = [
+            self.sensors.index(name)
+            for name in reversed(best_angles)
+            if offers[name].measures_range
+        ]
+        self._gate_ticks = int(self.p.coincidence_s * self.context.ticks_per_s)
+        self._recent: dict[str, Arrivals] = {}
+
+    def run(self, wake: Wake) -> FusedDetections | None:
+        """Fuse the detections of every instant."""
+        arrivals = {new.source: new for new in wake.arrivals("detections")}
+        if not arrivals:
+            return None
+        roster = next(iter(arrivals.values())).message.roster
+        width = max(1, len(roster))
+        keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
+        union = np.unique(np.concatenate(keys))
+        row, target = np.divmod(union, width)
+        if self._gate_ticks:
+            arrivals = self._with_recent(arrivals)
+            entries = {
+                name: latest_in_gate(new, wake.ticks[row], target, self._gate_ticks)
+                for name, new in arrivals.items()
+            }
+        else:
+            entries = {
+                name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
+            }
+        return self._combine(wake.ticks, row, target, arrivals, entries)
+
+    def _with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
+        """Return new and recent rows of every sensor, and keep what the next run may need."""
+        for name, new in arrivals.items():
+            old = self._recent.get(name)
+            if old is not None:
+                message = Detections.concatenate([old.message, new.message])
+                new = Arrivals(name, np.concatenate([old.tick, new.tick]), message)
+            self._recent[name] = new
+        latest = max(int(new.tick[-1]) for new in arrivals.values())
+        together = dict(self._recent)
+        for name, seen in together.items():
+            keep = slice(int(np.searchsorted(seen.tick, latest - self._gate_ticks)), len(seen.tick))
+            self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
+        return dict(sorted(together.items()))
+
+    def _combine(
+        self,
+        ticks: IntArray,
+        row: IntArray,
+        target: IntArray,
+        arrivals: dict[str, Arrivals],
+        entries: dict[str, IntArray],
+    ) -> FusedDetections:
+        count = len(row)
+        contributors = np.zeros(count, dtype=np.int64)
+        angle_source = np.full(count, -1, dtype=np.int64)
+        range_source = np.full(count, -1, dtype=np.int64)
+        values = {
+            name: np.full(count, np.nan)
+            for name in (
+                "azimuth_rad",
+                "elevation_rad",
+                "range_m",
+                "true_azimuth_rad",
+                "true_elevation_rad",
+                "true_range_m",
+            )
+        }
+        for index in self._by_angles:
+            name = self.sensors[index]
+            if name in entries:
+                found = np.flatnonzero(entries[name] >= 0)
+                contributors[found] |= 1 << index
+                angle_source[found] = index
+                for column in ("azimuth_rad", "elevation_rad"):
+                    _copy(values, column, found, arrivals[name], entries[name])
+                    _copy(values, f"true_{column}", found, arrivals[name], entries[name])
+                _copy(values, "true_range_m", found, arrivals[name], entries[name])
+        for index in self._by_range:
+            name = self.sensors[index]
+            if name in entries:
+                found = np.flatnonzero(entries[name] >= 0)
+                range_source[found] = index
+                _copy(values, "range_m", found, arrivals[name], entries[name])
+        return FusedDetections(
+            tick=ticks,
+            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
+            target=target,
+            contributors=contributors,
+            angle_source=angle_source,
+            range_source=range_source,
+            roster=next(iter(arrivals.values())).message.roster,
+            sensors=self.sensors,
+            **values,
+        )
+
+
+def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
+    """Return instant · width + target of every detection, ascending."""
+    row = np.searchsorted(ticks, new.tick)
+    offsets = new.message.offsets
+    return np.repeat(row, np.diff(offsets)) * width + new.message.target
+
+
+def _copy(
+    values: dict[str, FloatArray], column: str, at: IntArray, new: Arrivals, entry: IntArray
+) -> None:
+    values[column][at] = getattr(new.message, column)[entry[at]]

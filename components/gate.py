@@ -1,0 +1,51 @@
+"""The simulation decision: which sensor needs to look at which target (thesis §3.4, errata 4b)."""
+
+import numpy as np
+
+from components.messages import GatedTargets, RelativeTargets
+from components.reach import Decision, Reach
+from dsa_des.component import Component
+from dsa_des.message import Message
+from dsa_des.ports import Input, Output
+from dsa_des.wake import Wake
+
+
+class Gate(Component):
+    """Decides for every sensor and target whether the sensor's physics is needed, and why not.
+
+    A target is skipped when the sensor is switched off, when it is not the sensor's scan time,
+    when the target is not there, or when it is outside the field of view or the range.
+    """
+
+    inputs = {"targets": Input(RelativeTargets, "trigger", "Targets as seen from the ownship.")}
+    outputs = {"targets": Output(GatedTargets, "The same, with a decision for each sensor.")}
+    windowed = True
+
+    def setup(self) -> None:
+        """Learn the reach of every sensor downstream."""
+        self._reach = {
+            consumer.block: consumer.request
+            for consumer in self.context.consumers
+            if isinstance(consumer.request, Reach)
+        }
+
+    def run(self, wake: Wake) -> Message | None:
+        """Decide at every instant, for the sensors that scan then."""
+        targets = wake["targets"]
+        if targets is None:
+            return None
+        decisions = {}
+        for sensor, reach in self._reach.items():
+            rows = wake.demand.get(sensor)
+            if rows is None or len(rows) == len(targets):
+                place = np.arange(len(targets))
+                part = targets
+            else:
+                place = np.full(len(targets), -1, dtype=np.int64)
+                place[rows] = np.arange(len(rows))
+                part = targets.take(rows)
+            reason = reach.decide(
+                part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
+            )
+            decisions[sensor] = Decision(place, reason)
+        return GatedTargets(**vars(targets), decisions=decisions)

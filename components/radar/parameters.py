@@ -1,0 +1,102 @@
+"""Parameters that radar blocks share, and the link budget they describe."""
+
+from dataclasses import replace
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from components.radar.link_budget import LinkBudget, calibrated_bandwidth
+from components.sensor import SensorParameters
+from dsa_des.component import Parameters
+
+
+class RadarParameters(SensorParameters):
+    """Parameters of every radar."""
+
+    range_resolution_m: float = Field(
+        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
+    )
+
+
+class Calibration(Parameters):
+    """One known detection range, from which the bandwidth follows (errata 6)."""
+
+    rcs_dbsm: float = Field(description="Radar cross-section of the target, dBsm.")
+    range_km: float = Field(gt=0, description="Range at which Pd is known, km.")
+    pd: float = Field(gt=0, lt=1, description="Probability of detection there.")
+    swerling: int = Field(
+        default=1, ge=0, le=5, description="Fluctuation model the range was stated for."
+    )
+
+
+class LinkBudgetParameters(RadarParameters):
+    """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
+
+    power_w: float = Field(gt=0, description="Transmitted power, W.")
+    antenna_gain_db: float = Field(description="Gain of the antenna, both ways the same, dB.")
+    wavelength_m: float | None = Field(default=None, gt=0, description="Wavelength, m.")
+    frequency_hz: float | None = Field(
+        default=None, gt=0, description="Frequency instead of the wavelength, Hz."
+    )
+    integration_gain_db: float = Field(
+        default=0.0, description="Coherent integration gain, dB; never together with pulses > 1."
+    )
+    noise_figure_db: float = Field(default=0.0, description="Noise figure, dB.")
+    losses_db: float = Field(default=0.0, description="System losses, dB.")
+    bandwidth_hz: float | None = Field(default=None, gt=0, description="Noise bandwidth, Hz.")
+    calibrate: Calibration | None = Field(
+        default=None, description="A known detection range instead of the bandwidth."
+    )
+    minimum_range_m: float | None = Field(
+        default=None,
+        gt=0,
+        description="Closer than this no echo is processed, m; by default the antenna's far field.",
+    )
+    false_alarm_probability: float = Field(
+        default=0.05, gt=0, lt=1, description="Probability of false alarm per look and cell."
+    )
+    pulses: int = Field(default=1, ge=1, description="Pulses integrated non-coherently.")
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if (self.wavelength_m is None) == (self.frequency_hz is None):
+            raise ValueError("exactly one of wavelength_m and frequency_hz must be given")
+        if (self.bandwidth_hz is None) == (self.calibrate is None):
+            raise ValueError("exactly one of bandwidth_hz and calibrate must be given")
+        if self.pulses > 1 and self.integration_gain_db > 0:
+            raise ValueError(
+                "integration_gain_db and pulses > 1 would count the same pulses twice; "
+                "set one of them"
+            )
+        return self
+
+    def link_budget(self) -> LinkBudget:
+        """Return the link budget, its bandwidth calibrated where the scene asks for it."""
+        budget = LinkBudget(
+            power_w=self.power_w,
+            antenna_gain_db=self.antenna_gain_db,
+            bandwidth_hz=self.bandwidth_hz or 1.0,
+            wavelength_m=self.wavelength_m,
+            frequency_hz=self.frequency_hz,
+            integration_gain_db=self.integration_gain_db,
+            noise_figure_db=self.noise_figure_db,
+            losses_db=self.losses_db,
+            minimum_range_m=self.minimum_range_m,
+        )
+        if self.calibrate is None:
+            return budget
+        bandwidth_hz = calibrated_bandwidth(
+            budget,
+            rcs_dbsm=self.calibrate.rcs_dbsm,
+            range_km=self.calibrate.range_km,
+            pd=self.calibrate.pd,
+            pulses=self.pulses,
+            false_alarm_probability=self.false_alarm_probability,
+            model=f"swerling{self.calibrate.swerling}",
+        )
+        return replace(budget, bandwidth_hz=bandwidth_hz)
+
+
+def budget_report(name: str, budget: LinkBudget) -> dict[str, Any]:
+    """Return the section of the run's summary that records the bandwidth in use."""
+    return {"link_budgets": {name: {"bandwidth_hz": float(budget.bandwidth_hz)}}}

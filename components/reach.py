@@ -1,0 +1,92 @@
+"""A sensor's reach, and the decision whether a target needs its physics (thesis §3.4)."""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.field_of_view import inside
+from dsa_des.types import BoolArray, FloatArray, IntArray
+
+ReasonArray = npt.NDArray[np.uint8]
+
+#: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
+EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
+SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where a sensor can see, in the ownship's body axes; bounds are inclusive.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad : (low, high)
+        Azimuth runs clockwise from low to high and may cross ±pi.
+    range_max_m : float
+        Infinite where the sensor has no limit of its own.
+    enabled : bool
+    """
+
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+    range_max_m: float = math.inf
+    enabled: bool = True
+
+    def decide(
+        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
+    ) -> ReasonArray:
+        """Return the reason why each target is skipped, or EVALUATE.
+
+        Parameters
+        ----------
+        p_rad, q_rad, range_m, present : arrays of one shape
+            Body azimuth and elevation, slant range, and whether the target is there.
+        """
+        if not self.enabled:
+            return np.full(range_m.shape, OFF, dtype=np.uint8)
+        seen = inside(
+            p_rad,
+            q_rad,
+            azimuth_min_rad=self.azimuth_rad[0],
+            azimuth_max_rad=self.azimuth_rad[1],
+            elevation_min_rad=self.elevation_rad[0],
+            elevation_max_rad=self.elevation_rad[1],
+        )
+        reason = np.where(seen, np.uint8(EVALUATE), np.uint8(FIELD_OF_VIEW))
+        if math.isfinite(self.range_max_m):
+            reason[seen & (range_m > self.range_max_m)] = RANGE
+        if not present.all():
+            reason[~present] = ABSENT
+        return reason
+
+
+@dataclass(eq=False)
+class Decision:
+    """The decision for one sensor over the rows of a message.
+
+    Parameters
+    ----------
+    place : (rows,) of int
+        Row of `reason` that belongs to each message row; -1 where the sensor does not scan.
+    reason : (scans, targets) of uint8
+    """
+
+    place: IntArray
+    reason: ReasonArray
+
+    def take_rows(self, rows: slice | IntArray) -> "Decision":
+        """Return the decision for some of the rows."""
+        return Decision(self.place[rows], self.reason)
+
+    @classmethod
+    def join_rows(cls, parts: list[Self]) -> "Decision":
+        """Return the decision over the rows of all parts."""
+        starts = np.cumsum([0] + [len(part.reason) for part in parts[:-1]])
+        places = [
+            np.where(part.place < 0, -1, part.place + start)
+            for part, start in zip(parts, starts, strict=True)
+        ]
+        return Decision(np.concatenate(places), np.concatenate([part.reason for part in parts]))

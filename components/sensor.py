@@ -1,0 +1,249 @@
+"""What every sensor has in common: a scan clock, a reach, a grid, and a look at the cells.
+
+A sensor subclass writes one pure function, `Sensor.look`, over *cells*: flat arrays with one
+element per (scan, target) that needs its physics. How many scans those come from is the
+engine's business.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from components.geometry.angles import wrap_pi
+from components.messages import Detections, GatedTargets, RelativeTargets, SensorOffer
+from components.reach import EVALUATE, SKIP_REASONS, Reach, ReasonArray
+from components.resolution import round_to_grid
+from dsa_des.component import ClockedParameters, Component
+from dsa_des.ports import Input, Output
+from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.wake import Wake
+
+
+def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
+    if not all(-360 <= angle <= 360 for angle in value):
+        raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
+    return value
+
+
+def _elevations(value: tuple[float, float]) -> tuple[float, float]:
+    if not -90 <= value[0] <= value[1] <= 90:
+        raise ValueError("must hold two angles in [-90, 90], the lower one first")
+    return value
+
+
+class SensorParameters(ClockedParameters):
+    """Parameters of every sensor; angles in degrees in the ownship's body axes."""
+
+    enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(_azimuths)] = Field(
+        default=(-180.0, 180.0),
+        description="Field of view in azimuth, clockwise from the first to the second, deg.",
+    )
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(_elevations)] = Field(
+        default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
+    )
+    range_km: float | None = Field(
+        default=None, gt=0, description="Farthest range that is looked at, km; none by default."
+    )
+    azimuth_resolution_deg: float = Field(
+        default=0.0, ge=0, description="Grid step of measured azimuth, deg; 0 measures exactly."
+    )
+    elevation_resolution_deg: float = Field(
+        default=0.0, ge=0, description="Grid step of measured elevation, deg; 0 measures exactly."
+    )
+
+    def reach(self) -> Reach:
+        """Return the sensor's reach."""
+        return Reach(
+            (math.radians(self.azimuth_deg[0]), math.radians(self.azimuth_deg[1])),
+            (math.radians(self.elevation_deg[0]), math.radians(self.elevation_deg[1])),
+            math.inf if self.range_km is None else self.range_km * 1000.0,
+            self.enabled,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a sensor's physics says of each cell.
+
+    Parameters
+    ----------
+    detected : (cells,) of bool
+    confidence : (cells,)
+    extras : dict of (cells,)
+        Recorded beside the detection: ``snr_db``, ``detection_probability``, ``pixels``.
+    """
+
+    detected: BoolArray
+    confidence: FloatArray
+    extras: dict[str, FloatArray] = field(default_factory=dict)
+
+
+class Cells:
+    """The (scan, target) pairs that need a sensor's physics, as flat contiguous arrays.
+
+    Any field of `RelativeTargets` can be read as an attribute, for example ``cells.range_m``.
+
+    Parameters
+    ----------
+    targets : RelativeTargets
+    rows : (scans,)
+        Message row of each scan.
+    wanted : (scans, targets) of bool
+    scans : (scans,)
+        Scan numbers.
+    """
+
+    def __init__(
+        self, targets: RelativeTargets, rows: IntArray, wanted: BoolArray, scans: IntArray
+    ) -> None:
+        self._targets = targets
+        self.roster = targets.roster
+        place = np.flatnonzero(wanted)
+        width = max(1, wanted.shape[1])
+        #: Index of each cell's scan within this look, and of its target in the roster.
+        self.row, self.target = np.divmod(place, width)
+        self.scan = scans[self.row]
+        self._flat = rows[self.row] * width + self.target
+        self._everything = len(place) == targets.range_m.size
+        self._gathered: dict[str, AnyArray] = {}
+
+    def __len__(self) -> int:
+        return len(self.target)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        gathered = self._gathered
+        if name not in gathered:
+            values = getattr(self._targets, name)
+            flat = values.reshape(-1)
+            gathered[name] = flat if self._everything else flat.take(self._flat)
+        return gathered[name]
+
+    def of_target(self, column: FloatArray) -> AnyArray:
+        """Return a per-target column (shape (targets,)) for each cell."""
+        return column[self.target]
+
+    def draws(self, stream: Any, draw: int = 0) -> FloatArray:
+        """Return uniform draws keyed by each cell's target and scan."""
+        return stream.uniform(self.roster.keys[self.target], self.scan, draw)
+
+
+class Sensor(Component):
+    """A block that looks at the targets at its own scan instants and reports detections."""
+
+    inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
+    outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
+    Parameters = SensorParameters
+    windowed = True
+    #: Whether detections carry a range.
+    measures_range = False
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.reach: Reach = parameters.reach()
+        self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
+        self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
+        self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
+
+    def request(self, port: str) -> Any:
+        """Ask whoever feeds us for the targets in our reach."""
+        return self.reach
+
+    def offer(self, port: str) -> Any:
+        """Say whether we measure range, and how finely we measure angles."""
+        return SensorOffer(self.measures_range, max(self.azimuth_step_rad, self.elevation_step_rad))
+
+    def look(self, cells: Cells) -> Look:
+        """Decide for each cell whether it is detected; the physics of the sensor."""
+        raise TypeError(f"{type(self).__name__} has no look(cells)")
+
+    def run(self, wake: Wake) -> Detections | None:
+        """Look at every target in reach at every scan of the wake."""
+        held = wake.held("targets")
+        if held is None:
+            return None
+        targets, rows = held
+        rows, reason = self._decide(targets, rows)
+        wanted = reason == EVALUATE
+        cells = Cells(targets, rows, wanted, wake.scans)
+        look = self.look(cells)
+        found = np.flatnonzero(look.detected)
+        per_scan = np.bincount(cells.row[found], minlength=len(wake))
+        p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
+                   cells.range_m[found])  # fmt: skip
+        azimuth, elevation, range_m = self.measure(p, q, r)
+        return Detections(
+            tick=wake.ticks,
+            scan=wake.scans,
+            evaluated=wanted.sum(axis=1),
+            skipped=_skipped(reason),
+            offsets=np.concatenate(([0], np.cumsum(per_scan))),
+            target=cells.target[found],
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            range_m=range_m,
+            confidence=look.confidence[found],
+            true_azimuth_rad=p,
+            true_elevation_rad=q,
+            true_range_m=r,
+            extras={name: values[found] for name, values in look.extras.items()},
+            roster=targets.roster,
+        )
+
+    def _decide(self, targets: RelativeTargets, rows: IntArray) -> tuple[IntArray, ReasonArray]:
+        """Return message rows and reasons for each scan, from the gate's decision if it has one."""
+        if isinstance(targets, GatedTargets) and self.name in targets.decisions:
+            decision = targets.decisions[self.name]
+            place = decision.place[rows]
+            if place.min(initial=0) >= 0:
+                if len(place) == len(decision.reason) and place[0] == 0:
+                    return rows, decision.reason
+                return rows, decision.reason[place]
+        part = targets.take(rows)
+        reason = self.reach.decide(
+            part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
+        )
+        return rows, reason
+
+    def measure(
+        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Round a true line of sight to the sensor's grid, inside its field of view (§3.5.1).
+
+        Returns
+        -------
+        azimuth_rad, elevation_rad, range_m : arrays
+            Range is NaN when the sensor measures none.
+        """
+        azimuth = self._round_azimuth(p_rad)
+        elevation = round_to_grid(
+            q_rad,
+            self.elevation_step_rad,
+            limit_low=self.reach.elevation_rad[0],
+            limit_high=self.reach.elevation_rad[1],
+        )
+        if not self.measures_range:
+            return azimuth, elevation, np.full(len(range_m), np.nan)
+        return azimuth, elevation, round_to_grid(range_m, self.range_step_m, limit_low=0.0)
+
+    def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
+        low, high = self.reach.azimuth_rad
+        step = self.azimuth_step_rad
+        if high < low:
+            high += 2.0 * math.pi
+        if high - low >= 2.0 * math.pi:
+            return wrap_pi(round_to_grid(p_rad, step))
+        if low >= -math.pi and high <= math.pi:
+            return round_to_grid(p_rad, step, limit_low=low, limit_high=high)
+        # The field runs across ±pi: unwrap into it, so that its edges are its limits.
+        unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
+        return wrap_pi(round_to_grid(unwrapped, step, limit_low=low, limit_high=high))
+
+
+def _skipped(reason: ReasonArray) -> dict[str, IntArray]:
+    return {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}

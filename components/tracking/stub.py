@@ -1,0 +1,98 @@
+"""A stand-in for a tracker: it holds the last fused measurement (``tracking.stub``)."""
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from components.messages import FusedDetections, Tracks
+from dsa_des.component import Component, Parameters
+from dsa_des.ports import Input, Output
+from dsa_des.types import FloatArray, IntArray
+from dsa_des.wake import Wake
+
+_HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "tick")
+
+
+class StubParameters(Parameters):
+    """Parameters of the tracker stub."""
+
+    drop_after_s: float | None = Field(
+        default=None, gt=0, description="Age at which a held measurement is dropped, s."
+    )
+
+
+class TrackerStub(Component):
+    """Holds the last fused measurement of each target, its age, and which sensors gave it.
+
+    Tracks are sent at every instant at which at least one target was updated.
+    """
+
+    inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
+    outputs = {"tracks": Output(Tracks, "What is held of every target.")}
+    Parameters = StubParameters
+    windowed = True
+
+    def setup(self) -> None:
+        """Start with no tracks."""
+        self._targets: IntArray = np.empty(0, dtype=np.int64)
+        self._held: dict[str, Any] = {name: np.empty(0) for name in _HELD}
+
+    def run(self, wake: Wake) -> Tracks | None:
+        """Take in new measurements and report what is held."""
+        fused = wake["fused"]
+        if fused is None:
+            return None
+        counts = np.diff(fused.offsets)
+        updated = np.flatnonzero(counts)
+        if len(updated) == 0:
+            return None
+        targets = np.union1d(self._targets, fused.target)
+        pool, start = self._pool(fused, counts)
+        last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
+        last[0, np.searchsorted(targets, self._targets)] = np.arange(start)
+        rows = np.repeat(np.arange(1, len(updated) + 1), counts[updated])
+        last[rows, np.searchsorted(targets, fused.target)] = start + np.arange(len(fused.target))
+        last = np.maximum.accumulate(last, axis=0)
+        self._targets = targets[last[-1] >= 0]
+        held_at_end = last[-1][last[-1] >= 0]
+        self._held = {name: values[held_at_end] for name, values in pool.items()}
+        return self._tracks(fused, fused.tick[updated], targets, last[1:], pool)
+
+    def _pool(self, fused: FusedDetections, counts: IntArray) -> tuple[dict[str, Any], int]:
+        """Return everything that may be held: what was, then the new entries."""
+        start = len(self._targets)
+        new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD if name != "tick"}
+        new["tick"] = np.repeat(fused.tick, counts)
+        if start == 0:
+            return new, 0
+        return {name: np.concatenate([self._held[name], new[name]]) for name in _HELD}, start
+
+    def _tracks(
+        self,
+        fused: FusedDetections,
+        ticks: IntArray,
+        targets: IntArray,
+        last: IntArray,
+        pool: dict[str, Any],
+    ) -> Tracks:
+        age_s: FloatArray = (
+            ticks[:, np.newaxis] - pool["tick"][np.maximum(last, 0)]
+        ) / self.context.ticks_per_s
+        held = last >= 0
+        if self.p.drop_after_s is not None:
+            held &= age_s < self.p.drop_after_s
+        row, column = np.nonzero(held)
+        entry = last[row, column]
+        return Tracks(
+            tick=ticks,
+            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
+            target=targets[column],
+            azimuth_rad=pool["azimuth_rad"][entry],
+            elevation_rad=pool["elevation_rad"][entry],
+            range_m=pool["range_m"][entry],
+            age_s=age_s[row, column],
+            contributors=pool["contributors"][entry],
+            roster=fused.roster,
+            sensors=fused.sensors,
+        )

@@ -1,0 +1,114 @@
+"""Recorded traffic: flights read from files (``traffic.daa_file``, ``traffic.csv``)."""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from components.aircraft import Aircraft
+from components.traffic.csv_file import read_csv
+from components.traffic.daa_file import read_daa
+from components.traffic.fleet import SampledFleet
+from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
+from components.traffic.traffic_file import TrafficFile
+from dsa_des.component import ScenePath
+from dsa_des.types import FloatArray
+
+
+class FileParameters(SourceParameters):
+    """Parameters of recorded traffic."""
+
+    file: ScenePath = Field(description="The traffic file.")
+    intruder: Aircraft = Field(
+        default=Aircraft(), description="What every intruder is, unless `aircraft` names it."
+    )
+    aircraft: dict[str, Aircraft] = Field(
+        default={}, description="What single intruders are, by their names in the file."
+    )
+
+
+class DaaFileParameters(FileParameters):
+    """Parameters of a DAIDALUS traffic file."""
+
+    reference_lat_deg: float = Field(
+        default=0.0, ge=-90, le=90, description="Reference point of an .xyz file: latitude, deg."
+    )
+    reference_lon_deg: float = Field(default=0.0, description="Its longitude, deg.")
+    reference_alt_m: float = Field(default=0.0, description="Its altitude, m.")
+
+
+class CsvParameters(FileParameters):
+    """Parameters of a CSV traffic file."""
+
+    ownship: str | None = Field(
+        default=None, description="Name of the ownship; by default the first aircraft named."
+    )
+
+
+class RecordedTraffic(TrafficSource):
+    """Traffic from a file: positions between samples are interpolated, none are extrapolated.
+
+    Time 0 is the file's earliest sample.
+    """
+
+    Parameters = FileParameters
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.content = self.read()
+        self.own = self.content.ownship
+        self.targets = self.content.intruders
+        self.fleet = SampledFleet(self.content.intruders)
+        self.roster = roster_of(
+            [target.name for target in self.content.intruders],
+            parameters.intruder,
+            parameters.aircraft,
+            str(parameters.file),
+        )
+
+    def read(self) -> TrafficFile:
+        """Return the content of the file."""
+        raise TypeError(f"{type(self).__name__} reads no file")
+
+    def natural_duration_s(self) -> Fraction:
+        """Return the time from the file's first sample to its last."""
+        last = max(craft.interval_present()[1] for craft in self.content.aircraft)
+        # Zero-length recordings still have their one instant.
+        return max(Fraction(repr(float(last))), Fraction(1, 10**9))
+
+    def sample_times_s(self, target: Trajectory) -> FloatArray:
+        """Return the file's own sample times of the target and the ownship."""
+        own: FloatArray = self.content.ownship.sample_times_s
+        other: FloatArray = target.sample_times_s  # type: ignore[attr-defined]
+        return np.union1d(own, other)
+
+    def report(self) -> dict[str, Any]:
+        """Return closest approaches, and what the file's own clock said at time 0."""
+        source = {"start_time_s": self.content.start_time_s, "notes": self.content.notes}
+        return {**super().report(), "traffic": source}
+
+
+class DaaFile(RecordedTraffic):
+    """Traffic from a DAIDALUS .daa or .xyz file; the first aircraft named is the ownship."""
+
+    Parameters = DaaFileParameters
+
+    def read(self) -> TrafficFile:
+        """Return the content of the file."""
+        return read_daa(
+            self.p.file,
+            reference_lat_deg=self.p.reference_lat_deg,
+            reference_lon_deg=self.p.reference_lon_deg,
+            reference_alt_m=self.p.reference_alt_m,
+        )
+
+
+class CsvFile(RecordedTraffic):
+    """Traffic from a CSV file with time, id, latitude, longitude and altitude (ADS-B-like)."""
+
+    Parameters = CsvParameters
+
+    def read(self) -> TrafficFile:
+        """Return the content of the file."""
+        return read_csv(self.p.file, self.p.ownship)

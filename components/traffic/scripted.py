@@ -1,0 +1,200 @@
+"""Scripted traffic: flights written in the scene (``traffic.scripted``)."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from components.aircraft import Aircraft, Roster
+from components.traffic import leg_types
+from components.traffic.fleet import ScriptedFleet
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from dsa_des.component import Parameters
+from dsa_des.types import FloatArray
+
+
+class _Leg(Parameters):
+    duration_s: float | None = Field(
+        default=None, gt=0, description="Length of the leg, s; the last one is held for ever."
+    )
+
+
+class StraightLeg(_Leg):
+    """Fly straight."""
+
+    kind: Literal["straight"]
+    heading_deg: float | None = Field(default=None, description="New heading, deg from north.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
+    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
+
+
+class TurnLeg(_Leg):
+    """Turn at a constant rate; positive is to the right."""
+
+    kind: Literal["turn"]
+    rate_deg_s: float | None = Field(default=None, description="Rate of turn, deg/s.")
+    radius_m: float | None = Field(default=None, description="Radius instead of a rate, m.")
+    angle_deg: float | None = Field(default=None, gt=0, description="Angle to turn through, deg.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
+    climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
+
+
+class ClimbLeg(_Leg):
+    """Climb or descend straight ahead."""
+
+    kind: Literal["climb"]
+    climb_mps: float = Field(description="Rate of climb, m/s.")
+    to_alt_m: float | None = Field(default=None, description="Altitude to level off at, m.")
+    speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
+
+
+class StationaryLeg(_Leg):
+    """Stay in place."""
+
+    kind: Literal["stationary"]
+
+
+class Point(Parameters):
+    """A waypoint: degrees and metres, or an offset from the ownship's start."""
+
+    lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float | None = Field(default=None, description="Longitude, deg.")
+    alt_m: float | None = Field(default=None, description="Altitude, m.")
+    east_m: float | None = Field(default=None, description="Offset to the east, m.")
+    north_m: float | None = Field(default=None, description="Offset to the north, m.")
+    up_m: float | None = Field(default=None, description="Offset upward, m.")
+    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed to it, m/s.")
+
+
+class WaypointsLeg(Parameters):
+    """Fly over waypoints."""
+
+    kind: Literal["waypoints"]
+    points: list[Point] = Field(min_length=1, description="Waypoints in order.")
+    speed_mps: float | None = Field(default=None, gt=0, description="Ground speed, m/s.")
+
+
+AnyLeg = Annotated[
+    StraightLeg | TurnLeg | ClimbLeg | StationaryLeg | WaypointsLeg, Field(discriminator="kind")
+]
+
+
+class Flight(Parameters):
+    """How an aircraft starts and flies; without legs it flies straight on for ever."""
+
+    alt_m: float | None = Field(default=None, description="Altitude at the start, m.")
+    heading_deg: float = Field(default=0.0, description="Heading at the start, deg from north.")
+    speed_mps: float = Field(default=0.0, ge=0, description="Ground speed, m/s.")
+    climb_mps: float = Field(default=0.0, description="Rate of climb, m/s.")
+    yaw_deg: float | None = Field(default=None, description="Fixed yaw; else the track, deg.")
+    pitch_deg: float | None = Field(default=None, description="Fixed pitch; else the path, deg.")
+    roll_deg: float | None = Field(
+        default=None, description="Fixed roll; else the bank of a coordinated turn, deg."
+    )
+    legs: list[AnyLeg] = Field(default=[], description="What it does, one after the other.")
+
+
+class Ownship(Flight):
+    """The ownship's start and flight."""
+
+    lat_deg: float = Field(ge=-90, le=90, description="Latitude at the start, deg.")
+    lon_deg: float = Field(description="Longitude at the start, deg.")
+    alt_m: float = Field(description="Altitude at the start, m.")
+
+
+class Intruder(Flight, Aircraft):
+    """An intruder: a name, a start, a flight and what sensors need to know of it."""
+
+    name: str = Field(min_length=1, description="Name; keys its random draws.")
+    lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float | None = Field(default=None, description="Longitude, deg.")
+    east_m: float | None = Field(default=None, description="Start east of the ownship's, m.")
+    north_m: float | None = Field(default=None, description="Start north of the ownship's, m.")
+    up_m: float | None = Field(default=None, description="Start above the ownship's, m.")
+    start_time_s: float = Field(default=0.0, ge=0, description="When it appears, s.")
+    end_time_s: float | None = Field(default=None, ge=0, description="When it leaves, s.")
+
+
+class ScriptedParameters(SourceParameters):
+    """Parameters of scripted traffic."""
+
+    ownship: Ownship = Field(description="The ownship.")
+    intruders: list[Intruder] = Field(default=[], description="Any number of intruders.")
+    sample_interval_s: float = Field(
+        default=0.1, gt=0, description="Spacing of the samples at which closest approach is sought."
+    )
+
+
+class ScriptedTraffic(TrafficSource):
+    """Ownship and intruders on flights written in the scene: legs, turns, climbs, waypoints."""
+
+    Parameters = ScriptedParameters
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        own = parameters.ownship
+        reference = (own.lat_deg, own.lon_deg, own.alt_m)
+        self.own = ScriptedTrajectory(
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **_flight(own)
+        )
+        names = [intruder.name for intruder in parameters.intruders]
+        for twice in sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"intruders: the name {twice!r} is used more than once")
+        self.targets = [_intruder(craft, reference) for craft in parameters.intruders]
+        self.fleet = ScriptedFleet(self.targets)
+        self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
+
+    def sample_times_s(self, target: Trajectory) -> FloatArray:
+        """Return a regular grid over the run."""
+        step = self.p.sample_interval_s
+        # Rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
+        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
+
+
+def _flight(flight: Flight) -> dict[str, Any]:
+    return {
+        "alt_m": flight.alt_m,
+        "heading_deg": flight.heading_deg,
+        "speed_mps": flight.speed_mps,
+        "climb_mps": flight.climb_mps,
+        "yaw_deg": flight.yaw_deg,
+        "pitch_deg": flight.pitch_deg,
+        "roll_deg": flight.roll_deg,
+        "legs": [_leg(leg) for leg in flight.legs],
+    }
+
+
+def _leg(leg: Any) -> Any:
+    values = leg.model_dump(exclude={"kind", "points"})
+    if leg.kind == "waypoints":
+        points = tuple(leg_types.Waypoint(**point.model_dump()) for point in leg.points)
+        return leg_types.Waypoints(points, **values)
+    return getattr(leg_types, leg.kind.capitalize())(**values)
+
+
+def _intruder(craft: Intruder, reference: tuple[float, float, float]) -> ScriptedTrajectory:
+    values = _flight(craft) | {
+        "start_time_s": craft.start_time_s,
+        "end_time_s": craft.end_time_s,
+    }
+    geodetic = craft.lat_deg is not None and craft.lon_deg is not None
+    offset = craft.east_m is not None and craft.north_m is not None
+    if geodetic and craft.alt_m is not None and craft.east_m is craft.north_m is craft.up_m is None:
+        return ScriptedTrajectory(
+            craft.name, lat_deg=craft.lat_deg, lon_deg=craft.lon_deg, reference=reference, **values
+        )
+    if offset and craft.lat_deg is craft.lon_deg is craft.alt_m is None:
+        del values["alt_m"]
+        return ScriptedTrajectory.from_offset(
+            craft.name,
+            east_m=craft.east_m,
+            north_m=craft.north_m,
+            up_m=craft.up_m or 0.0,
+            reference=reference,
+            **values,
+        )
+    raise ValueError(
+        f"intruder {craft.name!r}: its start must be given as lat_deg, lon_deg and alt_m, or as "
+        "east_m, north_m and up_m from the ownship's start"
+    )

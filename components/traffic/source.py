@@ -1,0 +1,144 @@
+"""What every traffic source has in common: states at the instants that sensors ask for."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from components.aircraft import Aircraft, Roster
+from components.geometry.ellipsoid import line_of_sight
+from components.messages import TrafficStates
+from components.traffic.state import TrajectoryState
+from dsa_des.clock import ClockSpec
+from dsa_des.component import Component, Parameters, PositiveRational
+from dsa_des.message import Message
+from dsa_des.ports import Output
+from dsa_des.types import FloatArray
+from dsa_des.wake import Wake
+
+
+class SourceParameters(Parameters):
+    """Parameters of every traffic source."""
+
+    update_rate_hz: PositiveRational | None = Field(
+        default=None,
+        description="Rate at which positions are published; sensors then see the last one. By "
+        "default they are known at every scan instant.",
+    )
+
+
+class Trajectory(Protocol):
+    """The flight of one aircraft."""
+
+    name: str
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return its state at some times."""
+
+
+class Fleet(Protocol):
+    """The flights of many aircraft."""
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return their states, shape (times, aircraft)."""
+
+
+class TrafficSource(Component):
+    """Publishes where the ownship and its targets are.
+
+    Subclasses set `own`, `fleet` and `roster` in `setup`, and say at which times their data hold
+    samples.
+    """
+
+    outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
+    Parameters = SourceParameters
+    windowed = True
+    clocked = "demand"
+
+    own: Trajectory
+    fleet: Fleet
+    targets: Sequence[Trajectory]
+    roster: Roster
+
+    @classmethod
+    def clock_of(cls, parameters: Any) -> ClockSpec | None:
+        """Return the publishing clock, if the scene gives one."""
+        rate = parameters.update_rate_hz
+        return None if rate is None else ClockSpec(rate, Fraction(0))
+
+    @property
+    def width(self) -> int:
+        """Number of targets."""
+        return len(self.roster)
+
+    def run(self, wake: Wake) -> Message:
+        """Return the state of all aircraft at every instant."""
+        time_s = wake.time_s
+        own = self.own.at(time_s)
+        states = self.fleet.at(time_s)
+        return TrafficStates(
+            tick=wake.ticks,
+            own_lat_deg=own.lat_deg,
+            own_lon_deg=own.lon_deg,
+            own_alt_m=own.alt_m,
+            own_yaw_rad=own.yaw_rad,
+            own_pitch_rad=own.pitch_rad,
+            own_roll_rad=own.roll_rad,
+            lat_deg=states.lat_deg,
+            lon_deg=states.lon_deg,
+            alt_m=states.alt_m,
+            yaw_rad=states.yaw_rad,
+            pitch_rad=states.pitch_rad,
+            roll_rad=states.roll_rad,
+            present=states.present & own.present[:, np.newaxis],
+            roster=self.roster,
+        )
+
+    def sample_times_s(self, target: Trajectory) -> FloatArray:
+        """Return the times at which the source itself knows this target and the ownship, s."""
+        raise TypeError(f"{type(self).__name__} does not say when its samples are")
+
+    def report(self) -> dict[str, Any]:
+        """Return the closest approach of every target over the run."""
+        end_s = float(self.context.duration_s)
+        return {
+            "targets": {
+                target.name: {"closest_approach": self._closest_approach(target, end_s)}
+                for target in self.targets
+            }
+        }
+
+    def _closest_approach(self, target: Trajectory, end_s: float) -> dict[str, float] | None:
+        times = self.sample_times_s(target)
+        times = times[(times >= 0) & (times <= end_s)]
+        own, other = self.own.at(times), target.at(times)
+        both = own.present & other.present
+        if not both.any():
+            return None
+        _, _, range_m = line_of_sight(
+            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
+            validate=False,
+        )  # fmt: skip
+        nearest = int(np.argmin(np.where(both, range_m, np.inf)))
+        return {"time_s": float(times[nearest]), "range_m": float(range_m[nearest])}
+
+
+def roster_of(
+    names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
+) -> Roster:
+    """Return the roster of named targets: `others` by name, `default` for the rest.
+
+    Raises
+    ------
+    ValueError
+        If `others` names an aircraft that is not a target.
+    """
+    from dsa_des.errors import did_you_mean
+
+    for name in others:
+        if name not in names:
+            raise ValueError(f"aircraft.{name}: {what} has no such intruder"
+                             f"{did_you_mean(name, names)}")  # fmt: skip
+    return Roster.of([(name, others.get(name, default)) for name in names])

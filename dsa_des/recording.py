@@ -1,0 +1,225 @@
+"""Recording: a passive tap on every output, in an order that no scheduling choice can change.
+
+A recorder never schedules an event and never draws a number. Rows are sorted by (tick, block)
+before they reach a sink, so a run in look-ahead windows and one that goes scan by scan hand over
+the same rows in the same order.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from dsa_des.message import Message, Text
+from dsa_des.types import AnyArray, IntArray
+
+Columns = dict[str, AnyArray | Text]
+#: Column name → kind, one of "int64", "float64", "bool", "text". In float64, NaN means null.
+Schema = dict[str, str]
+
+_LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
+
+
+class Sink(Protocol):
+    """Something that takes recorded rows: a file, memory, or a running summary."""
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Take rows of one table, in their final order."""
+
+    def close(self) -> None:
+        """Take note that no more rows come."""
+
+
+class Recorder:
+    """Gathers what blocks send and hands it on in canonical order.
+
+    Parameters
+    ----------
+    sinks : iterable of Sink
+    """
+
+    def __init__(self, sinks: Iterable[Sink]) -> None:
+        self.sinks = list(sinks)
+        self._ticks_per_s = 1
+        self._schemas: dict[str, Schema] = {}
+        self._pending: dict[str, list[tuple[str, Columns]]] = {}
+        self._names: dict[tuple[str, str], dict[str, int]] = {}
+        self.rows: dict[str, int] = {}
+
+    def open(self, messages: Iterable[type[Message]], ticks_per_s: int) -> None:
+        """Learn what the run's messages record; called once, before the run."""
+        self._ticks_per_s = ticks_per_s
+        for message in messages:
+            for table, schema in message.recorded.items():
+                self._schemas.setdefault(table, dict(_LEADING)).update(schema)
+        self._schemas = dict(sorted(self._schemas.items()))
+        self._pending = {table: [] for table in self._schemas}
+        self.rows = dict.fromkeys(self._schemas, 0)
+        for sink in self.sinks:
+            sink.open(self._schemas)
+
+    def record(self, block: str, message: Message) -> None:
+        """Note a message that `block` has sent."""
+        for table, columns in message.tables().items():
+            if len(columns["tick"]):
+                self._pending[table].append((block, columns))
+
+    def advance(self, tick: int) -> None:
+        """Hand on every row before `tick`; no more of them will come."""
+        for table, pieces in self._pending.items():
+            ready: list[tuple[str, Columns]] = []
+            later: list[tuple[str, Columns]] = []
+            for block, columns in pieces:
+                ticks: Any = columns["tick"]
+                count = int(np.searchsorted(ticks, tick))
+                if count == len(ticks):
+                    ready.append((block, columns))
+                    continue
+                if count:
+                    ready.append((block, _rows(columns, slice(0, count))))
+                later.append((block, _rows(columns, slice(count, len(ticks)))))
+            self._pending[table] = later
+            if ready:
+                self._hand_on(table, ready)
+
+    def close(self) -> None:
+        """Hand on everything that is left and close the sinks."""
+        self.advance(np.iinfo(np.int64).max)
+        for sink in self.sinks:
+            sink.close()
+
+    def _hand_on(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
+        pieces.sort(key=lambda piece: piece[0])
+        ticks: IntArray = np.concatenate([columns["tick"] for _, columns in pieces])
+        order = None
+        if bool(np.any(ticks[1:] < ticks[:-1])):
+            order = np.argsort(ticks, kind="stable")
+        ordered: Columns = {}
+        for name, kind in self._schemas[table].items():
+            ordered[name] = self._column(table, name, kind, pieces, order, ticks)
+        self.rows[table] += len(ticks)
+        for sink in self.sinks:
+            sink.write(table, ordered)
+
+    def _column(
+        self,
+        table: str,
+        name: str,
+        kind: str,
+        pieces: list[tuple[str, Columns]],
+        order: IntArray | None,
+        ticks: IntArray,
+    ) -> AnyArray | Text:
+        if name == "time_s":
+            values: AnyArray = ticks / self._ticks_per_s
+            return values if order is None else values[order]
+        if kind == "text":
+            names = self._names.setdefault((table, name), {})
+            parts = [_codes(name, block, columns, names) for block, columns in pieces]
+            codes = np.concatenate(parts)
+            return Text(codes if order is None else codes[order], tuple(names))
+        parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
+        values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        return values if order is None else values[order]
+
+
+def _codes(name: str, block: str, columns: Columns, names: dict[str, int]) -> AnyArray:
+    count = len(columns["tick"])
+    if name == "block":
+        return np.full(count, names.setdefault(block, len(names)), dtype=np.int32)
+    text = columns.get(name)
+    if text is None:
+        return np.full(count, -1, dtype=np.int32)
+    if not isinstance(text, Text):
+        raise TypeError(f"column {name!r} must be Text")
+    known = [names.setdefault(item, len(names)) for item in text.names]
+    lookup = np.array([*known, -1], dtype=np.int32)  # code -1 (null) takes the last entry
+    return lookup[text.codes]
+
+
+def _values(values: Any, kind: str, count: int) -> AnyArray:
+    if values is None:
+        return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
+    return np.asarray(values, dtype=np.dtype(kind))
+
+
+def _rows(columns: Columns, rows: slice) -> Columns:
+    return {
+        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
+        for name, values in columns.items()
+    }
+
+
+class MemorySink:
+    """Keeps all rows in memory; `tables` gives them as Arrow tables."""
+
+    def __init__(self) -> None:
+        self._schemas: Mapping[str, Schema] = {}
+        self._parts: dict[str, list[Columns]] = {}
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+        self._schemas = schemas
+        self._parts = {table: [] for table in schemas}
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Keep rows of one table."""
+        self._parts[table].append(columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def tables(self) -> dict[str, Any]:
+        """Return table name → ``pyarrow.Table``."""
+        import pyarrow as pa
+
+        from dsa_des.arrow import arrow_schema, to_arrow
+
+        return {
+            table: pa.Table.from_batches(
+                [to_arrow(columns, schema) for columns in self._parts[table]],
+                schema=arrow_schema(schema),
+            ).combine_chunks()
+            for table, schema in self._schemas.items()
+        }
+
+
+class Observer(Protocol):
+    """A running summary over recorded rows, for reports and metrics."""
+
+    tables: ClassVar[frozenset[str]]
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of one of its `tables`."""
+
+    def result(self) -> dict[str, Any]:
+        """Return sections of the run's summary."""
+
+
+class ObserverSink:
+    """Passes rows on to observers."""
+
+    def __init__(self, observers: Iterable[Observer]) -> None:
+        self.observers = list(observers)
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Nothing to do."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Pass rows to every observer of this table."""
+        for observer in self.observers:
+            if table in observer.tables:
+                observer.update(table, columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def result(self) -> dict[str, Any]:
+        """Return the sections of all observers."""
+        sections: dict[str, Any] = {}
+        for observer in self.observers:
+            sections.update(observer.result())
+        return sections
