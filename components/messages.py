@@ -12,7 +12,7 @@ import numpy as np
 
 from components.aircraft import Roster
 from components.reach import Decision
-from dsa_des.message import Message, Text, per_entry, static
+from dsa_des.message import Message, Text, per_entry, per_row, static
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
@@ -86,7 +86,7 @@ class GatedTargets(RelativeTargets):
         By sensor name.
     """
 
-    decisions: dict[str, Decision]
+    decisions: dict[str, Decision] = per_row()
 
 
 @dataclass(frozen=True)

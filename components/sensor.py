@@ -7,7 +7,7 @@ engine's business.
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -138,7 +138,7 @@ class Sensor(Component):
 
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
-    Parameters = SensorParameters
+    Parameters: ClassVar[Any] = SensorParameters
     windowed = True
     #: Whether detections carry a range.
     measures_range = False

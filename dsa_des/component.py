@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 
 from dsa_des.clock import ClockSpec, parse_rational
 from dsa_des.message import Message
@@ -28,23 +28,10 @@ def _as_written(value: Fraction) -> int | float | str:
     return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
-def _positive(value: Fraction) -> Fraction:
-    if value <= 0:
-        raise ValueError("must be greater than 0")
-    return value
-
-
-def _not_negative(value: Fraction) -> Fraction:
-    if value < 0:
-        raise ValueError("must be 0 or greater")
-    return value
-
-
-_Exact = (BeforeValidator(parse_rational), PlainSerializer(_as_written))
 #: An exact rate or time: a number or text such as "30000/1001".
-Rational = Annotated[Fraction, *_Exact]
-PositiveRational = Annotated[Fraction, *_Exact, AfterValidator(_positive)]
-NonNegativeRational = Annotated[Fraction, *_Exact, AfterValidator(_not_negative)]
+Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(_as_written)]
+PositiveRational = Annotated[Rational, Field(gt=0)]
+NonNegativeRational = Annotated[Rational, Field(ge=0)]
 
 
 class SourcedText(str):
@@ -174,7 +161,7 @@ class Component:
     inputs: ClassVar[Mapping[str, Input]] = {}
     outputs: ClassVar[Mapping[str, Output]] = {}
     #: Model of the block's parameters.
-    Parameters: ClassVar[type[Parameters]] = Parameters
+    Parameters: ClassVar[Any] = Parameters
     #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
     windowed: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);

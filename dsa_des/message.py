@@ -7,7 +7,6 @@ when they run in a look-ahead window. Physics written over rows serves both.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,6 +17,9 @@ from dsa_des.types import AnyArray, IntArray
 PER_ROW = "row"  # first axis is the rows
 PER_ENTRY = "entry"  # first axis is the entries; `offsets[i]:offsets[i + 1]` belong to row i
 STATIC = "static"  # the same for all rows
+
+#: Row and entry fields of every message type seen so far.
+_LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 
 
 def per_row(**kwargs: Any) -> Any:
@@ -35,8 +37,9 @@ def static(**kwargs: Any) -> Any:
     return field(metadata={"per": STATIC}, **kwargs)
 
 
-@lru_cache(maxsize=256)
-def _layout(message_type: type["Message"]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if message_type in _LAYOUTS:
+        return _LAYOUTS[message_type]
     rows, entries = [], []
     for item in fields(message_type):
         kind = item.metadata.get("per", PER_ROW)
@@ -46,7 +49,8 @@ def _layout(message_type: type["Message"]) -> tuple[tuple[str, ...], tuple[str, 
             rows.append(item.name)
         elif kind == PER_ENTRY:
             entries.append(item.name)
-    return tuple(rows), tuple(entries)
+    _LAYOUTS[message_type] = tuple(rows), tuple(entries)
+    return _LAYOUTS[message_type]
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,7 @@ def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
 
 
 def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[str]]:
-    """Apply one ``--swap`` and return (what is wrong with it, dropped parameters as dotted keys)."""
+    """Apply one ``--swap``; return what is wrong with it and the dropped parameters' keys."""
     parsed = parse_assignment(assignment, "--swap")
     if isinstance(parsed, Problem):
         return [parsed], []

@@ -37,7 +37,7 @@ class Abort(Exception):
 class WakeUp(simpy.Event):
     """An event that happens after `delay` ticks with a priority of its own."""
 
-    def __init__(self, env: simpy.Environment, delay: int, priority: float) -> None:
+    def __init__(self, env: simpy.Environment, delay: int, priority: Any) -> None:
         super().__init__(env)
         self._ok = True
         self._value = None
@@ -49,7 +49,7 @@ class Bell(simpy.Event):
 
     def ring(self) -> None:
         """Resume whoever waits, now, within the current event."""
-        callbacks, self.callbacks = self.callbacks, None
+        callbacks, self.callbacks = self.callbacks, None  # type: ignore[assignment]
         self._ok = True
         self._value = None
         for callback in callbacks:

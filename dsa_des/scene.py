@@ -27,7 +27,7 @@ class Block:
     """One block of a scene: its name, its type as written, its class and its parameters."""
 
     name: str
-    type: str
+    type_name: str
     cls: type[Component]
     parameters: Parameters
 
@@ -82,7 +82,7 @@ class Scene:
         tables["wires"] = [_wire_table(wire) for wire in self.wires]
         tables["blocks"] = {
             name: {
-                "type": block.type,
+                "type": block.type_name,
                 **block.parameters.model_dump(mode="json", exclude_none=True),
             }
             for name, block in self.blocks.items()
@@ -276,9 +276,12 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
         value = value[part]
     path: list[str | int] = list(key)
     for position, part in enumerate(loc):
-        if (isinstance(value, Mapping) and part in value) or (isinstance(value, list) and isinstance(part, int) and part < len(value)):
+        found = (isinstance(value, Mapping) and part in value) or (
+            isinstance(value, list) and isinstance(part, int) and part < len(value)
+        )
+        if found:
             value = value[part]
-        elif position < len(loc) - 1 or isinstance(value, list) or not isinstance(value, Mapping):
+        elif position < len(loc) - 1 or not isinstance(value, Mapping):
             continue
         path.append(part)
     return tuple(path)

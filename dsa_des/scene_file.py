@@ -101,7 +101,8 @@ class _Reader:
             try:
                 return path.read_text(encoding="utf-8")
             except FileNotFoundError:
-                message = f"there is no file {path}{_similar_file(path)}"
+                what = f"there is no file {path}" if chain else "there is no such file"
+                message = what + _similar_file(path)
             except UnicodeDecodeError:
                 message = f"{path} is not a text file in UTF-8"
             except OSError as error:

@@ -98,15 +98,6 @@ class Simulation:
         self.nodes = self._build_nodes(window, shuffle_ties)
         self._connect()
         self._window_ticks = self._window_length(window)
-        if recorder is not None:
-            recorder.open(
-                [
-                    output.message
-                    for component in self.components.values()
-                    for output in component.outputs.values()
-                ],
-                self.ticks_per_s,
-            )
 
     # -- building ------------------------------------------------------------------------------
 
@@ -262,6 +253,9 @@ class Simulation:
         """
         started = time.process_time()
         end = self.end_tick
+        if self.recorder is not None:
+            outputs = [o for c in self.components.values() for o in c.outputs.values()]
+            self.recorder.open([output.message for output in outputs], self.ticks_per_s)
         for node in self.nodes.values():
             node.start()
         for number in count():

@@ -40,8 +40,8 @@ def _value(value: Any) -> str:
         items = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
         return f"{{{items}}}" if items else "{}"
     if isinstance(value, list | tuple):
-        items = [_value(item) for item in value]
-        if sum(map(len, items)) > 80:
-            return "[\n" + "".join(f"  {item},\n" for item in items) + "]"
-        return f"[{', '.join(items)}]"
+        texts = [_value(item) for item in value]
+        if sum(map(len, texts)) > 80:
+            return "[\n" + "".join(f"  {text},\n" for text in texts) + "]"
+        return f"[{', '.join(texts)}]"
     raise TypeError(f"{type(value).__name__} cannot be written as TOML: {value!r}")

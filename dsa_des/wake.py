@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from dsa_des.message import Message
 from dsa_des.types import FloatArray, IntArray
 
 
@@ -25,7 +25,7 @@ class Arrivals:
 
     source: str
     tick: IntArray
-    message: Message
+    message: Any
 
 
 class Wake:
@@ -50,7 +50,7 @@ class Wake:
         ticks: IntArray,
         scans: IntArray,
         ticks_per_s: int,
-        held: Mapping[str, tuple[Message, IntArray]],
+        held: Mapping[str, tuple[Any, IntArray]],
         arrived: Mapping[str, list[Arrivals]],
         demand: Mapping[str, IntArray] | None = None,
     ) -> None:
@@ -69,20 +69,20 @@ class Wake:
         """Time of each row since the start of the run, s."""
         return self.ticks / self.ticks_per_s
 
-    def held(self, port: str) -> tuple[Message, IntArray] | None:
+    def held(self, port: str) -> tuple[Any, IntArray] | None:
         """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""
         return self._held.get(port)
 
-    def __getitem__(self, port: str) -> Message | None:
+    def __getitem__(self, port: str) -> Any:
         """Return the message held at each instant, row by row, or None when nothing came yet."""
         held = self._held.get(port)
         if held is None:
             return None
         message, rows = held
         count = len(rows)
-        if len(message) == count and rows[0] == 0 and rows[-1] == count - 1:
-            if count == 1 or bool(np.all(rows[1:] > rows[:-1])):
-                return message
+        whole = len(message) == count and rows[0] == 0 and rows[-1] == count - 1
+        if whole and bool(np.all(rows[1:] > rows[:-1])):
+            return message
         if rows[0] < 0:
             if rows[-1] < 0:
                 return None

@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 from dsa_des.clock import parse_rational
@@ -102,7 +103,7 @@ def _hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
             raise _WireError('must read "block -> block" or "block.output -> block.input"', entry)
         if len(ends) > 2 and any("." in end for end in ends):
             raise _WireError("ports can be named only in a wire between two blocks", entry)
-        return [(a, b, {}) for a, b in zip(ends, ends[1:], strict=False)]
+        return [(a, b, {}) for a, b in pairwise(ends)]
     if not isinstance(entry, dict):
         raise _WireError('must be text such as "gate -> radar", or a table', entry)
     for name in entry:

@@ -1,5 +1,7 @@
 """Pick-best fusion: radar gives range, optics give the angles (``fusion.pick_best``, §3.6)."""
 
+from fractions import Fraction
+
 import numpy as np
 from pydantic import Field
 
@@ -15,8 +17,7 @@ class PickBestParameters(Parameters):
     """Parameters of pick-best fusion."""
 
     coincidence_s: NonNegativeRational = Field(
-        default=0,  # type: ignore[arg-type]
-        validate_default=True,
+        default=Fraction(0),
         description="How old another sensor's detection may be and still count as the same "
         "look, s; 0 fuses detections of the same instant only (Fig. 4.22).",
     )

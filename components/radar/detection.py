@@ -131,21 +131,7 @@ def _probability(
 ) -> Any:
     name = checked_model(model)
     one_of("method", method, METHODS)
-    shape, (ratio, n, pfa) = broadcast_flat(
-        snr=checked_snr(snr),
-        pulses=checked_pulses(pulses),
-        false_alarm_probability=checked_probability(
-            "false_alarm_probability", false_alarm_probability
-        ),
-    )
-    if np.size(pulses) == 1 and np.size(false_alarm_probability) == 1:
-        groups: list[tuple[Any, float, float]] = []
-        if ratio.size:
-            groups.append((slice(None), float(n[0]), float(pfa[0])))
-    else:
-        pairs, member = np.unique(np.stack([n, pfa]), axis=1, return_inverse=True)
-        member = member.reshape(-1)
-        groups = [(member == i, pairs[0, i], pairs[1, i]) for i in range(pairs.shape[1])]
+    shape, ratio, groups = _group(checked_snr(snr), pulses, false_alarm_probability)
     result = np.empty_like(ratio)
     # Tiny SNR and probabilities fade to 0; that is their value, not an error.
     with np.errstate(under="ignore"):
@@ -157,3 +143,19 @@ def _probability(
                 found = _RUNGS[method](part, *radar)
                 result[chosen] = 1.0 - found if miss else found
     return unflatten(result, shape)
+
+
+def _group(
+    snr: FloatArray, pulses: ArrayLike, false_alarm_probability: ArrayLike
+) -> tuple[tuple[int, ...], FloatArray, list[tuple[Any, float, float]]]:
+    """Return the shape, flat SNR, and which elements have which pulses and false alarms."""
+    n = checked_pulses(pulses)
+    pfa = checked_probability("false_alarm_probability", false_alarm_probability)
+    if n.ndim == 0 and pfa.ndim == 0:
+        flat = np.ascontiguousarray(snr).reshape(-1)
+        return snr.shape, flat, [(slice(None), float(n), float(pfa))]
+    shape, (flat, n, pfa) = broadcast_flat(snr=snr, pulses=n, false_alarm_probability=pfa)
+    pairs, member = np.unique(np.stack([n, pfa]), axis=1, return_inverse=True)
+    member = member.reshape(-1)
+    groups = [(member == i, pairs[0, i], pairs[1, i]) for i in range(pairs.shape[1])]
+    return shape, flat, groups

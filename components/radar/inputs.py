@@ -65,6 +65,8 @@ def checked_snr(value: ArrayLike) -> FloatArray:
 
 def checked_pulses(value: ArrayLike) -> FloatArray:
     """Return the number of pulses as float64 holding whole numbers from 1 to `MAX_PULSES`."""
+    if type(value) is int and 1 <= value <= MAX_PULSES:  # the usual case, without NumPy's calls
+        return np.array(float(value))
     array = as_numbers("pulses", value)
     with np.errstate(invalid="ignore"):  # floor of NaN or infinity; refused here
         bad = ~((array >= 1.0) & (array <= MAX_PULSES) & (np.floor(array) == array))
@@ -74,6 +76,8 @@ def checked_pulses(value: ArrayLike) -> FloatArray:
 
 def checked_probability(name: str, value: ArrayLike) -> FloatArray:
     """Return a probability as float64, strictly between 0 and 1."""
+    if type(value) is float and 0.0 < value < 1.0:  # the usual case, without NumPy's calls
+        return np.array(value)
     array = as_numbers(name, value)
     refuse(name, array, ~((array > 0.0) & (array < 1.0)), "lie strictly between 0 and 1")
     return array

@@ -16,7 +16,13 @@ from components.radar.inputs import (
     refuse,
     unflatten,
 )
-from components.radar.radar_equation import radar_constant, snr, wavelength
+from components.radar.radar_equation import (
+    SMALLEST_MINIMUM_RANGE_M,
+    checked_minimum_range,
+    radar_constant,
+    snr,
+    wavelength,
+)
 from components.radar.rcs import dbsm_to_m2
 from components.radar.required_snr import required_snr
 
@@ -75,7 +81,7 @@ class LinkBudget:
         if self.frequency_hz is not None:
             positive("frequency_hz", self.frequency_hz)
         if self.minimum_range_m is not None:
-            positive("minimum_range_m", self.minimum_range_m)
+            checked_minimum_range(self.minimum_range_m)
         positive("constant_m2", self.constant_m2)
 
     @property
@@ -103,7 +109,8 @@ class LinkBudget:
         """The minimum range in use: given, or the start of the antenna's far field."""
         if self.minimum_range_m is not None:
             return self.minimum_range_m
-        return 2.0 * 10.0 ** (self.antenna_gain_db / 10.0) * self.wavelength / math.pi**2
+        far_field_m = 2.0 * 10.0 ** (self.antenna_gain_db / 10.0) * self.wavelength / math.pi**2
+        return max(far_field_m, SMALLEST_MINIMUM_RANGE_M)
 
     def snr(self, range_m: ArrayLike, rcs_m2: ArrayLike) -> Any:
         """Return the SNR at a slant range for an RCS; see `components.radar.radar_equation.snr`."""

@@ -14,6 +14,9 @@ SPEED_OF_LIGHT_M_S = 299_792_458.0
 BOLTZMANN_J_K = 1.380649e-23
 REFERENCE_TEMPERATURE_K = 290.0
 
+LARGEST_DB = 300.0
+SMALLEST_MINIMUM_RANGE_M = 1e-3
+
 
 def wavelength(frequency_hz: ArrayLike) -> Any:
     """Return the wavelength in metres of a frequency in hertz.
@@ -87,11 +90,25 @@ def radar_constant(
         "losses_db": losses_db,
     }
     for name, value in decibels.items():
-        if not abs(float(finite(name, value))) <= 1000.0:
-            raise ValueError(f"{name} is {value:g}: it must lie in [-1000, 1000] dB")
+        if not abs(float(finite(name, value))) <= LARGEST_DB:
+            raise ValueError(f"{name} is {value:g}: it must lie in ±{LARGEST_DB:g} dB")
     total_db = 2.0 * antenna_gain_db + integration_gain_db - noise_figure_db - losses_db
     noise_w = BOLTZMANN_J_K * REFERENCE_TEMPERATURE_K * bandwidth_hz
-    return power_w * wavelength_m**2 * 10.0 ** (total_db / 10.0) / ((4.0 * math.pi) ** 3 * noise_w)
+    return (
+        power_w
+        * wavelength_m
+        * wavelength_m
+        * 10.0 ** (total_db / 10.0)
+        / ((4.0 * math.pi) ** 3 * noise_w)
+    )
+
+
+def checked_minimum_range(minimum_range_m: float) -> float:
+    """Return the minimum range as a float, or refuse one below 1 mm."""
+    nearest = float(positive("minimum_range_m", minimum_range_m))
+    if nearest < SMALLEST_MINIMUM_RANGE_M:
+        raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
+    return nearest
 
 
 def snr(
@@ -111,7 +128,7 @@ def snr(
     constant_m2 : float
         From `radar_constant`.
     minimum_range_m : float
-        Above 0.
+        At least 1 mm.
 
     Returns
     -------
@@ -122,17 +139,17 @@ def snr(
     ValueError
         If an argument is negative or not finite.
     """
-    positive("constant_m2", constant_m2)
-    positive("minimum_range_m", minimum_range_m)
+    constant_m2 = float(positive("constant_m2", constant_m2))
+    nearest = checked_minimum_range(minimum_range_m)
     shape, (distance, rcs) = broadcast_flat(
         range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
     )
-    near = distance < minimum_range_m
-    safe = np.where(near, minimum_range_m, distance)
-    # Divided twice by the square: the fourth power of a large range would overflow. An echo from
-    # the end of the number range is 0.
+    near = distance < nearest
+    safe = np.where(near, nearest, distance)
+    # Both factors are divided by the square: neither the fourth power of a large range nor their
+    # product overflows on the way. An echo from the end of the number range is 0.
     with np.errstate(under="ignore", over="ignore"):
         square = safe * safe
-        echo = constant_m2 * rcs / square / square
+        echo = (constant_m2 / square) * (rcs / square)
     echo = np.where(near, 0.0, np.minimum(echo, np.finfo(np.float64).max))
     return unflatten(echo, shape)

@@ -1,4 +1,4 @@
-"""The crudest radar: whatever is inside its range is detected (``radar.range_boundary``, §2.2.2)."""
+"""The crudest radar: all inside its range is detected (``radar.range_boundary``, §2.2.2)."""
 
 import numpy as np
 from pydantic import Field

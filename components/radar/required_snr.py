@@ -67,6 +67,8 @@ def required_snr(
             raise ValueError(f"pd is {wanted!r}: it must be reachable with an SNR of at most 1e30")
         first = int(np.argmax(reached))
         if first == 0:
+            # Only in the first round: `wanted` is the false-alarm probability to the last digits.
+            high = low
             break
         low, high = float(grid[first - 1]), float(grid[first])
         if high - low <= 4e-16 * max(1.0, abs(high)):

@@ -141,8 +141,9 @@ class ScriptedTraffic(TrafficSource):
         names = [intruder.name for intruder in parameters.intruders]
         for twice in sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        self.targets = [_intruder(craft, reference) for craft in parameters.intruders]
-        self.fleet = ScriptedFleet(self.targets)
+        flights = [_intruder(craft, reference) for craft in parameters.intruders]
+        self.targets = flights
+        self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
@@ -178,19 +179,23 @@ def _intruder(craft: Intruder, reference: tuple[float, float, float]) -> Scripte
         "start_time_s": craft.start_time_s,
         "end_time_s": craft.end_time_s,
     }
-    geodetic = craft.lat_deg is not None and craft.lon_deg is not None
-    offset = craft.east_m is not None and craft.north_m is not None
-    if geodetic and craft.alt_m is not None and craft.east_m is craft.north_m is craft.up_m is None:
+    geodetic = (craft.lat_deg, craft.lon_deg, craft.alt_m)
+    offset = (craft.east_m, craft.north_m, craft.up_m)
+    if None not in geodetic and offset == (None, None, None):
         return ScriptedTrajectory(
-            craft.name, lat_deg=craft.lat_deg, lon_deg=craft.lon_deg, reference=reference, **values
+            craft.name,
+            lat_deg=float(craft.lat_deg or 0.0),
+            lon_deg=float(craft.lon_deg or 0.0),
+            reference=reference,
+            **values,
         )
-    if offset and craft.lat_deg is craft.lon_deg is craft.alt_m is None:
+    if None not in offset[:2] and geodetic == (None, None, None):
         del values["alt_m"]
         return ScriptedTrajectory.from_offset(
             craft.name,
-            east_m=craft.east_m,
-            north_m=craft.north_m,
-            up_m=craft.up_m or 0.0,
+            east_m=float(craft.east_m or 0.0),
+            north_m=float(craft.north_m or 0.0),
+            up_m=float(craft.up_m or 0.0),
             reference=reference,
             **values,
         )

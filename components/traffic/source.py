@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -53,7 +53,7 @@ class TrafficSource(Component):
     """
 
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
-    Parameters = SourceParameters
+    Parameters: ClassVar[Any] = SourceParameters
     windowed = True
     clocked = "demand"
 

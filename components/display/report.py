@@ -1,0 +1,66 @@
+"""The report of a detect-and-sense run: summary, terminal tables and two figures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from components.display.summary import FusedSummary, SensorSummary
+from components.messages import Detections
+from dsa_des.recording import Observer
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+
+class DetectAndSenseReport:
+    """Summarises, prints and draws runs; registered in ``dsa_des.reports``."""
+
+    def observers(self, simulation: "Simulation") -> list[Observer]:
+        """Return running summaries with the sections ``sensors`` and ``fused``.
+
+        Every block that sends `Detections` is a sensor, whoever wrote it.
+        """
+        return [SensorSummary(sensor_names(simulation)), FusedSummary()]
+
+    def show(self, console: Any, summary: dict[str, Any]) -> None:
+        """Print a run's summary.
+
+        Parameters
+        ----------
+        console : rich.console.Console
+        summary : dict
+            Sections ``sensors``, ``fused`` and ``targets`` with ``simulated_s``, ``cpu_s`` and
+            ``out``; whatever is missing is left out.
+        """
+        from components.display.terminal import show
+
+        show(console, summary)
+
+    def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
+        """Draw ``plan.png`` and ``timeline.png`` into a run's folder.
+
+        Parameters
+        ----------
+        simulation : Simulation
+            The run, for flights and fields of view.
+        folder : Path
+            Holds the run's Parquet tables; takes the figures.
+        summary : dict
+            The run's summary.
+
+        Returns
+        -------
+        list of Path
+            Without ``plan.png`` when no block of the scene knows the flights.
+        """
+        from components.display.figures import draw
+
+        return draw(simulation, folder, summary, sensor_names(simulation))
+
+
+def sensor_names(simulation: "Simulation") -> list[str]:
+    """Return the names of all blocks that send `Detections`, sorted."""
+    return sorted(
+        name
+        for name, component in simulation.components.items()
+        if any(issubclass(output.message, Detections) for output in component.outputs.values())
+    )

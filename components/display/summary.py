@@ -1,0 +1,167 @@
+"""Running summaries of a run: what each sensor saw first and last, and which sensors were fused.
+
+They take the recorded rows as these come, and keep a few numbers per sensor whatever the length
+of the run.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from components.messages import Detections
+from dsa_des.message import Text
+from dsa_des.recording import Columns
+from dsa_des.types import IntArray
+
+_SKIPPED = "skipped_"
+SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.startswith(_SKIPPED))
+
+
+class SensorSummary:
+    """Counts each sensor's scans and detections and keeps its first and last detection.
+
+    Parameters
+    ----------
+    sensors : iterable of str
+        Names of all sensor blocks; each gets an entry, also when it never scans.
+    """
+
+    tables: ClassVar[frozenset[str]] = frozenset({"scans", "detections"})
+
+    def __init__(self, sensors: Iterable[str]) -> None:
+        self._entries = {name: _Sensor() for name in sorted(sensors)}
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of ``scans`` or ``detections``, in order of time."""
+        for name, rows in _rows_by_name(columns["block"]):
+            entry = self._entries.setdefault(name, _Sensor())
+            if table == "scans":
+                entry.add_scans(columns, rows)
+            else:
+                entry.add_detections(columns, rows)
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``sensors``.
+
+        Returns
+        -------
+        dict
+            ``{"sensors": {block: {"scans", "evaluated", "detections", "skipped",
+            "first_detection", "last_detection"}}}``. ``evaluated`` counts target evaluations over
+            all scans, ``skipped`` targets not evaluated, by reason. A detection is
+            ``{"time_s", "range_m", "target"}`` or None; ``range_m`` is the true slant range at
+            that instant, for every sensor, also those that measure none; of several targets
+            detected in one instant it is the nearest.
+        """
+        return {"sensors": {name: entry.result() for name, entry in self._entries.items()}}
+
+
+class FusedSummary:
+    """Counts fused lines of sight per combination of sensors."""
+
+    tables: ClassVar[frozenset[str]] = frozenset({"fused"})
+
+    def __init__(self) -> None:
+        self._counts: dict[str, int] = {}
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of ``fused``."""
+        for name, rows in _rows_by_name(columns["sensors"]):
+            self._counts[name] = self._counts.get(name, 0) + len(rows)
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``fused``: combination (``"radar+eo"``) → rows, sorted by name.
+
+        There is one row per target and instant, so one instant with two targets counts twice.
+        """
+        return {"fused": dict(sorted(self._counts.items()))}
+
+
+class _Sensor:
+    """What is kept of one sensor."""
+
+    def __init__(self) -> None:
+        self.scans = 0
+        self.evaluated = 0
+        self.detections = 0
+        self.skipped = dict.fromkeys(SKIP_COLUMNS, 0)
+        self.first: _Sighting | None = None
+        self.last: _Sighting | None = None
+
+    def add_scans(self, columns: Columns, rows: IntArray) -> None:
+        self.scans += len(rows)
+        self.evaluated += int(_numbers(columns, "evaluated")[rows].sum())
+        for name in self.skipped:
+            if name in columns:
+                self.skipped[name] += int(_numbers(columns, name)[rows].sum())
+
+    def add_detections(self, columns: Columns, rows: IntArray) -> None:
+        self.detections += len(rows)
+        tick = _numbers(columns, "tick")
+        if self.first is None or self.first.tick == tick[rows[0]]:
+            together = rows[: np.searchsorted(tick[rows], tick[rows[0]], side="right")]
+            self.first = _nearer(self.first, _Sighting.nearest(columns, together))
+        together = rows[np.searchsorted(tick[rows], tick[rows[-1]]) :]
+        last = _Sighting.nearest(columns, together)
+        same_instant = self.last is not None and self.last.tick == last.tick
+        self.last = _nearer(self.last, last) if same_instant else last
+
+    def result(self) -> dict[str, Any]:
+        return {
+            "scans": self.scans,
+            "evaluated": self.evaluated,
+            "detections": self.detections,
+            "skipped": {name.removeprefix(_SKIPPED): n for name, n in self.skipped.items()},
+            "first_detection": None if self.first is None else self.first.result(),
+            "last_detection": None if self.last is None else self.last.result(),
+        }
+
+
+class _Sighting:
+    """One detection."""
+
+    def __init__(self, tick: int, time_s: float, range_m: float, target: str) -> None:
+        self.tick = tick
+        self.time_s = time_s
+        self.range_m = range_m
+        self.target = target
+
+    @classmethod
+    def nearest(cls, columns: Columns, rows: IntArray) -> "_Sighting":
+        """Return the nearest of some rows of one instant."""
+        range_m = _numbers(columns, "true_range_m")[rows]
+        # A block that knows no true range records NaN, which is never the nearest.
+        row = rows[np.argmin(np.where(np.isnan(range_m), np.inf, range_m))]
+        target = columns["target"]
+        assert isinstance(target, Text)
+        return cls(
+            int(_numbers(columns, "tick")[row]),
+            float(_numbers(columns, "time_s")[row]),
+            float(_numbers(columns, "true_range_m")[row]),
+            target.names[target.codes[row]],
+        )
+
+    def result(self) -> dict[str, Any]:
+        range_m = None if math.isnan(self.range_m) else self.range_m
+        return {"time_s": self.time_s, "range_m": range_m, "target": self.target}
+
+
+def _nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
+    if one is None or math.isnan(one.range_m):
+        return other
+    return other if other.range_m < one.range_m else one
+
+
+def _numbers(columns: Columns, name: str) -> Any:
+    return columns[name]
+
+
+def _rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
+    """Return each name that occurs in a text column and its rows, ascending."""
+    counts = np.bincount(column.codes + 1)[1:]  # code -1 is null
+    return [
+        (column.names[code], np.flatnonzero(column.codes == code))
+        for code in np.flatnonzero(counts).tolist()
+    ]

@@ -1,0 +1,155 @@
+"""``dsa-des graph``: the blocks and wires of a scene as text, DOT or a picture."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+import networkx as nx
+
+from dsa_des.commands.loading import load
+from dsa_des.errors import UsageError
+from dsa_des.graph import depths, windowed_blocks
+from dsa_des.scene import Scene
+from dsa_des.wiring import Wire
+
+
+def show_graph(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    dot: bool,
+    png: bool,
+    out: str | None,
+) -> None:
+    """Print or draw the graph of a scene."""
+    if dot and png:
+        raise UsageError("give --dot or --png, not both")
+    loaded = load(scene, sets, swaps, seed, duration)
+    if dot:
+        click.echo(to_dot(loaded))
+    elif png:
+        path = Path(out) if out else Path(f"{loaded.path.stem}-graph.png")
+        draw_graph(loaded, path)
+        click.echo(f"wrote {path}")
+    else:
+        _print_table(loaded)
+
+
+def _wires(scene: Scene) -> list[Wire]:
+    return sorted(scene.wires, key=lambda w: (w.source, w.output, w.target, w.input))
+
+
+def _delay_label(wire: Wire) -> str:
+    if wire.delay_scans:
+        return f"{wire.delay_scans} scan{'s' if wire.delay_scans > 1 else ''} later"
+    return f"{float(wire.delay_s):g} s later" if wire.delay_s else ""
+
+
+def _print_table(scene: Scene) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    depth = depths(scene.graph)
+    windowed = windowed_blocks(scene.graph, scene.classes)
+    table = Table(title=f"{scene.title}: blocks in the order they run within an instant")
+    for heading in ("depth", "block", "type", "runs", "fed by"):
+        table.add_column(heading)
+    for name in sorted(scene.blocks, key=lambda n: (depth[n], n)):
+        block = scene.blocks[name]
+        spec = block.cls.clock_of(block.parameters)
+        when = f"{float(spec.rate_hz):g} Hz" if spec else (
+            "on demand" if block.cls.clocked == "demand" else "when triggered"
+        )  # fmt: skip
+        grain = "look-ahead" if name in windowed else "scan by scan"
+        fed = [
+            f"{w.source}.{w.output}" + (f" ({_delay_label(w)})" if w.delayed else "")
+            for w in _wires(scene)
+            if w.target == name
+        ]
+        table.add_row(str(depth[name]), name, block.type_name, f"{when}, {grain}", ", ".join(fed))
+    Console().print(table)
+
+
+def to_dot(scene: Scene) -> str:
+    """Return the graph in Graphviz's DOT language, always in the same order."""
+    lines = [f'digraph "{_escaped(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
+    for name, block in scene.blocks.items():
+        lines.append(f'  "{name}" [label="{name}\\n{_escaped(block.type_name)}"];')
+    for wire in _wires(scene):
+        message = scene.blocks[wire.source].cls.outputs[wire.output].message.__name__
+        label = message + (f"\\n{_delay_label(wire)}" if wire.delayed else "")
+        style = ", style=dashed" if wire.delayed else ""
+        lines.append(f'  "{wire.source}" -> "{wire.target}" [label="{label}"{style}];')
+    return "\n".join([*lines, "}"])
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", "\\\\").replace('"', '\\"')
+
+
+def draw_graph(scene: Scene, path: Path) -> None:
+    """Draw the graph from left to right by depth."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    depth = depths(scene.graph)
+    place = _layout(scene.graph, depth)
+    columns = max(depth.values()) + 1
+    rows = max(list(depth.values()).count(d) for d in set(depth.values()))
+    figure = Figure(figsize=(1.2 + 2.1 * columns, 1.2 + 1.1 * rows), dpi=110)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 0.9))
+    axes.set_axis_off()
+    axes.set_xlim(-0.6, columns - 0.4)
+    axes.set_ylim(-rows / 2 - 0.2, rows / 2 + 0.2)
+    figure.suptitle(scene.title, fontsize=12)
+    boxes = {}
+    for name, (x, y) in place.items():
+        boxes[name] = axes.text(
+            x, y, f"{name}\n{scene.blocks[name].type_name}", ha="center", va="center", fontsize=8,
+            bbox={"boxstyle": "round,pad=0.5", "facecolor": "#eef3f8", "edgecolor": "#33557a"},
+        )  # fmt: skip
+    for wire in _wires(scene):
+        _draw_wire(axes, wire, place, boxes)
+    try:
+        figure.savefig(path, metadata={"Software": None})
+    except OSError as error:
+        raise UsageError(f"--out {path}: cannot be written: {error.strerror}") from error
+
+
+def _layout(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:
+    place = {}
+    for level in sorted(set(depth.values())):
+        names = sorted(name for name in graph if depth[name] == level)
+        for row, name in enumerate(names):
+            place[name] = (float(level), (len(names) - 1) / 2 - row)
+    return place
+
+
+def _draw_wire(
+    axes: Any, wire: Wire, place: Mapping[str, tuple[float, float]], boxes: Mapping[str, Any]
+) -> None:
+    (x0, y0), (x1, y1) = place[wire.source], place[wire.target]
+    backward = x1 <= x0
+    axes.annotate(
+        "",
+        xy=(x1, y1),
+        xytext=(x0, y0),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": "#b4532a" if wire.delayed else "#555555",
+            "linestyle": "--" if wire.delayed else "-",
+            "patchA": boxes[wire.source].get_bbox_patch(),
+            "patchB": boxes[wire.target].get_bbox_patch(),
+            "shrinkA": 1,
+            "shrinkB": 1,
+            "connectionstyle": "arc3,rad=-0.35" if backward else "arc3,rad=0",
+        },
+    )
+    if wire.delayed:
+        height = 0.35 * abs(x1 - x0) if backward else 0.0
+        axes.text((x0 + x1) / 2, (y0 + y1) / 2 - height, _delay_label(wire), fontsize=7,
+                  ha="center", va="center", color="#b4532a")  # fmt: skip

@@ -1,0 +1,21 @@
+"""What every command that takes a scene does first."""
+
+from collections.abc import Iterable
+
+import click
+
+from dsa_des.scene import Scene, load_scene
+
+
+def load(
+    scene: str,
+    sets: Iterable[str],
+    swaps: Iterable[str],
+    seed: int | None,
+    duration: str | None,
+) -> Scene:
+    """Load and check a scene; parameters that a swap dropped are listed on standard error."""
+    loaded = load_scene(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    for key in loaded.dropped:
+        click.echo(f"note: the swap dropped {key}", err=True)
+    return loaded

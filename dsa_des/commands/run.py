@@ -1,0 +1,127 @@
+"""``dsa-des run``: run a scene, record it, sum it up and draw it."""
+
+import hashlib
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import click
+
+from dsa_des import __version__
+from dsa_des.commands.loading import load
+from dsa_des.recording import ObserverSink, Recorder
+from dsa_des.reports import load_reports
+from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.simulation import Outcome, Simulation
+from dsa_des.toml_text import to_toml
+
+_VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
+
+
+def run_scene(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    out: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run a scene into a folder, then print its summary."""
+    loaded = load(scene, sets, swaps, seed, duration)
+    target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
+    check_target(target)
+    recorder = Recorder([])
+    simulation = Simulation(loaded, recorder=recorder)
+    reports = load_reports()
+    observers = ObserverSink(
+        observer for report in reports for observer in report.observers(simulation)
+    )
+    with writing(target) as folder:
+        # Arrow takes longer to import than most scenes to check: not before all is well.
+        from dsa_des.arrow import ParquetSink
+
+        recorder.sinks += [ParquetSink(folder), observers]
+        started = time.perf_counter()
+        with _progress(simulation, silent=quiet or as_json) as progress:
+            outcome = simulation.run(progress)
+        summary = _summary(observers, outcome, target)
+        scene_text = to_toml(loaded.resolved())
+        (folder / "scene.toml").write_text(scene_text, encoding="utf-8")
+        wall_s = time.perf_counter() - started
+        info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        write_json(folder / RUN_JSON, info)
+        for report in reports:
+            report.draw(simulation, folder, summary)
+    if as_json:
+        click.echo(json.dumps(summary, indent=2))
+    elif not quiet:
+        from rich.console import Console
+
+        console = Console()
+        for report in reports:
+            report.show(console, summary)
+
+
+def _summary(observers: ObserverSink, outcome: Outcome, target: Path) -> dict[str, Any]:
+    return {
+        **observers.result(),
+        **outcome.report,
+        "simulated_s": outcome.duration_s,
+        "cpu_s": outcome.cpu_s,
+        "out": str(target),
+    }
+
+
+def _info(
+    simulation: Simulation,
+    recorder: Recorder,
+    outcome: Outcome,
+    summary: dict[str, Any],
+    scene_text: str,
+    wall_s: float,
+) -> dict[str, Any]:
+    """Return the content of run.json; only ``timings`` may differ between two runs."""
+    sections = {k: v for k, v in summary.items() if k not in ("simulated_s", "cpu_s", "out")}
+    return {
+        "title": simulation.scene.title,
+        "seed": simulation.scene.seed,
+        "duration_s": outcome.duration_s,
+        "ticks_per_s": simulation.ticks_per_s,
+        "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
+        "versions": {
+            "dsa_des": __version__,
+            "python": sys.version.split()[0],
+            **{name: version(name) for name in _VERSIONS_OF},
+        },
+        "look_ahead": outcome.windowed,
+        "rows": recorder.rows,
+        "summary": sections,
+        "timings": {"cpu_s": outcome.cpu_s, "wall_s": wall_s},
+    }
+
+
+@contextmanager
+def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[float], None] | None]:
+    """Show a progress bar on a terminal; nothing in a pipe."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(simulation.scene.title, total=float(simulation.duration_s))
+        yield lambda time_s: bar.update(task, completed=time_s)

@@ -1,0 +1,34 @@
+"""Plug-ins that summarise, print and draw a run; the engine itself knows no sensor.
+
+They are found by the entry-point group ``dsa_des.reports``; each is a class with the methods of
+`Report`, called without arguments.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from dsa_des.recording import Observer
+from dsa_des.registry import registered
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+REPORTS = "dsa_des.reports"
+
+
+class Report(Protocol):
+    """What a report plug-in can do."""
+
+    def observers(self, simulation: "Simulation") -> list[Observer]:
+        """Return running summaries over the recorded rows of this run."""
+
+    def show(self, console: Any, summary: dict[str, Any]) -> None:
+        """Print the summary on a ``rich.console.Console``."""
+
+    def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
+        """Draw figures from the Parquet tables in `folder` into it and return their paths."""
+
+
+def load_reports() -> list[Report]:
+    """Return one instance of every registered report, in the order of their names."""
+    return [point.load()() for point in registered(REPORTS).values()]
