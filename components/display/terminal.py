@@ -49,7 +49,7 @@ def speed_text(simulated_s: float | None, cpu_s: float | None) -> str:
     """Return how fast the run was, as a sentence."""
     if simulated_s is None or cpu_s is None:
         return ""
-    text = f"{simulated_s:,g} s simulated in {cpu_s:.3g} s of processor time"
+    text = f"{simulated_s:,g} s simulated in {cpu_s:.3g} s of CPU"
     if cpu_s > 0:
         text += f": {float(f'{simulated_s / cpu_s:.3g}'):,.0f} simulated seconds per second"
     return text
@@ -72,31 +72,35 @@ def _cell(text: str) -> Any:
 
 
 def _sensors(sensors: dict[str, Any]) -> Any:
-    table = _table("Sensors (range: true slant range)")
+    table = _table("Sensors")
     table.add_column("sensor")
-    for name in ("scans", "detected"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in ("first", "last"):
-        table.add_column(f"{name} [s]".replace("[", r"\["), justify="right", no_wrap=True)
-        table.add_column("range", justify="right", no_wrap=True)
-        table.add_column("target")
+    table.add_column("scans", justify="right", no_wrap=True)
+    table.add_column("detections", justify="right", no_wrap=True)
+    table.add_column("")
+    table.add_column(_cell("time [s]"), justify="right", no_wrap=True)
+    table.add_column("true range", justify="right", no_wrap=True)
+    table.add_column("target")
     for name, entry in sensors.items():
-        row = [name, f"{entry['scans']:,}", f"{entry['detections']:,}"]
-        for detection in (entry["first_detection"], entry["last_detection"]):
-            if detection is None:
-                row += ["never", "", ""]
-            else:
-                row += [
-                    time_text(detection["time_s"]),
-                    distance_text(detection["range_m"]),
-                    detection["target"],
-                ]
-        table.add_row(*(_cell(text) for text in row))
+        counts = [name, f"{entry['scans']:,}", f"{entry['detections']:,}"]
+        if entry["first_detection"] is None:
+            table.add_row(*(_cell(text) for text in [*counts, "never"]))
+            continue
+        for which in ("first", "last"):
+            seen = entry[f"{which}_detection"]
+            row = [
+                *counts,
+                which,
+                time_text(seen["time_s"]),
+                distance_text(seen["range_m"]),
+                seen["target"],
+            ]
+            table.add_row(*(_cell(text) for text in row))
+            counts = ["", "", ""]
     return table
 
 
 def _fused(fused: dict[str, int]) -> Any:
-    table = _table("Fused instants (one per target)")
+    table = _table("Fused (per target and instant)")
     table.add_column("sensors")
     table.add_column("count", justify="right", no_wrap=True)
     for name, count in sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0])):
@@ -107,8 +111,8 @@ def _fused(fused: dict[str, int]) -> Any:
 def _targets(targets: dict[str, Any]) -> list[Any]:
     table = _table("Closest approach")
     table.add_column("target")
-    for name in ("time [s]".replace("[", r"\["), "range"):
-        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column(_cell("time [s]"), justify="right", no_wrap=True)
+    table.add_column("range", justify="right", no_wrap=True)
     met = [
         (entry["closest_approach"], name)
         for name, entry in targets.items()

@@ -1,0 +1,92 @@
+"""Drawing a run's figures without a window system, the same bytes on every drawing."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+DPI = 110
+
+#: Okabe and Ito's colours, told apart with any kind of colour vision, each with its marker and
+#: its size in points. Sensors see the same target in the same place: big open marks first and
+#: small ones on top keep all of them visible.
+STYLES = (
+    ("#0072B2", "o", 7.5),
+    ("#E69F00", "^", 6.0),
+    ("#D55E00", "s", 4.0),
+    ("#009E73", "D", 5.0),
+    ("#CC79A7", "v", 5.5),
+    ("#56B4E9", "P", 5.0),
+)
+
+
+def draw(
+    simulation: "Simulation", folder: Path, summary: dict[str, Any], sensors: Sequence[str]
+) -> list[Path]:
+    """Draw ``plan.png`` and ``timeline.png`` into a run's folder and return their paths.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    folder : Path
+        Holds the run's Parquet tables.
+    summary : dict
+    sensors : sequence of str
+        Names of the sensor blocks.
+    """
+    from components.display.flights import Flights
+    from components.display.marks import Detected
+    from components.display.plan import draw_plan
+    from components.display.timeline import draw_timeline
+
+    flights = Flights.of(simulation, summary)
+    detected = Detected.read(folder, sensors)
+    paths = []
+    if flights is not None:
+        paths.append(draw_plan(folder / "plan.png", simulation, flights, detected, summary))
+    paths.append(draw_timeline(folder / "timeline.png", simulation, flights, detected, folder))
+    return paths
+
+
+def style_of(sensors: Sequence[str], name: str) -> tuple[str, str, float]:
+    """Return a sensor's colour, marker and marker size in points."""
+    return STYLES[sensors.index(name) % len(STYLES)]
+
+
+@contextmanager
+def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG when the block is done.
+
+    Neither the user's matplotlibrc nor the date goes into it.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(
+            {
+                "font.size": 9,
+                "axes.titlesize": 10,
+                "axes.spines.top": False,
+                "axes.spines.right": False,
+                "legend.fontsize": 8,
+                "legend.framealpha": 0.9,
+                "text.parse_math": False,  # a dollar sign in a name is a dollar sign
+            }
+        )
+        figure = Figure(figsize=(width_in, height_in), dpi=DPI)
+        canvas = FigureCanvasAgg(figure)
+        yield figure
+        import warnings
+
+        with warnings.catch_warnings():
+            # Names may hold letters that the font lacks; they are drawn as boxes.
+            warnings.filterwarnings("ignore", message="Glyph .* missing from")
+            canvas.print_png(
+                str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
+            )

@@ -1,0 +1,128 @@
+"""The flights of a run on a map: east and north of where the ownship starts."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
+from components.messages import TrafficStates
+from dsa_des.types import FloatArray
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+MOST_POINTS = 30_000
+"""Points of all tracks together."""
+
+
+@dataclass
+class Track:
+    """One aircraft's flight.
+
+    Parameters
+    ----------
+    name : str
+    time_s : (points,)
+    east_km, north_km : (points,)
+        NaN where the aircraft is not there.
+    range_m : (points,)
+        True slant range from the ownship; NaN where one of the two is not there.
+    """
+
+    name: str
+    time_s: FloatArray
+    east_km: FloatArray
+    north_km: FloatArray
+    range_m: FloatArray
+
+
+class Flights:
+    """Where the aircraft of a traffic source are, in a frame tangent at the ownship's start.
+
+    Parameters
+    ----------
+    source : traffic block
+        Its attributes `own` and `targets` are flights with ``at(time_s)``.
+    duration_s : float
+    closest_s : dict
+        Target → time of closest approach, which becomes a point of its track.
+    """
+
+    def __init__(self, source: Any, duration_s: float, closest_s: dict[str, float]) -> None:
+        self._source = source
+        self._targets = {target.name: target for target in source.targets}
+        self._closest_s = closest_s
+        self.duration_s = duration_s
+        count = int(np.clip(MOST_POINTS // (len(self._targets) + 1), 60, 600))
+        times = _times(source.own, duration_s, count)
+        own = source.own.at(times)
+        start = int(np.argmax(own.present))
+        self._reference = tuple(
+            float(values[start]) for values in (own.lat_deg, own.lon_deg, own.alt_m)
+        )
+        self.start_s = float(times[start])
+        #: Where the ownship's nose points at its start, clockwise from north.
+        self.start_yaw_rad = float(own.yaw_rad[start])
+        east, north = self._map(own)
+        self.own = Track("ownship", times, east, north, np.zeros(len(times)))
+        self.targets = [self._track(target, count) for target in source.targets]
+
+    @classmethod
+    def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
+        """Return the flights of a run, or None if its traffic does not give them away."""
+        closest_s = {
+            name: entry["closest_approach"]["time_s"]
+            for name, entry in summary.get("targets", {}).items()
+            if entry.get("closest_approach")
+        }
+        for _, component in sorted(simulation.components.items()):
+            sends = any(issubclass(o.message, TrafficStates) for o in component.outputs.values())
+            if sends and hasattr(component, "own") and hasattr(component, "targets"):
+                return cls(component, float(simulation.duration_s), closest_s)
+        return None
+
+    def at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return east and north of a target in km at some times; NaN where it is not known."""
+        target = self._targets.get(name)
+        if target is None:
+            nothing = np.full(len(time_s), np.nan)
+            return nothing, nothing
+        return self._map(target.at(time_s))
+
+    def own_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return east and north of the ownship in km at some times."""
+        return self._map(self._source.own.at(time_s))
+
+    def closest_s(self, name: str) -> float | None:
+        """Return when a target is closest, if it ever meets the ownship."""
+        return self._closest_s.get(name)
+
+    def _track(self, target: Any, count: int) -> Track:
+        times = _times(target, self.duration_s, count)
+        if target.name in self._closest_s:
+            times = np.union1d(times, [self._closest_s[target.name]])
+        state, own = target.at(times), self._source.own.at(times)
+        _, _, range_m = line_of_sight(
+            own.lat_deg, own.lon_deg, own.alt_m, state.lat_deg, state.lon_deg, state.alt_m,
+            validate=False,
+        )  # fmt: skip
+        range_m = np.where(own.present & state.present, range_m, np.nan)
+        return Track(target.name, times, *self._map(state), range_m)
+
+    def _map(self, state: Any) -> tuple[FloatArray, FloatArray]:
+        north, east, _ = line_of_sight_ned(
+            *self._reference, state.lat_deg, state.lon_deg, state.alt_m, validate=False
+        )
+        there = state.present
+        return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)
+
+
+def _times(flight: Any, duration_s: float, count: int) -> FloatArray:
+    """Return times over the part of a run in which an aircraft is there."""
+    start, end = flight.interval_present() if hasattr(flight, "interval_present") else (0, math.inf)
+    start = min(max(0.0, start), duration_s)
+    end = max(start, min(duration_s, end))
+    # One instant is enough for a flight of no length.
+    return np.linspace(start, end, count if end > start else 1)
