@@ -90,3 +90,8 @@ def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
             canvas.print_png(
                 str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
             )
+
+
+def plain(label: str) -> str:
+    """Return a label that Matplotlib shows: it leaves those that begin with ``_`` out."""
+    return f" {label}" if label.startswith("_") else label

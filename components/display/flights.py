@@ -37,6 +37,12 @@ class Track:
     north_km: FloatArray
     range_m: FloatArray
 
+    @property
+    def along_km(self) -> FloatArray:
+        """Length of the path flown so far, seen from above, shape (points,)."""
+        steps = np.nan_to_num(np.hypot(np.diff(self.east_km), np.diff(self.north_km)))
+        return np.concatenate(([0.0], np.cumsum(steps)))
+
 
 class Flights:
     """Where the aircraft of a traffic source are, in a frame tangent at the ownship's start.

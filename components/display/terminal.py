@@ -1,5 +1,6 @@
 """A run's summary as tables on the terminal."""
 
+from collections.abc import Iterable
 from typing import Any
 
 MOST_TARGETS = 10
@@ -15,124 +16,113 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         As described in `DetectAndSenseReport.show`.
     """
     if summary.get("sensors"):
-        console.print(_sensors(summary["sensors"]))
+        _print_table(
+            console,
+            "Sensors",
+            ("sensor", "scans>", "detections>", "", "time [s]>", "true range>", "target"),
+            _sensor_rows(summary["sensors"]),
+        )
     if summary.get("fused"):
-        console.print(_fused(summary["fused"]))
+        _print_table(
+            console,
+            "Fused instants by combination of sensors (each target counts)",
+            ("sensors", "fused>"),
+            [(name, f"{count:,}") for name, count in _by_size(summary["fused"])],
+        )
     if summary.get("targets"):
-        for item in _targets(summary["targets"]):
-            console.print(item)
+        _show_closest(console, summary["targets"])
     speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
     if speed:
-        console.print(speed, markup=False, highlight=False)
+        _print_line(console, speed)
     if summary.get("out"):
-        # Never cut or wrapped: it is there to be copied.
-        console.print(f"Results in {summary['out']}", markup=False, highlight=False,
-                      soft_wrap=True)  # fmt: skip
+        _print_line(console, f"Results in {summary['out']}")
 
 
 def distance_text(range_m: float | None) -> str:
     """Return a distance for reading: metres below 1 km, otherwise km."""
     if range_m is None:
-        return "-"
+        return "unknown"
     if round(range_m, 1) < 1000:
         return f"{range_m:.1f} m"
     return f"{range_m / 1000:,.2f} km"
-
-
-def time_text(time_s: float) -> str:
-    """Return an instant in s, to the millisecond where it needs that."""
-    text = f"{time_s:.3f}"
-    return text.removesuffix("00") if text.endswith("00") else text
 
 
 def speed_text(simulated_s: float | None, cpu_s: float | None) -> str:
     """Return how fast the run was, as a sentence."""
     if simulated_s is None or cpu_s is None:
         return ""
-    text = f"{simulated_s:,g} s simulated in {cpu_s:.3g} s of CPU"
+    text = f"{simulated_s:.10g} s simulated in {cpu_s:.3g} s of CPU time"
     if cpu_s > 0:
-        text += f": {float(f'{simulated_s / cpu_s:.3g}'):,.0f} simulated seconds per second"
+        text += f": {float(f'{simulated_s / cpu_s:.3g}'):,.0f} simulated s per s"
     return text
 
 
-def _table(title: str) -> Any:
-    from rich import box
-    from rich.table import Table
-
-    return Table(
-        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, padding=(0, 1),
-        pad_edge=False,
-    )  # fmt: skip
-
-
-def _cell(text: str) -> Any:
-    from rich.text import Text  # names are printed as they are, not as markup
-
-    return Text(text, overflow="fold")
-
-
-def _sensors(sensors: dict[str, Any]) -> Any:
-    table = _table("Sensors")
-    table.add_column("sensor")
-    table.add_column("scans", justify="right", no_wrap=True)
-    table.add_column("detections", justify="right", no_wrap=True)
-    table.add_column("")
-    table.add_column(_cell("time [s]"), justify="right", no_wrap=True)
-    table.add_column("true range", justify="right", no_wrap=True)
-    table.add_column("target")
+def _sensor_rows(sensors: dict[str, Any]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
     for name, entry in sensors.items():
-        counts = [name, f"{entry['scans']:,}", f"{entry['detections']:,}"]
+        start = (name, f"{entry['scans']:,}", f"{entry['detections']:,}")
         if entry["first_detection"] is None:
-            table.add_row(*(_cell(text) for text in [*counts, "never"]))
+            rows.append((*start, "never", "", "", ""))
             continue
         for which in ("first", "last"):
             seen = entry[f"{which}_detection"]
-            row = [
-                *counts,
-                which,
-                time_text(seen["time_s"]),
-                distance_text(seen["range_m"]),
-                seen["target"],
-            ]
-            table.add_row(*(_cell(text) for text in row))
-            counts = ["", "", ""]
-    return table
+            place = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
+            rows.append((*start, which, *place))
+            start = ("", "", "")
+    return rows
 
 
-def _fused(fused: dict[str, int]) -> Any:
-    table = _table("Fused (per target and instant)")
-    table.add_column("sensors")
-    table.add_column("count", justify="right", no_wrap=True)
-    for name, count in sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0])):
-        table.add_row(_cell(name), _cell(f"{count:,}"))
-    return table
+def _by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
+    """Return combinations with the fewest sensors first."""
+    return sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0]))
 
 
-def _targets(targets: dict[str, Any]) -> list[Any]:
-    table = _table("Closest approach")
-    table.add_column("target")
-    table.add_column(_cell("time [s]"), justify="right", no_wrap=True)
-    table.add_column("range", justify="right", no_wrap=True)
+def _show_closest(console: Any, targets: dict[str, Any]) -> None:
     met = [
         (entry["closest_approach"], name)
         for name, entry in targets.items()
         if entry.get("closest_approach") is not None
     ]
     met.sort(key=lambda item: item[0]["range_m"])
-    for approach, name in met[:MOST_TARGETS]:
-        table.add_row(
-            _cell(name),
-            _cell(time_text(approach["time_s"])),
-            _cell(distance_text(approach["range_m"])),
-        )
-    lines: list[Any] = [table] if met else []
+    rows = [
+        (name, f"{approach['time_s']:.3f}", distance_text(approach["range_m"]))
+        for approach, name in met[:MOST_TARGETS]
+    ]
     notes = []
     if len(met) > MOST_TARGETS:
-        notes.append(f"{len(met) - MOST_TARGETS:,} farther targets are not listed")
+        notes.append(f"{len(met) - MOST_TARGETS:,} more pass farther away")
     if len(met) < len(targets):
-        notes.append(f"{len(targets) - len(met):,} targets were never there with the ownship")
+        notes.append(f"{len(targets) - len(met):,} are never there together with the ownship")
+    title = "Closest approach to each target"
     if notes:
-        from rich.text import Text
+        title += f" ({'; '.join(notes)})"
+    _print_table(console, title, ("target", "time [s]>", "true range>"), rows)
 
-        lines.append(Text("; ".join(notes) + "\n"))
-    return lines
+
+def _print_table(
+    console: Any, title: str, columns: Iterable[str], rows: Iterable[tuple[str, ...]]
+) -> None:
+    """Print a table; columns whose name ends in ``>`` hold numbers, flush right."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text  # names are printed as they are, never read as markup
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1))
+    for name in columns:
+        number = name.endswith(">")
+        table.add_column(
+            Text(name.removesuffix(">")),
+            justify="right" if number else "left",
+            no_wrap=number,
+            overflow="fold",
+        )
+    for row in rows:
+        table.add_row(*(Text(text) for text in row))
+    console.print(Text(title, style="bold"))
+    console.print(table)
+    console.print()
+
+
+def _print_line(console: Any, text: str) -> None:
+    # Never wrapped: a path is there to be copied.
+    console.print(text, markup=False, highlight=False, soft_wrap=True)

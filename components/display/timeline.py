@@ -1,0 +1,248 @@
+"""``timeline.png``: the sensors' scans on their own clocks, and what was detected when."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from components.display.figures import DPI, drawing, plain, style_of
+from components.display.flights import Flights
+from components.display.marks import Detected, read_fused, read_scans
+from components.display.plan import mark_of
+from components.display.thinning import by_target, evenly, staggered
+from dsa_des.types import AnyArray, FloatArray
+
+if TYPE_CHECKING:
+    from dsa_des.simulation import Simulation
+
+Scans = dict[str, tuple[FloatArray, AnyArray]]
+
+MOST_SCANS_SHOWN = 90
+"""Scans of the fastest sensor in the close-up."""
+_SIZE_IN = (9.6, 7.0)
+_LEFT, _WIDTH = 0.105, 0.87
+_SPACING_PX = 11.0
+
+
+@dataclass
+class CloseUp:
+    """The part of a run in which single scans are shown.
+
+    Parameters
+    ----------
+    start_s, end_s : float
+    what : str
+        Why this part.
+    joined : list of (time_s, sensors)
+        Instants in it at which two or more sensors were fused.
+    """
+
+    start_s: float
+    end_s: float
+    what: str
+    joined: list[tuple[float, list[str]]]
+
+
+def draw_timeline(
+    path: Path,
+    simulation: "Simulation",
+    flights: Flights | None,
+    detected: Detected,
+    folder: Path,
+) -> Path:
+    """Draw a close-up of single scans, and range over time for the whole run.
+
+    Parameters
+    ----------
+    path : Path
+        The PNG to write.
+    simulation : Simulation
+    flights : Flights or None
+        For the targets' true ranges.
+    detected : Detected
+    folder : Path
+        Holds the run's Parquet tables.
+    """
+    duration_s = float(simulation.duration_s)
+    scans = read_scans(folder)
+    close_up = find_close_up(scans, folder, duration_s)
+    rows = max(1, len(detected.sensors))
+    share = min(0.42, 0.14 + 0.07 * rows)
+    with drawing(*_SIZE_IN, path) as figure:
+        above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
+        _draw_scans(above, scans, detected.sensors, close_up)
+        above.set_title(plain(f"{simulation.scene.title}: {close_up.what}"), loc="left")
+        below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
+        _draw_ranges(below, flights, detected, duration_s)
+        below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
+        below.set_title("Whole run: true slant range when detected (shaded: above)", loc="left")
+    return path
+
+
+def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
+    """Return a part of the run that shows how the sensors' clocks meet.
+
+    It lies around the first instant at which two sensors were fused, else the first detection,
+    else at the start. It is four periods of the slowest sensor long, but has at most
+    `MOST_SCANS_SHOWN` scans of the fastest.
+    """
+    periods = [
+        (float(time_s[-1]) - float(time_s[0])) / (len(time_s) - 1)
+        for time_s, _ in scans.values()
+        if len(time_s) > 1
+    ]
+    length_s = duration_s
+    if periods:
+        length_s = min(4.2 * max(periods), MOST_SCANS_SHOWN * min(periods), duration_s)
+    anchor_s, what = 0.0, "scans at the start"
+    first = [float(time_s[np.argmax(n > 0)]) for time_s, n in scans.values() if (n > 0).any()]
+    if first:
+        anchor_s, what = min(first), "scans around the first detection"
+    together = _first_joined(folder)
+    if together is not None:
+        anchor_s, what = together, "scans around the first fusion of two sensors"
+    start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
+    end_s = start_s + length_s
+    return CloseUp(start_s, end_s, what, _joined(folder, start_s, end_s))
+
+
+def _first_joined(folder: Path) -> float | None:
+    for time_s, code, names in read_fused(folder):
+        several = np.array(["+" in name for name in names])[code]
+        if several.any():
+            return float(time_s[np.argmax(several)])
+    return None
+
+
+def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
+    found: set[tuple[float, str]] = set()
+    for time_s, code, names in read_fused(folder):
+        low, high = np.searchsorted(time_s, [start_s, end_s])
+        for row in range(int(low), int(high)):
+            if "+" in names[code[row]]:
+                found.add((float(time_s[row]), names[code[row]]))
+        if len(time_s) and time_s[-1] > end_s:
+            break
+    return [(time_s, name.split("+")) for time_s, name in sorted(found)]
+
+
+def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    # The first sensor on top, as in the legend of the plan.
+    height = {name: len(sensors) - 1 - i for i, name in enumerate(sensors)}
+    names = []
+    hits: dict[str, FloatArray] = {}
+    for name in sensors:
+        time_s, count = scans.get(name, (np.empty(0), np.empty(0)))
+        style = style_of(sensors, name)
+        hits[name] = time_s[count > 0]
+        rate = (len(time_s) - 1) / (time_s[-1] - time_s[0]) if len(time_s) > 1 else 0.0
+        names.append(f"{name}\n{rate:.4g} Hz" if rate else name)
+        seen = (time_s >= close_up.start_s) & (time_s <= close_up.end_s)
+        shown = time_s[seen]
+        axes.plot(
+            shown, np.full(len(shown), height[name]), linestyle="none", marker="|", markersize=20,
+            markeredgewidth=1.0, color=style[0], clip_on=False,
+        )  # fmt: skip
+        shown = time_s[seen & (count > 0)]
+        mark = mark_of(style) | {"markersize": 7.0, "markerfacecolor": style[0]}
+        axes.plot(shown, np.full(len(shown), height[name]), **mark, zorder=3.0, clip_on=False)
+    segments, dots = [], []
+    for time_s, together in close_up.joined:
+        points = []
+        for name in sorted((n for n in together if n in height), key=lambda n: height[n]):
+            # Fused within a gate: the scan meant is the latest one with a detection.
+            at = int(np.searchsorted(hits[name], time_s, side="right")) - 1
+            points.append((float(hits[name][at]) if at >= 0 else time_s, float(height[name])))
+        segments += list(zip(points[:-1], points[1:], strict=True))
+        dots += points
+    if segments:
+        axes.add_collection(LineCollection(segments, colors="#000000", linewidths=1.6, zorder=4.0))
+        where = np.array(sorted(set(dots)))
+        axes.plot(
+            where[:, 0], where[:, 1], linestyle="none", marker="o", markersize=11,
+            markeredgecolor="#000000", markerfacecolor="none", markeredgewidth=1.4, zorder=4.1,
+        )  # fmt: skip
+    axes.set_yticks([height[name] for name in sensors], [plain(name) for name in names])
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_ylim(-0.6, max(1, len(sensors)) - 0.4)
+    _time_axis(axes, close_up.start_s, close_up.end_s)
+    handles = [
+        Line2D([], [], linestyle="none", marker="|", markersize=10, color="#555555", label="scan"),
+        Line2D([], [], linestyle="none", marker="s", markersize=6, color="#555555",
+               label="scan with a detection"),
+        Line2D([], [], color="#000000", marker="o", markersize=9, markerfacecolor="none",
+               label="fused"),
+    ]  # fmt: skip
+    axes.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
+        borderaxespad=0.1,
+    )  # fmt: skip
+
+
+def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duration_s: float) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    top_km = max(
+        (float(np.nanmax(r)) / 1000 for r in detected.range_m.values() if np.isfinite(r).any()),
+        default=0.0,
+    )
+    handles = []
+    if flights is not None:
+        lines = [np.column_stack((t.time_s, t.range_m / 1000)) for t in flights.targets]
+        farthest = max((float(np.nanmax(line[:, 1], initial=0.0)) for line in lines), default=0.0)
+        # A target that stays far beyond anything detected would flatten all the rest.
+        top_km = min(farthest, 1.6 * top_km) if top_km else farthest
+        many = len(lines) > 20
+        axes.add_collection(
+            LineCollection(lines, colors="#999999", linewidths=0.5 if many else 1.0, zorder=1.0),
+            autolim=False,
+        )
+        handles.append(Line2D([], [], color="#999999", linewidth=1.0, label="target"))
+    top_km = max(1.05 * top_km, 0.1)
+    width_px = _SIZE_IN[0] * _WIDTH * DPI
+    for name in detected.sensors:
+        style = style_of(detected.sensors, name)
+        _draw_detections(axes, style, detected, name, width_px / duration_s)
+        handles.append(Line2D([], [], **mark_of(style), label=plain(name)))
+    axes.set_ylim(0.0, top_km)
+    axes.set_ylabel("true slant range [km]")
+    axes.grid(color="#DDDDDD", linewidth=0.5)
+    axes.set_axisbelow(True)
+    _time_axis(axes, 0.0, duration_s)
+    axes.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles),
+        frameon=False, borderaxespad=0.1, columnspacing=1.2, handletextpad=0.3,
+    )  # fmt: skip
+
+
+def _draw_detections(
+    axes: Any,
+    style: tuple[str, str, float],
+    detected: Detected,
+    name: str,
+    px_per_s: float,
+) -> None:
+    turn, turns = detected.sensors.index(name), len(detected.sensors)
+    time_s, range_km = detected.time_s[name], detected.range_m[name] / 1000
+    kept = [
+        rows[staggered(time_s[rows] * px_per_s, _SPACING_PX * turns, turn, turns)]
+        for _, rows in by_target(detected.target[name])
+    ]
+    if kept:
+        rows = np.concatenate(kept)
+        rows = rows[evenly(len(rows), 5000)]
+        axes.plot(
+            time_s[rows], range_km[rows], **mark_of(style), zorder=2.0 + 1.0 / style[2],
+        )  # fmt: skip
+
+
+def _time_axis(axes: Any, start_s: float, end_s: float) -> None:
+    axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
+    axes.set_xlabel("time [s]")
+    axes.ticklabel_format(axis="x", useOffset=False, style="plain")
