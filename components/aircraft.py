@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from operator import attrgetter
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from components.table_files import RcsTableFile, SilhouetteTableFile
 from dsa_des.component import Parameters
 from dsa_des.randomness import target_keys
-from dsa_des.types import AnyArray, FloatArray
+from dsa_des.types import AnyArray, FloatArray, IntArray
 
 
 class VisibleAreas(Parameters):
@@ -19,6 +21,11 @@ class VisibleAreas(Parameters):
     front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
     side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
     horizontal_m2: float = Field(ge=0, description="Area of the horizontal plane, m².")
+    silhouette_table: SilhouetteTableFile | None = Field(
+        default=None,
+        description="CSV with az_deg, el_deg and area_m2 of the observer's direction from the "
+        "aircraft, for cameras with silhouette 'aspect_table'.",
+    )
 
 
 class InfraredAreas(VisibleAreas):
@@ -36,6 +43,11 @@ class Aircraft(Parameters):
     """What sensors need to know of one aircraft; files in ``configs/aircraft`` hold these keys."""
 
     rcs_dbsm: float = Field(default=3.01, description="Mean radar cross-section, dBsm (Table 4.1).")
+    rcs_table: RcsTableFile | None = Field(
+        default=None,
+        description="CSV with az_deg, el_deg and dbsm of the radar's direction from the aircraft; "
+        "used in place of rcs_dbsm.",
+    )
     swerling: Literal[0, 1, 2, 3, 4, 5] = Field(
         default=1, description="Fluctuation model of the radar cross-section; 0 and 5 are steady."
     )
@@ -43,6 +55,9 @@ class Aircraft(Parameters):
     ir: InfraredAreas = Field(default=_IR, description="Areas seen by IR cameras.")
     contrast: float = Field(default=1.0, ge=0, description="Contrast gain P for EO (eq. 18).")
     contrast_ir: float = Field(default=1.0, ge=0, description="Contrast gain P for IR (eq. 18).")
+    paint_reflectance: float = Field(
+        default=0.5, ge=0, le=1, description="Diffuse reflectance, for EO with a background."
+    )
     engine: Literal["propeller", "turbofan", "turbojet"] = Field(
         default="propeller", description="Propulsion type (Table 4.5)."
     )
@@ -80,6 +95,11 @@ class Roster:
         return np.array([10.0 ** (craft.rcs_dbsm / 10.0) for craft in self.aircraft])
 
     @cached_property
+    def engines(self) -> AnyArray:
+        """Propulsion type of each target, shape (targets,) of text."""
+        return np.array([craft.engine for craft in self.aircraft], dtype=np.str_)
+
+    @cached_property
     def swerling(self) -> AnyArray:
         """Swerling model of each target, 5 written as 0, shape (targets,)."""
         return np.array([craft.swerling % 5 for craft in self.aircraft], dtype=np.int64)
@@ -88,11 +108,37 @@ class Roster:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
         columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})
         if path not in columns:
-            values = []
-            for craft in self.aircraft:
-                value: object = craft
-                for name in path.split("."):
-                    value = getattr(value, name)
-                values.append(value)
-            columns[path] = np.array(values, dtype=np.float64)
+            read = attrgetter(path)
+            columns[path] = np.array([read(craft) for craft in self.aircraft], dtype=np.float64)
         return columns[path]
+
+    def tables(self, path: str) -> tuple[tuple[Any, ...], IntArray]:
+        """Return the tables that targets name, and which one each target has.
+
+        Parameters
+        ----------
+        path : str
+            ``"rcs_table"``, ``"eo.silhouette_table"`` or ``"ir.silhouette_table"``.
+
+        Returns
+        -------
+        tables : tuple
+            Each once, in the order of the targets.
+        place : (targets,) of int
+            Index into `tables`; -1 for a target without one.
+        """
+        cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
+        if path not in cache:
+            tables: list[Any] = []
+            place = np.full(len(self), -1, dtype=np.int64)
+            for target, craft in enumerate(self.aircraft):
+                file = attrgetter(path)(craft)
+                if file is None:
+                    continue
+                same = [i for i, table in enumerate(tables) if table is file.table]
+                place[target] = same[0] if same else len(tables)
+                if not same:
+                    tables.append(file.table)
+            cache[path] = tuple(tables), place
+        found: tuple[tuple[Any, ...], IntArray] = cache[path]
+        return found

@@ -7,8 +7,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dsa_des.message import Text
-from dsa_des.recording import Columns, Schema
+from dsa_des.message import Columns, Schema, Text
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.
 ROW_GROUP = 65536

@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dsa_des.events import Bell, WakeUp
 from dsa_des.wake import Wake
 
 if TYPE_CHECKING:
-    from dsa_des.process import Bell, Node, WakeUp
+    from dsa_des.process import Node
 
 
 class BlockEnvironment:
@@ -35,16 +36,18 @@ class BlockEnvironment:
         """The SimPy environment itself, for resources and stores."""
         return self._node.simulation.env
 
-    def timeout(self, ticks: int) -> "WakeUp":
+    def timeout(self, ticks: int) -> WakeUp:
         """Return an event `ticks` from now."""
-        from dsa_des.process import WakeUp
-
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}: it must be 0 or greater")
         return WakeUp(self._node.simulation.env, int(ticks), self._node.priority())
 
-    def arrival(self) -> "Bell":
-        """Return the event of the next arrival at a trigger input."""
+    def arrival(self) -> Bell | WakeUp:
+        """Return the event of the next arrival at a trigger input.
+
+        It happens at once when something arrived since the last `receive`, while the block was
+        busy with a timeout.
+        """
         return self._node.wait()
 
     def receive(self) -> Wake:

@@ -114,15 +114,15 @@ class ScanClock:
         self._jitter_limit = 0.45 * float(period)
 
     def _grid(self, scans: IntArray) -> IntArray:
-        ticks = self.offset + scans * self._whole
+        ticks: IntArray = self.offset + scans * self._whole
         if self._rest == 0:
             return ticks
         largest = int(np.abs(scans).max(initial=0))
         if 2 * largest * self._rest + self._denominator < MAX_TICK:
             extra = (2 * scans * self._rest + self._denominator) // (2 * self._denominator)
         else:  # exact in Python integers; only rates given to many digits come here
-            r, d = self._rest, self._denominator
-            extra = np.array([(2 * int(k) * r + d) // (2 * d) for k in scans], dtype=np.int64)
+            exact = [self._grid_tick(k) for k in scans.ravel().tolist()]
+            return np.array(exact, dtype=np.int64).reshape(scans.shape)
         return ticks + extra
 
     def ticks(self, scans: IntArray) -> IntArray:
@@ -138,9 +138,14 @@ class ScanClock:
     def first_scan_at_or_after(self, tick: int) -> int:
         """Return the number of the first scan (not below 0) whose grid instant is >= tick."""
         guess = max(0, math.ceil((tick - self.offset) / self.period) - 1)
-        while int(self._grid(np.array([guess], dtype=np.int64))[0]) < tick:
+        while self._grid_tick(guess) < tick:
             guess += 1
         return guess
+
+    def _grid_tick(self, scan: int) -> int:
+        """Return one grid instant in Python integers, which cannot overflow."""
+        r, d = self._rest, self._denominator
+        return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""

@@ -5,7 +5,7 @@ of their names. (A topological sort would do as well, but which of the many it g
 the order in the file.)
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 import networkx as nx
 
@@ -41,23 +41,25 @@ def check_graph(
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],
     problems: list[Problem],
+    unsure: Set[str] = frozenset(),
 ) -> None:
     """Add everything that is wrong with the wiring to `problems`.
 
     Required inputs without a wire, blocks that no source reaches, cycles without a delay (each
     hop listed), and feedback wires that do not say what they hold before the first message.
+    Blocks in `unsure`, which a faulty wire meant to feed, are not blamed for missing it.
     """
     known = {name for name, cls in classes.items() if cls is not None}
     fed = {(wire.target, wire.input) for _, _, wires in graph.edges(data="wires") for wire in wires}
     for name in sorted(known):
         for port, declared in sorted(classes[name].inputs.items()):
-            if declared.required and (name, port) not in fed:
+            if declared.required and (name, port) not in fed and name not in unsure:
                 message = (
                     f"input {port!r} ({declared.message.__name__}) is required and has no wire"
                 )
                 problems.append(scene.problem(("blocks", name), message))
     _check_cycles(scene, graph, problems)
-    if known == set(classes):
+    if known == set(classes) and not unsure:
         _check_reach(scene, graph, classes, problems)
 
 
@@ -67,7 +69,11 @@ def _check_cycles(scene: SceneFile, graph: nx.DiGraph, problems: list[Problem]) 
         first = min(group)
         if len(group) == 1 and not now.has_edge(first, first):
             continue
-        hops = [str(graph.edges[a, b]["wires"][0]) for a, b in nx.find_cycle(now, first)]
+        cycle = nx.find_cycle(now.subgraph(group), first)
+        hops = [
+            next(str(wire) for wire in graph.edges[a, b]["wires"] if not wire.delayed)
+            for a, b in cycle
+        ]
         message = (
             f"a cycle without delay: {'; '.join(hops)}. Give one of these wires a delay "
             '(delay_s, or delay = "1 scan")'

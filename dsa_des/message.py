@@ -70,6 +70,12 @@ class Text:
         return len(self.codes)
 
 
+#: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
+#: In float64, NaN means null.
+Columns = dict[str, AnyArray | Text]
+Schema = dict[str, str]
+
+
 @dataclass(eq=False)
 class Message:
     """A batch of rows; subclasses add fields.
@@ -121,7 +127,9 @@ class Message:
         if len(parts) == 1:
             return parts[0]
         row_names, entry_names = _layout(type(parts[0]))
-        result = copy(parts[0])
+        # Static fields come from the last part: what a wire held before its first message may
+        # know less than a real one.
+        result = copy(parts[-1])
         for name in row_names:
             setattr(result, name, _join([getattr(part, name) for part in parts]))
         if entry_names or hasattr(result, "offsets"):

@@ -71,8 +71,8 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
         return [parsed], []
     name, type_name = parsed
     blocks = scene.data.get("blocks", {})
-    if name not in blocks or not isinstance(blocks[name], dict):
-        hint = did_you_mean(name, blocks)
+    if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
+        hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
         return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
     try:
         cls = find(type_name)

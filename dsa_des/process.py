@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import simpy
 
+from dsa_des.block_environment import BlockEnvironment
 from dsa_des.channel import Channel
 from dsa_des.clock import ScanClock
 from dsa_des.component import Component
+from dsa_des.events import Bell, WakeUp
 from dsa_des.message import Message
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
@@ -32,28 +34,6 @@ class Abort(Exception):
     SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
     original never travels through it.
     """
-
-
-class WakeUp(simpy.Event):
-    """An event that happens after `delay` ticks with a priority of its own."""
-
-    def __init__(self, env: simpy.Environment, delay: int, priority: Any) -> None:
-        super().__init__(env)
-        self._ok = True
-        self._value = None
-        env.schedule(self, priority, delay)
-
-
-class Bell(simpy.Event):
-    """What a block's process waits for; rung from inside a `WakeUp`, so it keeps its priority."""
-
-    def ring(self) -> None:
-        """Resume whoever waits, now, within the current event."""
-        callbacks, self.callbacks = self.callbacks, None  # type: ignore[assignment]
-        self._ok = True
-        self._value = None
-        for callback in callbacks:
-            callback(self)
 
 
 @dataclass
@@ -93,6 +73,7 @@ class Node:
         self.name = self.component.name
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
+        self._missed = False
         self._bell = Bell(self.simulation.env)
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
@@ -119,14 +100,15 @@ class Node:
                 self._run_at(int(self.simulation.env.now))
 
     def _own_process(self, own: Any) -> Generator[simpy.Event, None, None]:
-        from dsa_des.block_environment import BlockEnvironment
-
         try:
-            yield from own(BlockEnvironment(self))
+            env = BlockEnvironment(self)
+            yield env.timeout(0)  # start at its own place in the first instant
+            yield from own(env)
         except Abort:
             raise
         except Exception as error:
-            self.simulation.fail(self, int(self.simulation.env.now), error)
+            ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
+            self.simulation.fail(self, ticks, error)
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -141,9 +123,17 @@ class Node:
         self._scheduled.discard(int(self.simulation.env.now))
         if self._bell.callbacks:
             self._bell.ring()
+        else:
+            self._missed = True
 
-    def wait(self) -> Bell:
-        """Return the event of the next trigger arrival, for a block with its own process."""
+    def wait(self) -> Bell | WakeUp:
+        """Return the event of the next trigger arrival, for a block with its own process.
+
+        What arrived while the process was busy, and was not received yet, counts as arriving now.
+        """
+        if self._missed:
+            self._missed = False
+            return WakeUp(self.simulation.env, 0, self.priority())
         if self._bell.callbacks is None:
             self._bell = Bell(self.simulation.env)
         return self._bell
@@ -233,7 +223,7 @@ class Node:
         except Abort:
             raise
         except Exception as error:
-            self.simulation.fail(self, int(ticks[0]), error, int(scans[0]))
+            self.simulation.fail(self, ticks, error, int(scans[0]))
 
     def _collect(self, port: str, end: int) -> list[Arrivals]:
         found = []
@@ -256,6 +246,7 @@ class Node:
 
     def receive(self) -> Wake:
         """Return the inputs as they are now, for a block with its own process."""
+        self._missed = False
         tick = int(self.simulation.env.now)
         ticks = np.array([tick], dtype=np.int64)
         held = {}

@@ -10,12 +10,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from dsa_des.message import Message, Text
+from dsa_des.message import Columns, Message, Schema, Text
 from dsa_des.types import AnyArray, IntArray
-
-Columns = dict[str, AnyArray | Text]
-#: Column name → kind, one of "int64", "float64", "bool", "text". In float64, NaN means null.
-Schema = dict[str, str]
 
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
 

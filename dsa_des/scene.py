@@ -9,12 +9,13 @@ from typing import Any
 import networkx as nx
 from pydantic import ValidationError
 
-from dsa_des.clock import MAX_TICK, parse_rational, resolution
+from dsa_des.clock import parse_rational
 from dsa_des.component import Component, Parameters
 from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
 from dsa_des.graph import build_graph, check_graph
 from dsa_des.overrides import apply_set, apply_swap
 from dsa_des.registry import UnknownType, find
+from dsa_des.scene_checks import check_activity, check_times
 from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, read_scene_file
 from dsa_des.wiring import Wire, read_wires
 
@@ -148,10 +149,13 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     seed = _seed(scene_file, problems)
     duration = _duration(scene_file, problems)
     classes, blocks = _blocks(scene_file, problems)
-    wires = read_wires(scene_file, classes, problems)
+    unsure: set[str] = set()
+    wires = read_wires(scene_file, classes, problems, unsure)
     graph = build_graph(list(classes), wires)
-    check_graph(scene_file, graph, classes, problems)
-    ticks_per_s = _resolution(scene_file, blocks, wires, duration, problems)
+    check_graph(scene_file, graph, classes, problems, unsure)
+    ticks_per_s = check_times(scene_file, blocks, wires, duration, problems)
+    if not unsure:
+        check_activity(scene_file, blocks, wires, problems)
     if problems:
         raise SceneError(problems)
     return Scene(
@@ -308,30 +312,6 @@ def _nested_model(annotation: Any) -> Any:
         if nested is not None:
             return nested
     return None
-
-
-def _resolution(
-    scene_file: SceneFile,
-    blocks: Mapping[str, Block],
-    wires: Iterable[Wire],
-    duration: Fraction | None,
-    problems: list[Problem],
-) -> int:
-    times: list[Fraction] = [wire.delay_s for wire in wires]
-    clocks: list[str] = []
-    for name, block in blocks.items():
-        spec = block.cls.clock_of(block.parameters)
-        if spec is not None:
-            times += spec.exact_times()
-            clocks.append(f"{name} {_plain(spec.rate_hz)} Hz + {_plain(spec.offset_s)} s")
-    ticks_per_s = resolution(times)
-    if ticks_per_s * (1 + (duration or Fraction(86400))) >= MAX_TICK:
-        message = (
-            "these clocks have no common tick that fits 64 bits for the whole run: "
-            f"{', '.join(clocks)}; give offsets to fewer digits or rates as simpler fractions"
-        )
-        problems.append(scene_file.problem(("blocks",), message))
-    return ticks_per_s
 
 
 def _plain(value: Fraction) -> int | float | str:

@@ -115,7 +115,7 @@ class _Reader:
     ) -> dict[str, Any]:
         merged: dict[str, Any] = {}
         bases = table.get("extends", [])
-        for base in [bases] if isinstance(bases, str) else bases:
+        for base in bases if isinstance(bases, list) else [bases]:
             if not isinstance(base, str):
                 self.problems.append(
                     Problem(str(path), dotted((*at, "extends")), "must be a file name", base)

@@ -7,12 +7,13 @@ nothing that is recorded.
 
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import count
+from itertools import count, pairwise
 from typing import Any
 
+import numpy as np
 import simpy
 
 from dsa_des.channel import Channel
@@ -20,10 +21,12 @@ from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order, windowed_blocks
+from dsa_des.pinpoint import pinpoint
 from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Demand, Node
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.scene import Scene
+from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 32768
@@ -66,6 +69,8 @@ class Simulation:
     recorder : Recorder, optional
     trace : list, optional
         Receives ``(tick, block)`` for every instant a block runs at, in order of execution.
+    cuts : iterable of int
+        Ticks at which look-ahead windows are cut in two; results do not depend on them.
 
     Raises
     ------
@@ -81,6 +86,7 @@ class Simulation:
         shuffle_ties: int | None = None,
         recorder: Recorder | None = None,
         trace: list[tuple[int, str]] | None = None,
+        cuts: Iterable[int] = (),
     ) -> None:
         if window is not None and window < 1:
             raise ValueError(f"window is {window}: it must be 1 or more scans")
@@ -91,6 +97,10 @@ class Simulation:
         self.env = simpy.Environment(initial_time=0)
         self.window = (0, 0)
         self._failure: tuple[BlockFailure, BaseException] | None = None
+        #: The instants of the call in which a block failed.
+        self.failed_at = np.empty(0, dtype=np.int64)
+        self._window = window
+        self._cuts = sorted(cuts)
         self._depth = depths(scene.graph)
         self.components = self._build_components()
         self.duration_s = self._duration()
@@ -111,6 +121,8 @@ class Simulation:
                 components[name] = block.cls(name, block.parameters, context)
             except (ValueError, OSError) as error:
                 problems.append(self._problem(f"blocks.{name}", error))
+            except Exception as error:
+                raise _failure(name, block.cls, 0.0, error) from error
         if problems:
             raise SceneError(problems)
         return components
@@ -147,6 +159,8 @@ class Simulation:
                 component.setup()
             except (ValueError, OSError) as error:
                 problems.append(self._problem(f"blocks.{name}", error))
+            except Exception as error:
+                raise _failure(name, type(component), 0.0, error) from error
         if problems:
             raise SceneError(problems)
 
@@ -201,7 +215,8 @@ class Simulation:
         if clock is None:
             message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
             raise SceneError([self._problem("wires", message)])
-        return wire.delay_scans * round(clock.period)
+        # Rounded down: a message must not arrive a tick after the scan it was sent for.
+        return wire.delay_scans * int(clock.period)
 
     def _find_demands(self, name: str) -> list[Demand]:
         found: dict[tuple[str, int], Demand] = {}
@@ -258,11 +273,7 @@ class Simulation:
             self.recorder.open([output.message for output in outputs], self.ticks_per_s)
         for node in self.nodes.values():
             node.start()
-        for number in count():
-            start = number * self._window_ticks
-            if start >= end:
-                break
-            self.window = (start, min(start + self._window_ticks, end))
+        for self.window in self._windows(end):
             self._run_window(*self.window)
             if self.recorder is not None:
                 self.recorder.advance(self.window[1])
@@ -277,6 +288,15 @@ class Simulation:
             sorted(name for name, node in self.nodes.items() if node.windowed),
         )
 
+    def _windows(self, end: int) -> Iterator[tuple[int, int]]:
+        for number in count():
+            start = number * self._window_ticks
+            if start >= end:
+                return
+            stop = min(start + self._window_ticks, end)
+            inner = [cut for cut in self._cuts if start < cut < stop]
+            yield from pairwise([start, *inner, stop])
+
     def _run_window(self, start: int, end: int) -> None:
         for node in self.nodes.values():
             node.open_window(start, end)
@@ -286,6 +306,10 @@ class Simulation:
             if self._failure is None:
                 raise
             failure, cause = self._failure
+            if len(self.failed_at) > 1 and not self._cuts:
+                exact = pinpoint(self.scene, self._window, self.failed_at)
+                if exact is not None:
+                    raise exact from exact.__cause__
             raise failure from cause
 
     def _reports(self) -> dict[str, Any]:
@@ -295,19 +319,20 @@ class Simulation:
                 sections.setdefault(section, {}).update(content)
         return sections
 
-    def fail(self, node: Node, tick: int, error: BaseException, scan: int = -1) -> None:
-        """Note that a block raised, and leave SimPy."""
-        component = node.component
-        reason = f"{type(error).__name__}: {error}"
-        failure = BlockFailure(
-            component.name,
-            type(component).path(),
-            tick / self.ticks_per_s,
-            scan if scan >= 0 else None,
-            reason,
-        )
+    def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
+        """Note that a block raised when it handled `ticks`, and leave SimPy."""
+        self.failed_at = ticks
+        time_s = int(ticks[0]) / self.ticks_per_s
+        failure = _failure(node.name, type(node.component), time_s, error, scan)
         self._failure = (failure, error)
         raise Abort
+
+
+def _failure(
+    name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
+) -> BlockFailure:
+    reason = f"{type(error).__name__}: {error}"
+    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, reason)
 
 
 def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Callable[[], float]:

@@ -26,14 +26,18 @@ def _table(table: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) ->
 
 
 def _key(key: str) -> str:
-    return key if key and set(key) <= _BARE else json.dumps(key)
+    return key if key and set(key) <= _BARE else _text(key)
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+        return _text(str(value))
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Mapping):

@@ -18,7 +18,7 @@ from typing import Any
 
 from dsa_des.clock import parse_rational
 from dsa_des.component import Component
-from dsa_des.errors import Problem, did_you_mean
+from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene_file import Key, SceneFile
 
 _END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
@@ -60,7 +60,10 @@ class Wire:
 
 
 def read_wires(
-    scene: SceneFile, classes: Mapping[str, type[Component]], problems: list[Problem]
+    scene: SceneFile,
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+    unsure: set[str] | None = None,
 ) -> list[Wire]:
     """Return the wires of a scene, sorted; what is wrong is added to `problems`.
 
@@ -71,6 +74,8 @@ def read_wires(
         The class of each block; blocks whose type is unknown map to None and their wires are
         not judged.
     problems : list of Problem
+    unsure : set of str, optional
+        Receives the blocks that a faulty wire meant to feed.
     """
     entries = scene.data.get("wires", [])
     if not isinstance(entries, list):
@@ -80,12 +85,25 @@ def read_wires(
     for position, entry in enumerate(entries):
         key: Key = ("wires", position)
         try:
-            for source, target, options in _hops(entry):
-                wire = _connect(source, target, options, classes)
-                if wire is not None:
-                    wires.append(wire)
+            hops = _hops(entry)
         except _WireError as error:
             problems.append(scene.problem(key, str(error), *error.value))
+            if unsure is not None:
+                unsure.update(classes)  # whom it meant to feed cannot be told
+            continue
+        for source, target, options in hops:
+            try:
+                wire = _connect(source, target, options, classes)
+            except _WireError as error:
+                problem = scene.problem(key, str(error), *error.value)
+                if problem not in problems:
+                    problems.append(problem)
+                wire = None
+            if wire is not None:
+                wires.append(wire)
+            elif unsure is not None:
+                name = target.partition(".")[0]
+                unsure.add(name if name in classes else nearest(name, classes) or name)
     _two_writers(scene, wires, classes, problems)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 

@@ -1,5 +1,6 @@
 """Drawing a run's figures without a window system, the same bytes on every drawing."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,6 +57,19 @@ def style_of(sensors: Sequence[str], name: str) -> tuple[str, str, float]:
     return STYLES[sensors.index(name) % len(STYLES)]
 
 
+def mark_of(style: tuple[str, str, float]) -> dict[str, Any]:
+    """Return how a sensor's detections are marked: big ones open, small ones filled."""
+    colour, marker, size = style
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": size,
+        "markeredgecolor": colour,
+        "markerfacecolor": "none" if size > 7 else colour,
+        "markeredgewidth": 1.2 if size > 7 else 0.4,
+    }
+
+
 @contextmanager
 def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
     """Give an empty figure and write it as PNG when the block is done.
@@ -82,8 +96,6 @@ def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
         figure = Figure(figsize=(width_in, height_in), dpi=DPI)
         canvas = FigureCanvasAgg(figure)
         yield figure
-        import warnings
-
         with warnings.catch_warnings():
             # Names may hold letters that the font lacks; they are drawn as boxes.
             warnings.filterwarnings("ignore", message="Glyph .* missing from")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
-from components.messages import TrafficStates
+from components.traffic.source import TrafficSource
 from dsa_des.types import FloatArray
 
 if TYPE_CHECKING:
@@ -49,14 +49,15 @@ class Flights:
 
     Parameters
     ----------
-    source : traffic block
-        Its attributes `own` and `targets` are flights with ``at(time_s)``.
+    source : TrafficSource
     duration_s : float
     closest_s : dict
         Target → time of closest approach, which becomes a point of its track.
     """
 
-    def __init__(self, source: Any, duration_s: float, closest_s: dict[str, float]) -> None:
+    def __init__(
+        self, source: TrafficSource, duration_s: float, closest_s: dict[str, float]
+    ) -> None:
         self._source = source
         self._targets = {target.name: target for target in source.targets}
         self._closest_s = closest_s
@@ -65,9 +66,9 @@ class Flights:
         times = _times(source.own, duration_s, count)
         own = source.own.at(times)
         start = int(np.argmax(own.present))
-        self._reference = tuple(
-            float(values[start]) for values in (own.lat_deg, own.lon_deg, own.alt_m)
-        )
+        self._lat_deg = float(own.lat_deg[start])
+        self._lon_deg = float(own.lon_deg[start])
+        self._alt_m = float(own.alt_m[start])
         self.start_s = float(times[start])
         #: Where the ownship's nose points at its start, clockwise from north.
         self.start_yaw_rad = float(own.yaw_rad[start])
@@ -77,15 +78,14 @@ class Flights:
 
     @classmethod
     def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
-        """Return the flights of a run, or None if its traffic does not give them away."""
+        """Return the flights of a run, or None if it has no `TrafficSource`."""
         closest_s = {
             name: entry["closest_approach"]["time_s"]
             for name, entry in summary.get("targets", {}).items()
             if entry.get("closest_approach")
         }
         for _, component in sorted(simulation.components.items()):
-            sends = any(issubclass(o.message, TrafficStates) for o in component.outputs.values())
-            if sends and hasattr(component, "own") and hasattr(component, "targets"):
+            if isinstance(component, TrafficSource):
                 return cls(component, float(simulation.duration_s), closest_s)
         return None
 
@@ -119,7 +119,13 @@ class Flights:
 
     def _map(self, state: Any) -> tuple[FloatArray, FloatArray]:
         north, east, _ = line_of_sight_ned(
-            *self._reference, state.lat_deg, state.lon_deg, state.alt_m, validate=False
+            self._lat_deg,
+            self._lon_deg,
+            self._alt_m,
+            state.lat_deg,
+            state.lon_deg,
+            state.alt_m,
+            validate=False,
         )
         there = state.present
         return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)

@@ -2,10 +2,15 @@
 
 from typing import Any
 
+import numpy as np
+
+from dsa_des.types import FloatArray
+
 FONT_SIZE = 8
 _LINE_PX = FONT_SIZE * 1.9
 _LETTER_PX = FONT_SIZE * 0.95
-_GAP_PX = 7.0
+_GAP_PX = 8.0
+_CELL_PX = 6.0
 
 Box = tuple[float, float, float, float]
 
@@ -20,16 +25,28 @@ class Labels:
         Limits of the axes.
     unit_per_px : float
         Scale of both axes.
+    obstacles : (points, 2)
+        Places that are better left free, in units of the axes.
     """
 
     def __init__(
-        self, axes: Any, x: tuple[float, float], y: tuple[float, float], unit_per_px: float
+        self,
+        axes: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        unit_per_px: float,
+        obstacles: FloatArray,
     ) -> None:
         self._axes = axes
         self._x = x
         self._y = y
         self._unit_per_px = unit_per_px
         self._taken: list[Box] = []
+        cells = np.floor((obstacles - (x[0], y[0])) / (unit_per_px * _CELL_PX))
+        # One number per cell: sorting rows is ten times slower. Cells out of sight do not matter.
+        cells = cells[(cells >= 0).all(axis=1) & (cells < 10_000).all(axis=1)]
+        numbers = np.unique(cells[:, 0] * 10_000 + cells[:, 1])
+        self._obstacles = (np.column_stack(np.divmod(numbers, 10_000)) + 0.5) * _CELL_PX
 
     def add(
         self, text: str, x: float, y: float, colour: str = "#000000", weight: str = "normal"
@@ -55,7 +72,8 @@ class Labels:
             ):
                 box = (left, bottom, left + width, bottom + height)
                 cost = sum(_overlap(box, other) for other in self._taken)
-                cost += width * height - _overlap(box, (0.0, 0.0, right, top))
+                cost += 2 * (width * height - _overlap(box, (0.0, 0.0, right, top)))
+                cost += self._covered(box)
                 if best is None or cost < best[0]:
                     best = (cost, box)
             if best is not None and best[0] == 0:
@@ -69,6 +87,12 @@ class Labels:
             text, fontsize=FONT_SIZE, color=colour, weight=weight, va="center", clip_on=True,
             bbox={"facecolor": "white", "alpha": 0.65, "edgecolor": "none", "pad": 0.8}, zorder=4.0,
         )  # fmt: skip
+
+    def _covered(self, box: Box) -> float:
+        """Return about the area of the obstacles that a box would cover."""
+        x, y = self._obstacles.T
+        inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
+        return 0.5 * _CELL_PX**2 * int(np.count_nonzero(inside))
 
 
 def _overlap(one: Box, other: Box) -> float:

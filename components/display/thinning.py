@@ -5,7 +5,7 @@ import numpy as np
 from dsa_des.types import FloatArray, IntArray
 
 
-def staggered(along_px: FloatArray, spacing_px: float, turn: int, turns: int) -> IntArray:
+def staggered(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
     """Return the indices of marks about `spacing_px` apart along a path.
 
     Several sensors that mark the same path take turns on it, so that their marks alternate
@@ -16,8 +16,8 @@ def staggered(along_px: FloatArray, spacing_px: float, turn: int, turns: int) ->
     along_px : (points,)
         Where each point lies along the path, ascending; NaN is left out.
     spacing_px : float
-    turn, turns : int
-        Which sensor this is, of how many.
+    phase : float
+        Where in the spacing this sensor's turn is, as a share of it.
 
     Returns
     -------
@@ -25,7 +25,7 @@ def staggered(along_px: FloatArray, spacing_px: float, turn: int, turns: int) ->
         Ascending; the first point is always among them, and a gap stays a gap.
     """
     known = np.flatnonzero(np.isfinite(along_px))
-    bins = np.floor(along_px[known] / spacing_px - turn / turns)
+    bins = np.floor(along_px[known] / spacing_px - phase)
     return known[np.diff(bins, prepend=-np.inf) > 0]
 
 

@@ -1,15 +1,15 @@
 """``timeline.png``: the sensors' scans on their own clocks, and what was detected when."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.figures import DPI, drawing, plain, style_of
+from components.display.figures import DPI, drawing, mark_of, plain, style_of
 from components.display.flights import Flights
 from components.display.marks import Detected, read_fused, read_scans
-from components.display.plan import mark_of
 from components.display.thinning import by_target, evenly, staggered
 from dsa_des.types import AnyArray, FloatArray
 
@@ -22,7 +22,8 @@ MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
 _LEFT, _WIDTH = 0.105, 0.87
-_SPACING_PX = 11.0
+_SPACING_PX = 9.0
+_GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 
 @dataclass
@@ -76,15 +77,17 @@ def draw_timeline(
         below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
-        below.set_title("Whole run: true slant range when detected (shaded: above)", loc="left")
+        below.set_title(
+            "Whole run: true slant range of detections (shaded: the part above)", loc="left"
+        )
     return path
 
 
 def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     """Return a part of the run that shows how the sensors' clocks meet.
 
-    It lies around the first instant at which two sensors were fused, else the first detection,
-    else at the start. It is four periods of the slowest sensor long, but has at most
+    It lies around the first instant at which the most sensors were fused, else around the first
+    detection, else at the start. It is four periods of the slowest sensor long, but has at most
     `MOST_SCANS_SHOWN` scans of the fastest.
     """
     periods = [
@@ -99,20 +102,27 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     first = [float(time_s[np.argmax(n > 0)]) for time_s, n in scans.values() if (n > 0).any()]
     if first:
         anchor_s, what = min(first), "scans around the first detection"
-    together = _first_joined(folder)
+    together = _first_joined(folder, len(scans))
     if together is not None:
-        anchor_s, what = together, "scans around the first fusion of two sensors"
+        anchor_s, number = together
+        word = {2: "two", 3: "three", 4: "four"}.get(number, str(number))
+        what = f"scans around the first fusion of {word} sensors"
     start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
     end_s = start_s + length_s
     return CloseUp(start_s, end_s, what, _joined(folder, start_s, end_s))
 
 
-def _first_joined(folder: Path) -> float | None:
+def _first_joined(folder: Path, sensors: int) -> tuple[float, int] | None:
+    """Return the first instant of the largest combination, and its size; None if there is none."""
+    best: tuple[float, int] | None = None
     for time_s, code, names in read_fused(folder):
-        several = np.array(["+" in name for name in names])[code]
-        if several.any():
-            return float(time_s[np.argmax(several)])
-    return None
+        size = np.array([name.count("+") + 1 for name in names])[code]
+        largest = int(size.max())
+        if largest > (1 if best is None else best[1]):
+            best = float(time_s[np.argmax(size == largest)]), largest
+        if best is not None and best[1] >= sensors:
+            break
+    return best
 
 
 def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
@@ -142,32 +152,36 @@ def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) 
         rate = (len(time_s) - 1) / (time_s[-1] - time_s[0]) if len(time_s) > 1 else 0.0
         names.append(f"{name}\n{rate:.4g} Hz" if rate else name)
         seen = (time_s >= close_up.start_s) & (time_s <= close_up.end_s)
+        size = min(7.0, _mark_size(int(np.count_nonzero(seen))))
         shown = time_s[seen]
         axes.plot(
             shown, np.full(len(shown), height[name]), linestyle="none", marker="|", markersize=20,
             markeredgewidth=1.0, color=style[0], clip_on=False,
         )  # fmt: skip
         shown = time_s[seen & (count > 0)]
-        mark = mark_of(style) | {"markersize": 7.0, "markerfacecolor": style[0]}
+        mark = mark_of(style) | {"markersize": size, "markerfacecolor": style[0]}
         axes.plot(shown, np.full(len(shown), height[name]), **mark, zorder=3.0, clip_on=False)
-    segments, dots = [], []
-    for time_s, together in close_up.joined:
+    segments: list[Any] = []
+    dots: list[tuple[float, float]] = []
+    for fused_s, together in close_up.joined:
         points = []
         for name in sorted((n for n in together if n in height), key=lambda n: height[n]):
             # Fused within a gate: the scan meant is the latest one with a detection.
-            at = int(np.searchsorted(hits[name], time_s, side="right")) - 1
-            points.append((float(hits[name][at]) if at >= 0 else time_s, float(height[name])))
-        segments += list(zip(points[:-1], points[1:], strict=True))
+            at = int(np.searchsorted(hits[name], fused_s, side="right")) - 1
+            points.append((float(hits[name][at]) if at >= 0 else fused_s, float(height[name])))
+        segments += pairwise(points)
         dots += points
     if segments:
-        axes.add_collection(LineCollection(segments, colors="#000000", linewidths=1.6, zorder=4.0))
+        axes.add_collection(LineCollection(segments, colors="#000000", linewidths=1.6, zorder=1.5))
         where = np.array(sorted(set(dots)))
+        size = min(11.0, _mark_size(len(close_up.joined)) * 1.4)
         axes.plot(
-            where[:, 0], where[:, 1], linestyle="none", marker="o", markersize=11,
-            markeredgecolor="#000000", markerfacecolor="none", markeredgewidth=1.4, zorder=4.1,
+            where[:, 0], where[:, 1], linestyle="none", marker="o", markersize=size,
+            markeredgecolor="#000000", markerfacecolor="none", markeredgewidth=1.4, zorder=4.0,
+            clip_on=False,
         )  # fmt: skip
     axes.set_yticks([height[name] for name in sensors], [plain(name) for name in names])
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", length=0, pad=9)
     axes.spines["left"].set_visible(False)
     axes.set_ylim(-0.6, max(1, len(sensors)) - 0.4)
     _time_axis(axes, close_up.start_s, close_up.end_s)
@@ -182,6 +196,11 @@ def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) 
         handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
         borderaxespad=0.1,
     )  # fmt: skip
+
+
+def _mark_size(count: int) -> float:
+    """Return the size in points at which `count` marks in a row do not touch."""
+    return 0.65 * _SIZE_IN[0] * _WIDTH * 72 / max(1, count)
 
 
 def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duration_s: float) -> None:
@@ -228,11 +247,12 @@ def _draw_detections(
     name: str,
     px_per_s: float,
 ) -> None:
-    turn, turns = detected.sensors.index(name), len(detected.sensors)
+    spacing_px = _SPACING_PX * len(detected.sensors)
+    phase = detected.sensors.index(name) / len(detected.sensors)
     time_s, range_km = detected.time_s[name], detected.range_m[name] / 1000
     kept = [
-        rows[staggered(time_s[rows] * px_per_s, _SPACING_PX * turns, turn, turns)]
-        for _, rows in by_target(detected.target[name])
+        rows[staggered(time_s[rows] * px_per_s, spacing_px, phase + _GOLDEN * target)]
+        for target, rows in by_target(detected.target[name])
     ]
     if kept:
         rows = np.concatenate(kept)

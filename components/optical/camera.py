@@ -21,8 +21,10 @@ class CameraParameters(SensorParameters):
     threshold: float = Field(default=1.0, description="Signature needed for a detection (eq. 19).")
     static_weight: float = Field(default=0.3, ge=0, description="Weight a of eq. 18, per pixel.")
     dynamic_weight: float = Field(default=0.0, ge=0, description="Weight b of eq. 18, s/rad.")
-    silhouette: Literal["exact", "thesis", "convex_hull"] = Field(
-        default="exact", description="How the area follows from the target's attitude."
+    silhouette: Literal["exact", "thesis", "convex_hull", "aspect_table"] = Field(
+        default="exact",
+        description="How the area follows from the target's attitude; 'aspect_table' takes each "
+        "aircraft's silhouette_table.",
     )
     rate: Literal["exact", "thesis"] = Field(
         default="exact",

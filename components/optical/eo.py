@@ -1,16 +1,61 @@
 """The electro-optical camera (``optical.eo``, thesis §3.5.2)."""
 
-from components.optical.camera import Camera
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from components.optical.camera import Camera, CameraParameters
+from components.optical.contrast import contrast_gain
 from components.optical.silhouette import visible_area
+from components.optical.tabulated_area import tabulated_area
 from components.sensor import Cells
 from dsa_des.types import FloatArray
+
+
+class ElectroOpticalParameters(CameraParameters):
+    """Parameters of an electro-optical camera; sun and reflectances matter with a background."""
+
+    background: Literal["none", "auto", "sky", "ground"] = Field(
+        default="none",
+        description="What targets are seen against by daylight: sky, ground, or auto, sky from the "
+        "horizon up; 'none' takes each aircraft's constant contrast.",
+    )
+    sky: Literal["clear", "partly_cloudy", "overcast"] = Field(
+        default="clear", description="State of the sky."
+    )
+    sun_azimuth_deg: float = Field(
+        default=180.0, ge=-360, le=360, description="Bearing of the sun, deg from north."
+    )
+    sun_elevation_deg: float = Field(
+        default=45.0, gt=0, le=90, description="Elevation of the sun, deg."
+    )
+    sun_exclusion_deg: float = Field(
+        default=0.0,
+        ge=0,
+        le=180,
+        description="Half angle of the cone round the sun in which the camera is blind, deg.",
+    )
+    ground_reflectance: float = Field(
+        default=0.2, gt=0, le=1, description="Diffuse reflectance of the ground; 0.2 is grass."
+    )
+    visibility_km: float | None = Field(
+        default=None,
+        gt=0,
+        description="Meteorological visibility (2 % contrast), km; clear air by default.",
+    )
 
 
 class ElectroOptical(Camera):
     """An electro-optical camera that sees a target's silhouette against its background."""
 
+    Parameters = ElectroOpticalParameters
+
     def area(self, cells: Cells) -> FloatArray:
         """Return the silhouette of sphere, cylinder and plane (eq. 9-13, errata 9), m²."""
+        if self.p.silhouette == "aspect_table":
+            return tabulated_area(cells, "eo.silhouette_table")
         return visible_area(
             cells.relative_heading_rad,
             cells.target_pitch_rad,
@@ -23,5 +68,30 @@ class ElectroOptical(Camera):
         )
 
     def contrast(self, cells: Cells) -> FloatArray:
-        """Return each target's contrast gain for EO."""
-        return cells.of_target(cells.roster.column("contrast"))
+        """Return each target's contrast gain: constant, or by daylight and haze."""
+        constant: FloatArray = cells.of_target(cells.roster.column("contrast"))
+        p = self.p
+        if p.background == "none" and p.visibility_km is None:
+            return constant
+        if p.background == "none":
+            daylight = {}
+        else:
+            daylight = {
+                "model": "daylight",
+                "background": p.background,
+                "sky": p.sky,
+                "sun_azimuth_rad": math.radians(p.sun_azimuth_deg),
+                "sun_elevation_rad": math.radians(p.sun_elevation_deg),
+                "sun_exclusion_rad": math.radians(p.sun_exclusion_deg),
+                "ground_reflectance": p.ground_reflectance,
+                "paint_reflectance": cells.of_target(cells.roster.column("paint_reflectance")),
+            }
+        gain = contrast_gain(
+            contrast=constant,
+            azimuth_rad=cells.azimuth_rad,
+            elevation_rad=cells.elevation_rad,
+            range_m=cells.range_m,
+            visibility_m=None if p.visibility_km is None else p.visibility_km * 1000.0,
+            **daylight,
+        )
+        return np.asarray(gain)

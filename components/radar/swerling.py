@@ -1,14 +1,17 @@
 """A radar that detects with the probability its SNR gives (``radar.swerling``, thesis §4.1.2)."""
 
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.detection import detection_probability
 from components.radar.parameters import LinkBudgetParameters
+from components.radar.sampled_rcs import scan_rcs
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.sensor import Cells, Look
+from dsa_des.types import FloatArray
 
 
 class SwerlingParameters(LinkBudgetParameters):
@@ -17,19 +20,41 @@ class SwerlingParameters(LinkBudgetParameters):
     swerling: Literal[0, 1, 2, 3, 4, 5] | None = Field(
         default=None, description="Fluctuation model for all targets; by default each its own."
     )
-    detection: Literal["exact", "table"] = Field(
-        default="exact", description="How Pd is computed: exactly, or by table (error < 1e-6)."
+    fluctuation: Literal["probability", "sampled"] = Field(
+        default="probability",
+        description="Fluctuation inside Pd, or a sampled RCS (per scan for I and III, per pulse "
+        "for II and IV) and a steady target's Pd at it; the same share of detections.",
+    )
+    detection: Literal["exact", "table", "gram_charlier"] = Field(
+        default="exact",
+        description="How Pd is computed: exactly, by table (error < 1e-6), or by the thesis's "
+        "series (error < 0.03; steady targets only).",
     )
     reference_pd: float = Field(
         default=0.9, gt=0, lt=1, description="Pd whose SNR is the zero of the confidence."
     )
 
+    @model_validator(mode="after")
+    def _covered(self) -> Self:
+        steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
+        if self.detection == "gram_charlier" and not steady:
+            raise ValueError(
+                f"detection is 'gram_charlier' and swerling is {self.swerling}: the series covers "
+                "steady targets only; set swerling to 0, or fluctuation to 'sampled'"
+            )
+        return self
+
 
 class SwerlingRadar(LinkBudgetRadar):
     """Detects each target with its probability of detection for a fluctuating cross-section.
 
-    One keyed uniform draw per target and scan decides. Confidence is the mean SNR above the SNR
-    at which Pd is `reference_pd`, in dB.
+    One keyed uniform draw per target and scan decides. With fluctuation 'probability' Pd is that
+    of the fluctuating target at its mean SNR; with 'sampled' further keyed draws sample the RCS of
+    the scan, and Pd is a steady target's at the SNR it gives. Confidence is the SNR (mean, or of
+    the scan) above the SNR at which that Pd is `reference_pd`, in dB.
+
+    The approximations of Shnidman and Albersheim are no choice for `detection`: they hold for part
+    of the SNR of an encounter only and refuse the rest.
     """
 
     Parameters = SwerlingParameters
@@ -37,6 +62,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self._draws = self.stream("detection")
+        self._rcs_draws = self.stream("rcs")
         self._reference_db: dict[int, float] = {}
 
     def look(self, cells: Cells) -> Look:
@@ -46,7 +72,7 @@ class SwerlingRadar(LinkBudgetRadar):
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
-        for model, chosen in self._models(cells):
+        for model, chosen in self._detection_models(cells):
             pd[chosen] = detection_probability(
                 snr[chosen],
                 pulses=self.p.pulses,
@@ -57,6 +83,29 @@ class SwerlingRadar(LinkBudgetRadar):
             confidence[chosen] = snr_db[chosen] - self._reference(model)
         detected = echo & (cells.draws(self._draws) < pd)
         return Look(detected, confidence, {"snr_db": snr_db, "detection_probability": pd})
+
+    def snr(self, cells: Cells) -> FloatArray:
+        """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
+        if self.p.fluctuation == "probability":
+            return super().snr(cells)
+        rcs = mean_rcs_m2(cells)
+        keys = cells.roster.keys[cells.target]
+        for model, chosen in self._models(cells):
+            target, scan = keys[chosen], cells.scan[chosen]
+
+            def draw(number: int, target: Any = target, scan: Any = scan) -> FloatArray:
+                return self._rcs_draws.uniform(target, scan, number)
+
+            rcs[chosen] = scan_rcs(
+                rcs[chosen], draw, pulses=self.p.pulses, model=f"swerling{model}"
+            )
+        return self.budget.snr(cells.range_m, rcs)
+
+    def _detection_models(self, cells: Cells) -> list[tuple[int, Any]]:
+        """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
+        if self.p.fluctuation == "sampled":
+            return [(0, slice(None))]
+        return self._models(cells)
 
     def _models(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each fluctuation model with the cells it holds for."""

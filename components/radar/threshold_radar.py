@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.required_snr import required_snr
 from components.sensor import Cells, Look, Sensor
@@ -32,7 +33,7 @@ class LinkBudgetRadar(Sensor):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.budget.snr(cells.range_m, cells.of_target(cells.roster.rcs_m2))
+        return self.budget.snr(cells.range_m, mean_rcs_m2(cells))
 
     def required_snr_db(self, pd: float, model: str) -> float:
         """Return the mean SNR in dB at which the probability of detection is `pd`."""

@@ -99,9 +99,11 @@ def test_the_resolution_is_nanoseconds_or_finer():
 
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(
-    rate=st.fractions(Fraction(1, 100), 1000, max_denominator=2002),
+    rate=st.fractions(Fraction(1, 100), 1000, max_denominator=2002).map(
+        lambda rate: Fraction(rate.numerator % 1000 + 1, rate.denominator)
+    ),
     ppm=st.fractions(-500, 500, max_denominator=1000),
-    day=st.integers(0, 30),
+    day=st.sampled_from([0, 1, 3, 30]),
 )
 def test_a_rate_error_is_rounded_once_and_never_accumulates(rate, ppm, day):
     spec = ClockSpec(rate, rate_error_ppm=ppm)
@@ -126,7 +128,7 @@ def test_a_rate_error_written_to_many_digits_is_still_exact():
 
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(
-    rate=st.fractions(1, 200, max_denominator=1001),
+    rate=st.builds(Fraction, st.integers(200, 2000), st.integers(1, 101)),
     offset=st.fractions(0, 3, max_denominator=50),
     ppm=st.sampled_from([Fraction(0), Fraction(-37), Fraction(101, 7)]),
     jitter_s=st.sampled_from([0.0, 1e-4, 0.02, 10.0]),

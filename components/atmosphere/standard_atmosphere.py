@@ -1,0 +1,80 @@
+"""What are pressure, temperature and humidity at an altitude, if nobody has measured them?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.atmosphere.inputs import within
+from components.atmosphere.recommendation_tables import columns
+from components.radar.inputs import broadcast_flat, not_negative, unflatten
+
+LOWEST_ALTITUDE_M = -5_000.0
+HIGHEST_ALTITUDE_M = 80_000.0
+
+SEA_LEVEL_VAPOUR_DENSITY_G_M3 = 7.5
+
+_EARTH_RADIUS_KM = 6356.766
+_HYDROSTATIC_K_PER_KM = 34.1632
+_VAPOUR_SCALE_HEIGHT_KM = 2.0
+_SMALLEST_MIXING_RATIO = 2e-6
+
+
+def standard_atmosphere(
+    altitude_m: ArrayLike,
+    *,
+    sea_level_vapour_density_g_m3: ArrayLike = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
+) -> tuple[Any, Any, Any]:
+    """Return pressure, temperature and water vapour density of the reference atmosphere.
+
+    Parameters
+    ----------
+    altitude_m : array_like, m
+        Geometric altitude above sea level, -5 to 80 km. Below sea level the lowest layer is
+        continued.
+    sea_level_vapour_density_g_m3 : array_like, g/m³
+        0 for dry air; the Recommendation's 7.5 by default. It falls by e every 2 km, down to the
+        stratosphere's constant mixing ratio of 2e-6.
+
+    Returns
+    -------
+    pressure_hpa, temperature_k, vapour_density_g_m3 : arrays of the broadcast shape
+        The pressure is the barometric one, vapour included.
+
+    Raises
+    ------
+    ValueError
+        If an altitude is outside the range or the vapour density negative.
+
+    Notes
+    -----
+    Recommendation ITU-R P.835-6 (12/2017), Annex 1, mean annual global reference atmosphere.
+    """
+    shape, (altitude, sea_level_vapour) = broadcast_flat(
+        altitude_m=within("altitude_m", altitude_m, LOWEST_ALTITUDE_M, HIGHEST_ALTITUDE_M, "m"),
+        density=not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
+    )
+    height_km = altitude * 1e-3
+    geopotential_km = _EARTH_RADIUS_KM * height_km / (_EARTH_RADIUS_KM + height_km)
+    layers = columns("standard_atmosphere")
+    base_km = layers["base_geopotential_km"]
+    layer = np.maximum(np.searchsorted(base_km, geopotential_km, side="left") - 1, 0)
+    above_base_km = geopotential_km - base_km[layer]
+    base_temperature, lapse = layers["base_temperature_k"][layer], layers["lapse_k_per_km"][layer]
+    temperature = base_temperature + lapse * above_base_km
+    isothermal = lapse == 0.0
+    fall = np.where(
+        isothermal,
+        np.exp(-_HYDROSTATIC_K_PER_KM * above_base_km / base_temperature),
+        np.power(
+            base_temperature / temperature,
+            _HYDROSTATIC_K_PER_KM / np.where(isothermal, 1.0, lapse),
+        ),
+    )
+    pressure = layers["base_pressure_hpa"][layer] * fall
+    vapour = sea_level_vapour * np.exp(-height_km / _VAPOUR_SCALE_HEIGHT_KM)
+    driest = _SMALLEST_MIXING_RATIO * pressure * 216.7 / temperature
+    vapour = np.where(sea_level_vapour > 0.0, np.maximum(vapour, driest), 0.0)
+    return unflatten(pressure, shape), unflatten(temperature, shape), unflatten(vapour, shape)

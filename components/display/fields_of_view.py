@@ -1,0 +1,85 @@
+"""The sensors' fields of view on the plan."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.display.figures import style_of
+from dsa_des.types import FloatArray
+
+
+@dataclass
+class Outline:
+    """A field of view from above.
+
+    Parameters
+    ----------
+    corners_km : (corners, 2)
+        East and north; unless `closed`, the two edges' directions.
+    radius_km : float
+    closed : bool
+        Whether it has a range limit.
+    """
+
+    corners_km: FloatArray
+    radius_km: float
+    closed: bool
+
+
+def outline_of(yaw_rad: float, reach: Any) -> Outline:
+    """Return a reach from above, for an ownship at the origin with its nose at `yaw_rad`."""
+    low, high = reach.azimuth_rad
+    width = high - low if high >= low else high - low + 2 * math.pi
+    everywhere = width >= 2 * math.pi - 1e-9
+    closed = math.isfinite(reach.range_max_m)
+    angle = yaw_rad + low + np.linspace(0.0, min(width, 2 * math.pi), 181)
+    if not closed:
+        angle = angle[:0] if everywhere else angle[[0, -1]]
+    radius_km = reach.range_max_m / 1000 if closed else 1.0
+    corners = np.column_stack((np.sin(angle), np.cos(angle))) * radius_km
+    if closed and not everywhere:
+        corners = np.vstack((corners, [[0.0, 0.0]]))
+    return Outline(corners, radius_km, closed)
+
+
+def draw_outline(axes: Any, outline: Outline, sensors: list[str], name: str, far_km: float) -> None:
+    """Draw a field of view: filled up to a range limit, or dashed edges without end.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    outline : Outline
+    sensors : list of str
+        All sensors, for the colours.
+    name : str
+        Whose field of view this is.
+    far_km : float
+        Beyond every corner of the plot.
+    """
+    from matplotlib.patches import Polygon
+
+    colour = style_of(sensors, name)[0]
+    corners = outline.corners_km
+    if outline.closed:
+        axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.06, zorder=0.5))
+        axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.0, zorder=0.6))
+        return
+    for edge in corners * far_km:
+        # Shifted dashes keep two fields of view with the same edges apart.
+        axes.plot(
+            [0.0, edge[0]], [0.0, edge[1]], color=colour, linewidth=1.2,
+            linestyle=(4 * sensors.index(name), (6, 5)), zorder=0.7, scalex=False, scaley=False,
+        )  # fmt: skip
+
+
+def reach_text(reach: Any) -> str:
+    """Return a reach in words."""
+    if not reach.enabled:
+        return "switched off"
+    low, high = (math.degrees(angle) for angle in reach.azimuth_rad)
+    field = f"±{high:.4g}°" if low == -high else f"{low:.4g}° to {high:.4g}°"
+    if math.isfinite(reach.range_max_m):
+        return f"field of view {field},\nto {reach.range_max_m / 1000:g} km"
+    return f"field of view {field},\nno range limit (dashed)"

@@ -1,0 +1,105 @@
+"""Checks of a scene that need both its wiring and the parameters of its blocks.
+
+Clocks that 64-bit ticks cannot hold, blocks that would never run, and wires that would hold a
+message where nobody looks for it.
+"""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from dsa_des.clock import MAX_TICK, ClockSpec, resolution
+from dsa_des.errors import Problem
+from dsa_des.scene_file import Key, SceneFile
+from dsa_des.wiring import Wire
+
+if TYPE_CHECKING:
+    from dsa_des.scene import Block
+
+# Assumed where a scene leaves its length to its sources.
+_A_DAY = Fraction(86400)
+
+
+def check_times(
+    scene: SceneFile,
+    blocks: "Mapping[str, Block]",
+    wires: Sequence[Wire],
+    duration_s: Fraction | None,
+    problems: list[Problem],
+) -> int:
+    """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
+    specs = {name: block.cls.clock_of(block.parameters) for name, block in blocks.items()}
+    clocks = {name: spec for name, spec in specs.items() if spec is not None}
+    times = [wire.delay_s for wire in wires]
+    for spec in clocks.values():
+        times += spec.exact_times()
+    ticks_per_s = resolution(times)
+    longest_s = Fraction(MAX_TICK, ticks_per_s)
+    if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
+        shown = (f"{name} {spec.rate_hz} Hz + {spec.offset_s} s" for name, spec in clocks.items())
+        message = (
+            "these clocks have no common tick that fits 64 bits for the whole run: "
+            f"{', '.join(shown)}; give offsets to fewer digits or rates as simpler fractions"
+        )
+        problems.append(scene.problem(("blocks",), message))
+        return ticks_per_s
+    limit = f"must be at most {float(longest_s):.4g} s: that is how far this scene's ticks reach"
+    if duration_s is not None and 1 + duration_s >= longest_s:
+        value = scene.data.get("duration_s")
+        problems.append(scene.problem(("duration_s",), limit, value))
+    for wire in wires:
+        if wire.delay_s >= longest_s:
+            problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
+    for name, spec in clocks.items():
+        _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)
+    return ticks_per_s
+
+
+def _check_clock(
+    scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int, problems: list[Problem]
+) -> None:
+    longest_s = Fraction(MAX_TICK, ticks_per_s)
+    speed = 1 + spec.rate_error_ppm / 1_000_000
+    if speed <= 0:
+        message = "must be greater than -1000000: a clock cannot stand still or run backwards"
+        problems.append(scene.problem((*key, "rate_error_ppm"), message, str(spec.rate_error_ppm)))
+    elif spec.period_s / speed >= longest_s:
+        message = f"is too slow: the time between scans must be below {float(longest_s):.4g} s"
+        problems.append(scene.problem((*key, "scan_rate_hz"), message, str(spec.rate_hz)))
+    elif spec.period_s / speed * ticks_per_s < 1:
+        message = f"is too fast: there are {ticks_per_s} ticks per second"
+        problems.append(scene.problem((*key, "scan_rate_hz"), message, str(spec.rate_hz)))
+    if spec.offset_s >= longest_s:
+        message = f"must be below {float(longest_s):.4g} s"
+        problems.append(scene.problem((*key, "offset_s"), message, str(spec.offset_s)))
+
+
+def check_activity(
+    scene: SceneFile,
+    blocks: "Mapping[str, Block]",
+    wires: Sequence[Wire],
+    problems: list[Problem],
+) -> None:
+    """Add blocks that would never run, and wires that hold a message for a queued input."""
+    woken = {
+        wire.target
+        for wire in wires
+        if wire.target in blocks and blocks[wire.target].cls.inputs[wire.input].mode == "trigger"
+    }
+    for name, block in blocks.items():
+        alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
+        if not alive and block.cls.clock_of(block.parameters) is None:
+            message = (
+                "would never run: it has no scan clock, no process of its own, and no wire into "
+                "a trigger input"
+            )
+            problems.append(scene.problem(("blocks", name), message))
+    for wire in wires:
+        if isinstance(wire.holds, dict) and wire.target in blocks:
+            declared = blocks[wire.target].cls.inputs[wire.input]
+            if declared.mode == "queued" or declared.many:
+                message = (
+                    f"{wire}: holds must be 'nothing': only a sampled or trigger input with one "
+                    "writer can hold a message"
+                )
+                problems.append(scene.problem(("wires",), message))

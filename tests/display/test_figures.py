@@ -1,0 +1,199 @@
+"""The two figures: they are drawn for every kind of run, and drawn the same every time."""
+
+import struct
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from components.display.flights import Flights
+from components.display.marks import Detected, read_scans
+from components.display.report import DetectAndSenseReport, sensor_names
+from components.display.timeline import find_close_up
+from dsa_des.arrow import ParquetSink
+from dsa_des.recording import ObserverSink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+HEAD = """
+title = "Test $cene_"
+duration_s = {duration}
+wires = ["traffic -> transform", "transform -> radar", "transform -> near",
+         "radar -> fusion", "near -> fusion"]
+[blocks.transform]
+type = "geometry.ellipsoid"
+[blocks.radar]
+type = "radar.range_boundary"
+scan_rate_hz = 5
+range_km = 8
+azimuth_deg = [-110, 110]
+[blocks.near]
+type = "radar.range_boundary"
+scan_rate_hz = 2
+offset_s = 0.1
+range_km = 3
+[blocks.fusion]
+type = "fusion.pick_best"
+[blocks.traffic]
+type = "traffic.scripted"
+ownship = {{ lat_deg = 52, lon_deg = 4.4, alt_m = 1000, heading_deg = 30, speed_mps = {speed} }}
+"""
+
+TARGET = """
+[[blocks.traffic.intruders]]
+name = "{name}"
+east_m = {east}
+north_m = {north}
+heading_deg = {heading}
+speed_mps = {speed}
+"""
+
+
+def a_target(name, east=2000, north=3500, heading=210, speed=60):
+    return TARGET.format(name=name, east=east, north=north, heading=heading, speed=speed)
+
+
+def run(tmp_path, targets, duration=40, speed=50, window=None):
+    """Run a scene into a folder; return the simulation, the folder and the summary."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(HEAD.format(duration=duration, speed=speed) + targets, encoding="utf-8")
+    folder = tmp_path / f"run-{window}"
+    folder.mkdir(exist_ok=True)
+    observers = ObserverSink([])
+    recorder = Recorder([ParquetSink(folder), observers])
+    simulation = Simulation(load_scene(scene), recorder=recorder, window=window)
+    observers.observers = DetectAndSenseReport().observers(simulation)
+    outcome = simulation.run()
+    return simulation, folder, {**observers.result(), **outcome.report, "simulated_s": 1.0}
+
+
+def draw(simulation, folder, summary):
+    return DetectAndSenseReport().draw(simulation, folder, summary)
+
+
+def size_of(path):
+    content = path.read_bytes()
+    assert content[:8] == b"\x89PNG\r\n\x1a\n"
+    return struct.unpack(">II", content[16:24])
+
+
+SCENES = {
+    "one target": (a_target("solo"), 40, 50),
+    "no target": ("", 40, 50),
+    "none detected": (a_target("far", east=90000) + a_target("farther", east=-90000), 40, 50),
+    "ownship at rest": (a_target("hover", speed=0), 40, 0),
+    "all at rest in one place": (a_target("same", east=0, north=0, speed=0), 5, 0),
+    "one instant": (a_target("blink"), 0.001, 50),
+    "flights that go far away": (a_target("gone", speed=250), 4000, 60),
+    "strange names": (a_target("$x_{1") + a_target("_hidden") + a_target("通訊"), 20, 50),
+    "many targets": ("".join(a_target(f"t{i}", east=-9000 + 600 * i) for i in range(30)), 20, 50),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_kind_of_run_is_drawn(tmp_path, name):
+    targets, duration, speed = SCENES[name]
+    paths = draw(*run(tmp_path, targets, duration, speed))
+    assert [path.name for path in paths] == ["plan.png", "timeline.png"]
+    for path in paths:
+        width, height = size_of(path)
+        assert width > 800
+        assert height > 400
+        assert path.stat().st_size > 8000
+
+
+def test_the_same_run_is_the_same_picture(tmp_path):
+    simulation, folder, summary = run(tmp_path, a_target("solo"), 10)
+    first = [path.read_bytes() for path in draw(simulation, folder, summary)]
+    again = [path.read_bytes() for path in draw(simulation, folder, summary)]
+    assert first == again
+    for content in first:
+        assert b"Software" not in content
+        assert b"Matplotlib" not in content
+
+
+def test_summary_and_picture_do_not_depend_on_the_window(tmp_path):
+    runs = [run(tmp_path, a_target("solo") + a_target("b"), 12, window=w) for w in (None, 1, 7)]
+    pictures = [[path.read_bytes() for path in draw(*one)] for one in runs]
+    assert runs[0][2] == runs[1][2] == runs[2][2]
+    assert runs[0][2]["sensors"]["radar"]["detections"] > 0
+    assert pictures[0] == pictures[1] == pictures[2]
+
+
+def test_detections_are_read_sensor_by_sensor(tmp_path):
+    simulation, folder, summary = run(tmp_path, a_target("solo"))
+    assert sensor_names(simulation) == ["near", "radar"]
+    detected = Detected.read(folder, sensor_names(simulation))
+    for name in ("near", "radar"):
+        assert len(detected.time_s[name]) == summary["sensors"][name]["detections"] > 0
+        first = summary["sensors"][name]["first_detection"]
+        assert detected.time_s[name][0] == first["time_s"]
+        assert detected.range_m[name][0] == first["range_m"]
+        assert detected.names[detected.target[name][0]] == "solo"
+
+
+def test_marks_lie_where_the_target_truly_was(tmp_path):
+    simulation, folder, summary = run(tmp_path, a_target("solo"))
+    flights = Flights.of(simulation, summary)
+    detected = Detected.read(folder, ["radar"])
+    time_s = detected.time_s["radar"]
+    east, north = flights.at("solo", time_s)
+    own_east, own_north = flights.own_at(time_s)
+    # Straight flight: start plus speed times time, to a metre over these few kilometres.
+    assert np.allclose(east, 2.0 + 0.06 * np.sin(np.radians(210)) * time_s, atol=2e-3)
+    assert np.allclose(north, 3.5 + 0.06 * np.cos(np.radians(210)) * time_s, atol=2e-3)
+    apart = np.hypot(east - own_east, north - own_north)
+    assert np.allclose(apart, detected.range_m["radar"] / 1000, atol=2e-3)
+
+
+def test_the_close_up_shows_the_first_fusion(tmp_path):
+    _, folder, _ = run(tmp_path, a_target("solo"))
+    scans = read_scans(folder)
+    close_up = find_close_up(scans, folder, 40.0)
+    detected = Detected.read(folder, ["near", "radar"])
+    both = np.intersect1d(detected.time_s["near"], detected.time_s["radar"])
+    assert close_up.joined[0] == (both[0], ["near", "radar"])
+    assert close_up.start_s < both[0] < close_up.end_s
+    assert "fusion" in close_up.what
+
+
+def test_the_close_up_falls_back_to_the_first_detection_and_the_start(tmp_path):
+    for targets, what in ((a_target("seen", east=4000, north=6000), "first detection"),
+                          (a_target("far", east=90000), "at the start")):  # fmt: skip
+        _, folder, _ = run(tmp_path, targets, 5)
+        close_up = find_close_up(read_scans(folder), folder, 5.0)
+        assert what in close_up.what
+        assert close_up.joined == []
+        assert 0.0 <= close_up.start_s < close_up.end_s <= 5.0
+
+
+def test_the_close_up_prefers_the_largest_combination(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = [(1.0, "a+b"), (2.0, "a"), (3.0, "a+b+c"), (3.5, "a+c"), (9.0, "a+b+c")]
+    table = {"time_s": [row[0] for row in rows], "sensors": [row[1] for row in rows]}
+    pq.write_table(pa.table(table), tmp_path / "fused.parquet", row_group_size=2)
+    clock = np.arange(0.0, 10.0, 0.5)
+    scans = {name: (clock, np.ones(len(clock), dtype=np.int64)) for name in "abc"}
+    close_up = find_close_up(scans, tmp_path, 10.0)
+    assert close_up.what.endswith("three sensors")
+    assert close_up.start_s < 3.0 < close_up.end_s < 9.0
+    assert (3.0, ["a", "b", "c"]) in close_up.joined
+    assert (3.5, ["a", "c"]) in close_up.joined
+
+
+def test_without_flights_there_is_still_a_timeline(tmp_path, monkeypatch):
+    simulation, folder, summary = run(tmp_path, a_target("solo"), 10)
+    monkeypatch.setattr(Flights, "of", classmethod(lambda cls, *_: None))
+    assert [path.name for path in draw(simulation, folder, summary)] == ["timeline.png"]
+
+
+def test_matplotlib_and_arrow_are_imported_only_for_drawing():
+    code = (
+        "import sys, components.display.report as r; r.DetectAndSenseReport();"
+        "print([m for m in ('matplotlib', 'pyarrow', 'rich', 'PIL') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

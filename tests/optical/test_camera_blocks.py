@@ -1,0 +1,238 @@
+"""The camera blocks: their silhouettes, backgrounds and plumes are those of the physics."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from components.aircraft import Aircraft, Roster
+from components.optical.contrast import contrast_gain
+from components.optical.eo import ElectroOptical, ElectroOpticalParameters
+from components.optical.infrared_area import infrared_area
+from components.optical.ir import Infrared, InfraredParameters
+from components.optical.silhouette import visible_area
+from dsa_des.component import Context
+from dsa_des.errors import SceneError
+from dsa_des.randomness import Streams
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+AREA_TABLE = "az_deg,el_deg,area_m2\n" + "".join(
+    f"{az},{el},{20.0 + 0.1 * abs(el) + 15.0 * abs(math.sin(math.radians(az)))}\n"
+    for el in range(-90, 91, 30)
+    for az in range(0, 360, 30)
+)
+AREAS = {"front_m2": 12.0, "side_m2": 30.0, "horizontal_m2": 90.0}
+CAMERA = {"scan_rate_hz": 2, "azimuth_pixels": 1000, "elevation_pixels": 500}
+
+
+@pytest.fixture
+def area_file(tmp_path):
+    path = tmp_path / "areas.csv"
+    path.write_text(AREA_TABLE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def crafts(area_file):
+    """Three aircraft with tables, of other paint and engine each."""
+    return [
+        Aircraft(
+            engine=engine,
+            paint_reflectance=paint,
+            contrast=paint + 0.5,
+            eo={**AREAS, "silhouette_table": area_file},
+            ir={**AREAS, "back_m2": 15.0, "silhouette_table": area_file},
+        )
+        for engine, paint in (("propeller", 0.1), ("turbofan", 0.5), ("turbojet", 0.9))
+    ]
+
+
+def cells_of(crafts, count=60):
+    """Cells of the aircraft in turn, in random directions and attitudes."""
+    rng = np.random.default_rng(8)
+    roster = Roster.of([(f"target {i}", craft) for i, craft in enumerate(crafts)])
+    target = np.arange(count) % len(crafts)
+
+    class Some(SimpleNamespace):
+        def __len__(self):
+            return count
+
+        def of_target(self, column):
+            return column[target]
+
+    return Some(
+        roster=roster,
+        target=target,
+        range_m=rng.uniform(200.0, 9000.0, count),
+        azimuth_rad=rng.uniform(0.0, 6.2, count),
+        elevation_rad=rng.uniform(-1.2, 1.2, count),
+        relative_heading_rad=rng.uniform(-3.1, 3.1, count),
+        target_pitch_rad=rng.uniform(-0.4, 0.4, count),
+        target_roll_rad=rng.uniform(-0.9, 0.9, count),
+    )
+
+
+def view_of(cells):
+    return (
+        cells.relative_heading_rad,
+        cells.target_pitch_rad,
+        cells.target_roll_rad,
+        cells.elevation_rad,
+    )
+
+
+def eo(**changes):
+    return ElectroOptical("eo", ElectroOpticalParameters(**CAMERA, **changes), Context(Streams(1)))
+
+
+def ir(**changes):
+    return Infrared("ir", InfraredParameters(**CAMERA, **changes), Context(Streams(1)))
+
+
+@pytest.mark.parametrize("silhouette", ["exact", "thesis", "convex_hull"])
+def test_parametric_silhouettes(crafts, silhouette):
+    cells = cells_of(crafts)
+    seen = eo(silhouette=silhouette).area(cells)
+    np.testing.assert_array_equal(seen, visible_area(*view_of(cells), **AREAS, model=silhouette))
+    warm = ir(silhouette=silhouette).area(cells)
+    expected = infrared_area(*view_of(cells), **AREAS, back_m2=15.0, model=silhouette)
+    np.testing.assert_array_equal(warm, expected)
+
+
+def test_tabulated_silhouettes(crafts):
+    cells = cells_of(crafts)
+    table = crafts[0].eo.silhouette_table.table
+    expected = visible_area(*view_of(cells), model="aspect_table", table=table)
+    np.testing.assert_array_equal(eo(silhouette="aspect_table").area(cells), expected)
+    np.testing.assert_array_equal(ir(silhouette="aspect_table").area(cells), expected)
+    cells = cells_of([crafts[0], Aircraft()])
+    message = r"eo\.silhouette_table of target 'target 1' is None: .* needs a table of every target"
+    with pytest.raises(ValueError, match=message):
+        eo(silhouette="aspect_table").area(cells)
+    eo().area(cells)
+
+
+@pytest.mark.parametrize("silhouette", ["exact", "aspect_table"])
+def test_plume_by_engine(crafts, silhouette):
+    cells = cells_of(crafts)
+    extra = ir(silhouette=silhouette, plume=True).area(cells) - ir(silhouette=silhouette).area(
+        cells
+    )
+    for index, engine in enumerate(("propeller", "turbofan", "turbojet")):
+        chosen = cells.target == index
+        view = [angles[chosen] for angles in view_of(cells)]
+        known = {**AREAS, "back_m2": 15.0}
+        expected = infrared_area(*view, **known, engine=engine) - infrared_area(*view, **known)
+        np.testing.assert_allclose(extra[chosen], expected, rtol=0, atol=1e-12)
+        assert (expected.max() > 0.0) == (engine != "propeller")
+
+
+def test_backgrounds(crafts):
+    cells = cells_of(crafts)
+    constant = np.array([0.6, 1.0, 1.4])[cells.target]
+    np.testing.assert_array_equal(eo().contrast(cells), constant)
+    haze = eo(visibility_km=8).contrast(cells)
+    np.testing.assert_allclose(haze, constant * np.exp(-3.912 * cells.range_m / 8e3), rtol=1e-13)
+    for background in ("auto", "sky", "ground"):
+        camera = eo(
+            background=background,
+            sky="partly_cloudy",
+            sun_azimuth_deg=100,
+            sun_elevation_deg=25,
+            sun_exclusion_deg=30,
+            ground_reflectance=0.4,
+            visibility_km=20,
+        )
+        expected = contrast_gain(
+            model="daylight",
+            contrast=constant,
+            azimuth_rad=cells.azimuth_rad,
+            elevation_rad=cells.elevation_rad,
+            range_m=cells.range_m,
+            visibility_m=20_000.0,
+            sun_azimuth_rad=math.radians(100),
+            sun_elevation_rad=math.radians(25),
+            sun_exclusion_rad=math.radians(30),
+            paint_reflectance=np.array([0.1, 0.5, 0.9])[cells.target],
+            ground_reflectance=0.4,
+            sky="partly_cloudy",
+            background=background,
+        )
+        np.testing.assert_array_equal(camera.contrast(cells), expected)
+        assert np.any(expected == 0.0) and np.any(expected > 0.0)  # some look into the sun
+
+
+@pytest.fixture
+def scene(configs, tmp_path, area_file):
+    """Write first light with other parameters of its cameras and three turning intruders."""
+
+    def write(eo, ir):
+        lines = [f'extends = "{configs / "first_light.toml"}"', "duration_s = 20"]
+        lines += ["[blocks.eo]", eo, "[blocks.ir]", ir]
+        areas = 'front_m2 = 12, side_m2 = 30, horizontal_m2 = 90, silhouette_table = "areas.csv"'
+        for i, engine in enumerate(("propeller", "turbofan", "turbojet")):
+            lines += [
+                "[[blocks.traffic.intruders]]",
+                f'name = "{engine}"\nengine = "{engine}"\npaint_reflectance = {0.3 * i + 0.2}',
+                f"east_m = {600 * i - 300}\nnorth_m = 1500\nup_m = 40",
+                f"heading_deg = {160 + 40 * i}\nspeed_mps = 30",
+                "legs = [{ kind = 'turn', rate_deg_s = 6 }]",
+                f"eo = {{ {areas} }}\nir = {{ back_m2 = 14, {areas} }}",
+            ]
+        path = tmp_path / "scene.toml"
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    return write
+
+
+def run(path, window=None):
+    memory = MemorySink()
+    Simulation(load_scene(path), window=window, recorder=Recorder([memory])).run()
+    return memory.tables()
+
+
+CAMERAS = [
+    ('silhouette = "aspect_table"', 'silhouette = "aspect_table"\nplume = true'),
+    ('background = "auto"\nvisibility_km = 12\nsun_azimuth_deg = 20', "plume = true"),
+    ('silhouette = "convex_hull"\nbackground = "ground"', 'silhouette = "thesis"'),
+    ("visibility_km = 5\ndynamic_weight = 2", 'silhouette = "convex_hull"\nplume = true'),
+]
+
+
+@pytest.mark.parametrize(("eo", "ir"), CAMERAS)
+def test_windows_do_not_change_a_bit(scene, eo, ir):
+    path = scene(eo, ir)
+    one, many = run(path, window=1), run(path)
+    assert one.keys() == many.keys()
+    for name, table in one.items():
+        assert table.equals(many[name]), name
+    assert {"eo", "ir"} <= set(one["detections"]["block"].to_pylist())
+
+
+@pytest.mark.parametrize(
+    ("eo", "key"),
+    [
+        ('background = "sun"', "blocks.eo.background"),
+        ("sun_elevation_deg = 0", "blocks.eo.sun_elevation_deg"),
+        ("visibility_km = 0", "blocks.eo.visibility_km"),
+        ('silhouette = "mesh"', "blocks.eo.silhouette"),
+    ],
+)
+def test_bad_parameters_are_problems_of_the_scene(scene, eo, key):
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene(eo, ""))
+    assert [problem.key for problem in caught.value.problems] == [key]
+
+
+def test_a_silhouette_table_with_a_hole_is_a_problem_of_the_scene(scene, area_file):
+    lines = area_file.read_text(encoding="utf-8").splitlines()
+    area_file.write_text("\n".join(lines[:20] + lines[21:]), encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene("", ""))
+    assert len(caught.value.problems) == 6
+    for problem in caught.value.problems:
+        assert problem.key.endswith("silhouette_table") and "hole" in str(problem)
