@@ -60,6 +60,9 @@ class RelativeTargets(Message):
     relative_heading_rad : (rows, targets)
         Target's heading minus bearing of the line of sight: 0 when it flies away from us.
     target_pitch_rad, target_roll_rad : (rows, targets)
+    own_alt_m : (rows,)
+    alt_m : (rows, targets)
+        Altitudes above the ellipsoid, for what changes with height.
     present : (rows, targets) of bool
     roster : Roster
     """
@@ -72,6 +75,8 @@ class RelativeTargets(Message):
     relative_heading_rad: FloatArray
     target_pitch_rad: FloatArray
     target_roll_rad: FloatArray
+    own_alt_m: FloatArray
+    alt_m: FloatArray
     present: BoolArray
     roster: Roster = static()
 

@@ -107,6 +107,7 @@ class Cells:
         #: Index of each cell's scan within this look, and of its target in the roster.
         self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
+        self._width = width
         self._flat = rows[self.row] * width + self.target
         self._everything = len(place) == targets.range_m.size
         self._gathered: dict[str, AnyArray] = {}
@@ -123,6 +124,10 @@ class Cells:
             flat = values.reshape(-1)
             gathered[name] = flat if self._everything else flat.take(self._flat)
         return gathered[name]
+
+    def of_row(self, name: str) -> AnyArray:
+        """Return a field of the message that has one value per row, for each cell."""
+        return getattr(self._targets, name).take(self._flat // self._width)
 
     def of_target(self, column: FloatArray) -> AnyArray:
         """Return a per-target column (shape (targets,)) for each cell."""

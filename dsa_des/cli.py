@@ -59,6 +59,13 @@ def _scene_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+_everything_option = click.option(
+    "--simulate-everything",
+    is_flag=True,
+    help="Build also the effects the scene does not call for; results must not change.",
+)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="dsa-des")
 def main() -> None:
@@ -70,6 +77,7 @@ def main() -> None:
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-NNN].")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON only.")
+@_everything_option
 @_plain_errors
 def run(**options: Any) -> None:
     """Run SCENE and say which sensor saw which intruder, when, and how far away."""
@@ -99,6 +107,18 @@ def graph(**options: Any) -> None:
     from dsa_des.commands.graph import show_graph
 
     show_graph(**options)
+
+
+@main.command()
+@_scene_options
+@click.option("--measure", is_flag=True, help="Run the scene and show each effect's share.")
+@_everything_option
+@_plain_errors
+def explain(**options: Any) -> None:
+    """Say which effects SCENE calls for, which it does not, and because of what."""
+    from dsa_des.commands.explain import explain_scene
+
+    explain_scene(**options)
 
 
 @main.command()

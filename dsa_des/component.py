@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 
 from dsa_des.clock import ClockSpec, parse_rational
+from dsa_des.effects import Effect
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.randomness import Stream, Streams
@@ -141,6 +142,11 @@ class Context:
         Blocks that our outputs feed, sorted by name; known when `Component.setup` is called.
     producers : list of Producer
         Blocks that feed our inputs, sorted by name; likewise.
+    sections : mapping
+        The scene's tables that belong to no block, by name (`dsa_des.sections`).
+    effects : dict
+        What was built of this block's effects, by name, in the order of their declaration; known
+        when `Component.setup` is called.
     """
 
     streams: Streams
@@ -148,6 +154,8 @@ class Context:
     duration_s: Fraction = Fraction(0)
     consumers: list[Consumer] = field(default_factory=list)
     producers: list[Producer] = field(default_factory=list)
+    sections: Mapping[str, Any] = field(default_factory=dict)
+    effects: dict[str, Any] = field(default_factory=dict)
 
 
 class Component:
@@ -167,6 +175,8 @@ class Component:
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
+    #: Physics that is built only when the scene calls for it (`dsa_des.effects`).
+    effects: ClassVar[tuple[Effect, ...]] = ()
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -221,6 +231,14 @@ class Component:
     def report(self) -> dict[str, Any]:
         """Return sections of the run's summary that only this block knows."""
         return {}
+
+    def built(self, acts_on: str) -> list[Any]:
+        """Return what was built of the effects that act on a quantity, in declared order."""
+        return [
+            self.context.effects[effect.name]
+            for effect in type(self).effects
+            if effect.acts_on == acts_on and effect.name in self.context.effects
+        ]
 
     def stream(self, purpose: str) -> Stream:
         """Return this block's keyed random numbers for one purpose."""

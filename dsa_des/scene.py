@@ -15,11 +15,13 @@ from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
 from dsa_des.graph import build_graph, check_graph
 from dsa_des.overrides import apply_set, apply_swap
 from dsa_des.registry import UnknownType, find
-from dsa_des.scene_checks import check_activity, check_times
+from dsa_des.scene_checks import check_activity, check_lookalikes, check_times
 from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, read_scene_file
+from dsa_des.sections import section_models
 from dsa_des.wiring import Wire, read_wires
 
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires")
+_TOLERANCE = "accuracy"
 _MAX_SEED = 2**63
 
 
@@ -52,6 +54,8 @@ class Scene:
     graph : networkx.DiGraph
     ticks_per_s : int
         The resolution in which every clock, offset and delay of the scene is exact.
+    sections : dict
+        Tables that belong to no block, by name; those the scene leaves out have their defaults.
     dropped : list of str
         Dotted keys of parameters that a swap dropped.
     """
@@ -65,7 +69,14 @@ class Scene:
     wires: list[Wire]
     graph: nx.DiGraph
     ticks_per_s: int
+    sections: dict[str, Parameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
+
+    @property
+    def tolerance(self) -> dict[str, float]:
+        """What ``[accuracy]`` allows, by quantity; empty when the scene has no such table."""
+        accuracy = self.sections.get(_TOLERANCE)
+        return {} if accuracy is None else accuracy.model_dump(exclude_none=True)
 
     @property
     def classes(self) -> dict[str, type[Component]]:
@@ -81,6 +92,10 @@ class Scene:
             tables["duration_s"] = _plain(self.duration_s)
         tables["seed"] = self.seed
         tables["wires"] = [_wire_table(wire) for wire in self.wires]
+        for name, section in self.sections.items():
+            values = section.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+            if values:
+                tables[name] = values
         tables["blocks"] = {
             name: {
                 "type": block.type_name,
@@ -140,14 +155,16 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     """
     problems = [] if problems is None else problems
     data = scene_file.data
+    known = (*_TOP_LEVEL, *section_models())
     for key in data:
-        if key not in _TOP_LEVEL:
-            hint = did_you_mean(key, _TOP_LEVEL)
+        if key not in known:
+            hint = did_you_mean(key, known)
             problems.append(scene_file.problem((key,), f"unknown key of a scene{hint}"))
     title = _text(scene_file, "title", problems) or Path(scene_file.path).stem
     description = _text(scene_file, "description", problems)
     seed = _seed(scene_file, problems)
     duration = _duration(scene_file, problems)
+    sections = _sections(scene_file, problems)
     classes, blocks = _blocks(scene_file, problems)
     unsure: set[str] = set()
     wires = read_wires(scene_file, classes, problems, unsure)
@@ -168,6 +185,7 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
         wires,
         graph,
         ticks_per_s,
+        sections,
     )
 
 
@@ -207,6 +225,20 @@ def _duration(scene_file: SceneFile, problems: list[Problem]) -> Fraction | None
     return duration
 
 
+def _sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, Parameters]:
+    sections: dict[str, Parameters] = {}
+    for name, model in section_models().items():
+        table = scene_file.data.get(name, {})
+        if not isinstance(table, dict):
+            problems.append(scene_file.problem((name,), "must be a table", table))
+            continue
+        try:
+            sections[name] = model.model_validate(table)
+        except ValidationError as error:
+            problems += _explain(scene_file, (name,), f"[{name}]", model, error)
+    return sections
+
+
 def _blocks(
     scene_file: SceneFile, problems: list[Problem]
 ) -> tuple[dict[str, Any], dict[str, Block]]:
@@ -238,27 +270,28 @@ def _blocks(
         try:
             parameters = cls.Parameters.model_validate(given)
         except ValidationError as error:
-            problems += _explain(scene_file, key, str(type_name), cls, error)
+            problems += _explain(scene_file, key, str(type_name), cls.Parameters, error)
             continue
+        check_lookalikes(scene_file, key, given, cls.Parameters, problems)
         blocks[name] = Block(name, str(type_name), cls, parameters)
     return classes, blocks
 
 
 def _explain(
-    scene_file: SceneFile, key: Key, type_name: str, cls: type[Component], error: ValidationError
+    scene_file: SceneFile, key: Key, what: str, model: Any, error: ValidationError
 ) -> list[Problem]:
     problems = []
     for item in error.errors(include_url=False):
         at = _existing_path(scene_file, key, item["loc"])
         if item["type"] == "extra_forbidden":
-            allowed = _sibling_names(cls.Parameters, item["loc"])
+            allowed = _sibling_names(model, item["loc"])
             hint = did_you_mean(str(item["loc"][-1]), allowed)
-            problems.append(scene_file.problem(at, f"unknown parameter of {type_name}{hint}"))
+            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
         elif item["type"] == "missing":
             given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
             close = nearest(str(item["loc"][-1]), given)
             hint = f" ({close!r} is given)" if close else ""
-            problems.append(scene_file.problem(at, f"is required by {type_name} and missing{hint}"))
+            problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)

@@ -1,12 +1,13 @@
 """Checks of a scene that need both its wiring and the parameters of its blocks.
 
-Clocks that 64-bit ticks cannot hold, blocks that would never run, and wires that would hold a
-message where nobody looks for it.
+Values of the wrong kind, clocks that 64-bit ticks cannot hold, blocks that would never run, and
+wires that would hold a message where nobody looks for it.
 """
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 from dsa_des.clock import MAX_TICK, ClockSpec, resolution
 from dsa_des.errors import Problem
@@ -18,6 +19,27 @@ if TYPE_CHECKING:
 
 # Assumed where a scene leaves its length to its sources.
 _A_DAY = Fraction(86400)
+
+
+def check_lookalikes(
+    scene: SceneFile, key: Key, given: Mapping[str, Any], model: Any, problems: list[Problem]
+) -> None:
+    """Add values that pydantic would quietly convert: ``true`` or ``"5"`` for a number."""
+    for name, value in given.items():
+        declared = model.model_fields.get(name)
+        if declared is None:
+            continue
+        union = get_origin(declared.annotation) in (Union, UnionType)
+        options = get_args(declared.annotation) if union else (declared.annotation,)
+        kinds = set(options) - {type(None)}
+        message = ""
+        if kinds <= {int, float} and isinstance(value, bool | str):
+            message = "must be a number"
+        elif kinds == {bool} and not isinstance(value, bool):
+            message = "must be true or false"
+        if message:
+            shown = str(value) if isinstance(value, str) else value
+            problems.append(scene.problem((*key, name), message, shown))
 
 
 def check_times(

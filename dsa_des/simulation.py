@@ -19,6 +19,7 @@ import simpy
 from dsa_des.channel import Channel
 from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
+from dsa_des.effects import Planned, plan
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order, windowed_blocks
 from dsa_des.pinpoint import pinpoint
@@ -69,6 +70,10 @@ class Simulation:
     recorder : Recorder, optional
     trace : list, optional
         Receives ``(tick, block)`` for every instant a block runs at, in order of execution.
+    simulate_everything : bool
+        Build also the effects that the scene does not call for, where they can be neutral.
+    wrap_effect : callable, optional
+        Given each planned effect and what was built of it, returns what is used instead.
     cuts : iterable of int
         Ticks at which look-ahead windows are cut in two; results do not depend on them.
 
@@ -86,6 +91,8 @@ class Simulation:
         shuffle_ties: int | None = None,
         recorder: Recorder | None = None,
         trace: list[tuple[int, str]] | None = None,
+        simulate_everything: bool = False,
+        wrap_effect: Callable[[Planned, Any], Any] | None = None,
         cuts: Iterable[int] = (),
     ) -> None:
         if window is not None and window < 1:
@@ -104,6 +111,7 @@ class Simulation:
         self._depth = depths(scene.graph)
         self.components = self._build_components()
         self.duration_s = self._duration()
+        self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
         self._connect()
@@ -116,7 +124,7 @@ class Simulation:
         components: dict[str, Component] = {}
         problems: list[Problem] = []
         for name, block in self.scene.blocks.items():
-            context = Context(streams, self.ticks_per_s)
+            context = Context(streams, self.ticks_per_s, sections=self.scene.sections)
             try:
                 components[name] = block.cls(name, block.parameters, context)
             except (ValueError, OSError) as error:
@@ -140,11 +148,33 @@ class Simulation:
             raise SceneError([self._problem("duration_s", message)])
         return max(known)
 
+    def _plan_effects(
+        self, everything: bool, wrap: Callable[[Planned, Any], Any] | None
+    ) -> list[Planned]:
+        """Decide which effects exist in this run and build them."""
+        planned: list[Planned] = []
+        problems: list[Problem] = []
+        for name, component in self.components.items():
+            component.context.duration_s = self.duration_s
+            try:
+                found = plan(component, self.scene.tolerance, everything=everything)
+                built = {i: i.effect.build(component) for i in found if i.built}
+            except (ValueError, OSError) as error:
+                problems.append(self._problem(f"blocks.{name}", error))
+                continue
+            planned += found
+            component.context.effects = {
+                item.effect.name: effect if wrap is None else wrap(item, effect)
+                for item, effect in built.items()
+            }
+        if problems:
+            raise SceneError(problems)
+        return planned
+
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
         for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
             component = self.components[name]
-            component.context.duration_s = self.duration_s
             component.context.consumers = [
                 Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
                 for wire in self.scene.wires
@@ -273,8 +303,9 @@ class Simulation:
             self.recorder.open([output.message for output in outputs], self.ticks_per_s)
         for node in self.nodes.values():
             node.start()
-        for self.window in self._windows(end):
-            self._run_window(*self.window)
+        for window in self._windows(end):
+            self.window = window
+            self._run_window(*window)
             if self.recorder is not None:
                 self.recorder.advance(self.window[1])
             if progress is not None:

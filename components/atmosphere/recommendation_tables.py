@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +13,14 @@ from components.radar.inputs import FloatArray
 _FOLDER = Path(__file__).parent / "data"
 
 
-@lru_cache(maxsize=None)
+@cache
 def rows(name: str) -> tuple[dict[str, str], ...]:
     """Return the rows of ``data/<name>.csv`` as dictionaries; lines starting with # are notes."""
     with open(_FOLDER / f"{name}.csv", encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-@lru_cache(maxsize=None)
+@cache
 def columns(name: str) -> dict[str, FloatArray]:
     """Return the columns of ``data/<name>.csv`` as read-only float64 arrays."""
     table = rows(name)

@@ -72,6 +72,8 @@ class Transform(Component):
             relative_heading_rad=wrap_pi(states.yaw_rad - azimuth),
             target_pitch_rad=states.pitch_rad,
             target_roll_rad=states.roll_rad,
+            own_alt_m=states.own_alt_m,
+            alt_m=states.alt_m,
             present=states.present,
             roster=states.roster,
         )

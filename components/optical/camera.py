@@ -8,6 +8,7 @@ from pydantic import Field
 
 from components.optical.line_of_sight_rate import line_of_sight_rate
 from components.optical.signature import confidence, pixels_covered, total_signature
+from components.optical.weather_effects import Visibility
 from components.sensor import Cells, Look, Sensor, SensorParameters
 from dsa_des.types import FloatArray
 from dsa_des.wake import Wake
@@ -40,6 +41,7 @@ class Camera(Sensor):
     """
 
     Parameters = CameraParameters
+    effects = (Visibility(),)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -53,8 +55,13 @@ class Camera(Sensor):
             self.azimuth_step_rad = self.pixel_azimuth_rad
         if not parameters.elevation_resolution_deg:
             self.elevation_step_rad = self.pixel_elevation_rad
+        self._contrast_factors: list[Any] = []
         # Tick and NED angles of the last scan, one column per target; NaN where it saw none.
         self._last_look: tuple[int, FloatArray, FloatArray] | None = None
+
+    def setup(self) -> None:
+        """Take what the scene's effects do to the contrast."""
+        self._contrast_factors = self.built("contrast")
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell, m²."""
@@ -79,10 +86,13 @@ class Camera(Sensor):
             sensor_pixels=float(self.p.azimuth_pixels * self.p.elevation_pixels),
         )
         rate = self._rate(cells) if self.p.dynamic_weight > 0 else 0.0
+        contrast = self.contrast(cells)
+        for factor in self._contrast_factors:
+            contrast = contrast * factor(cells)
         signature = total_signature(
             pixels,
             rate,
-            contrast_gain=self.contrast(cells),
+            contrast_gain=contrast,
             static_weight=self.p.static_weight,
             dynamic_weight=self.p.dynamic_weight,
         )

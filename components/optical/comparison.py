@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from os import PathLike
 from typing import Any
 
@@ -23,6 +24,13 @@ _STARTS = {
     "y": "from the nose (0) over the top (90) to the tail (180)",
     "z": "from the nose (0) past the right wing (90) to the tail (180)",
 }
+
+# Hollow marks of falling size, so that curves that coincide are all seen.
+_STYLES: list[dict[str, Any]] = [
+    {"marker": "s", "linestyle": "--", "markersize": 7.0},
+    {"marker": "^", "linestyle": ":", "markersize": 4.5},
+    {"marker": "d", "linestyle": "-.", "markersize": 3.0},
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,15 +219,13 @@ def draw_comparison(
     FigureCanvasAgg(figure)
     panels = figure.subplots(3, 1, sharex=True, sharey=True)
     for panel, axis in zip(panels, AXES, strict=True):
-        curves: dict[str, tuple[FloatArray, FloatArray, str]] = {}
-        for one in comparisons:
-            if one.axis == axis:
-                curves[one.reference] = (one.angle_deg, one.reference_share, "o-")
-        for one in comparisons:
-            if one.axis == axis:
-                curves[f"{one.model} model"] = (one.angle_deg, one.model_share, "s--")
-        for name, (angle_deg, share, style) in curves.items():
-            panel.plot(angle_deg, share, style, label=name, markersize=3.5, linewidth=1.2)
+        shown = [one for one in comparisons if one.axis == axis]
+        curves = {one.reference: (one.angle_deg, one.reference_share) for one in shown}
+        for name, (angle_deg, share) in curves.items():
+            panel.plot(angle_deg, share, "o-", label=name, markersize=3.5, linewidth=1.2)
+        curves = {f"{one.model} model": (one.angle_deg, one.model_share) for one in shown}
+        for (name, (angle_deg, share)), style in zip(curves.items(), cycle(_STYLES)):
+            panel.plot(angle_deg, share, label=name, fillstyle="none", linewidth=1.2, **style)
         panel.set_title(f"Rotation about {axis}: {_STARTS[axis]}", fontsize=9)
         panel.set_ylabel("Signature\n[share of maximum]")
         panel.grid(True, alpha=0.3)

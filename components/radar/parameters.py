@@ -1,7 +1,7 @@
 """Parameters that radar blocks share, and the link budget they describe."""
 
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -54,6 +54,9 @@ class LinkBudgetParameters(RadarParameters):
     )
     false_alarm_probability: float = Field(
         default=0.05, gt=0, lt=1, description="Probability of false alarm per look and cell."
+    )
+    polarisation: Literal["horizontal", "vertical", "circular"] = Field(
+        default="circular", description="Polarisation of the wave; rain attenuates each unlike."
     )
     pulses: int = Field(default=1, ge=1, description="Pulses integrated non-coherently.")
 

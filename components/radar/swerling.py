@@ -1,5 +1,6 @@
 """A radar that detects with the probability its SNR gives (``radar.swerling``, thesis §4.1.2)."""
 
+import math
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -99,7 +100,22 @@ class SwerlingRadar(LinkBudgetRadar):
             rcs[chosen] = scan_rcs(
                 rcs[chosen], draw, pulses=self.p.pulses, model=f"swerling{model}"
             )
-        return self.budget.snr(cells.range_m, rcs)
+        return self.echo_snr(cells, rcs)
+
+    def steepest_pd(self) -> float:
+        """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid."""
+        log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
+        steepest = 0.0
+        for model in range(5):
+            pd = detection_probability(
+                np.exp(log_snr),
+                pulses=self.p.pulses,
+                false_alarm_probability=self.p.false_alarm_probability,
+                model=f"swerling{model}",
+            )
+            steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
+        # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
+        return 1.01 * steepest
 
     def _detection_models(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""

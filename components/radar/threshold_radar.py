@@ -8,6 +8,7 @@ from pydantic import Field
 from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.required_snr import required_snr
+from components.radar.weather_effects import WEATHER_EFFECTS, CellFactor
 from components.sensor import Cells, Look, Sensor
 from dsa_des.types import FloatArray
 
@@ -26,14 +27,31 @@ class LinkBudgetRadar(Sensor):
 
     Parameters = LinkBudgetParameters
     measures_range = True
+    effects = WEATHER_EFFECTS
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.budget = parameters.link_budget()
+        self._snr_factors: list[CellFactor] = []
+
+    def setup(self) -> None:
+        """Take what the scene's effects do to the SNR."""
+        self._snr_factors = self.built("SNR")
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.budget.snr(cells.range_m, mean_rcs_m2(cells))
+        return self.echo_snr(cells, mean_rcs_m2(cells))
+
+    def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
+        """Return each cell's SNR for the given cross-sections, with all losses on the way."""
+        snr = self.budget.snr(cells.range_m, rcs_m2)
+        for factor in self._snr_factors:
+            snr = snr * factor(cells)
+        return snr
+
+    def steepest_pd(self) -> float | None:
+        """Return the largest |dPd / d ln SNR| of any target, or None where Pd jumps."""
+        return None
 
     def required_snr_db(self, pd: float, model: str) -> float:
         """Return the mean SNR in dB at which the probability of detection is `pd`."""

@@ -32,13 +32,14 @@ def run_scene(
     out: str | None,
     quiet: bool,
     as_json: bool,
+    simulate_everything: bool,
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     loaded = load(scene, sets, swaps, seed, duration)
     target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
     check_target(target)
     recorder = Recorder([])
-    simulation = Simulation(loaded, recorder=recorder)
+    simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     reports = load_reports()
     observers = ObserverSink(
         observer for report in reports for observer in report.observers(simulation)

@@ -1,5 +1,6 @@
 """Scan clocks never drift: every instant is what rational arithmetic says, after any time."""
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -46,7 +47,9 @@ def test_two_clocks_meet_exactly_as_often_as_rational_arithmetic_says(
     rate_a, rate_b, seconds, common
 ):
     (a, b), ticks_per_s = clocks_of(spec_of(rate_a), spec_of(rate_b))
-    met = np.intersect1d(ticks_within(a, ticks_per_s, seconds), ticks_within(b, ticks_per_s, seconds))
+    met = np.intersect1d(
+        ticks_within(a, ticks_per_s, seconds), ticks_within(b, ticks_per_s, seconds)
+    )
     assert len(met) == common
 
 
@@ -140,7 +143,7 @@ def test_windows_partition_the_scans(rate, offset, ppm, jitter_s, cuts, later):
     (clock,), ticks_per_s = clocks_of(spec)
     bounds = sorted({int((later + cut) * ticks_per_s) for cut in [0, 4, *cuts]})
     whole = clock.between(bounds[0], bounds[-1])
-    parts = [clock.between(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
+    parts = [clock.between(a, b) for a, b in itertools.pairwise(bounds)]
     for position in (0, 1):
         assert np.array_equal(np.concatenate([part[position] for part in parts]), whole[position])
     scans, ticks = whole

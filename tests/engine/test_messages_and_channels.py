@@ -1,5 +1,7 @@
 """Rows of messages can be cut and joined anywhere, and a channel shows only what has arrived."""
 
+import itertools
+
 import engine_blocks as blocks
 import numpy as np
 import pytest
@@ -34,7 +36,7 @@ def rows_in(message):
     assert np.array_equal(message.columns["twice"], 2 * message.entry)
     assert message.columns["none"] is None
     assert message.label == "same"
-    rows = [message.entry[a:b].tolist() for a, b in zip(o, o[1:], strict=False)]
+    rows = [message.entry[a:b].tolist() for a, b in itertools.pairwise(o)]
     assert message.value.tolist() == [sum(row) for row in rows]
     return rows
 
@@ -44,7 +46,10 @@ def rows_in(message):
 def test_taking_rows_takes_their_entries(rows, data):
     message = ragged(rows)
     count = len(rows)
-    start, stop = data.draw(st.integers(-count - 2, count + 2)), data.draw(st.integers(-3, count + 2))
+    start, stop = (
+        data.draw(st.integers(-count - 2, count + 2)),
+        data.draw(st.integers(-3, count + 2)),
+    )
     step = data.draw(st.sampled_from([None, 1, 2, 3]))
     cut = slice(start, stop, step)
     assert rows_in(message.take(cut)) == rows[cut]
@@ -60,7 +65,7 @@ def test_taking_rows_takes_their_entries(rows, data):
 def test_cutting_and_joining_gives_the_message_back(rows, cuts):
     message = ragged(rows)
     bounds = [0, *sorted(min(cut, len(rows)) for cut in cuts), len(rows)]
-    parts = [message.take(slice(a, b)) for a, b in zip(bounds, bounds[1:], strict=False)]
+    parts = [message.take(slice(a, b)) for a, b in itertools.pairwise(bounds)]
     whole = blocks.Ragged.concatenate(parts)
     assert rows_in(whole) == rows
     assert whole.tick.tolist() == message.tick.tolist()
@@ -151,7 +156,7 @@ def test_sampling_in_windows_equals_looking_back_over_a_list(sent, batches, dela
         channel.push(beats(sent[start : start + size], start))
     found = []
     bounds = [0, *sorted(windows), 61]
-    for a, b in zip(bounds, bounds[1:], strict=False):
+    for a, b in itertools.pairwise(bounds):
         ticks = np.array([t for t in asked if a <= t < b], dtype=np.int64)
         if len(ticks):
             sample = channel.sample(ticks, b)

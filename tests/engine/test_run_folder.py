@@ -9,7 +9,14 @@ import pytest
 
 import dsa_des
 from dsa_des.errors import UsageError
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, read_run, write_json, writing
+from dsa_des.run_folder import (
+    RUN_JSON,
+    check_target,
+    new_folder_name,
+    read_run,
+    write_json,
+    writing,
+)
 
 
 def fill(folder, rows=3):

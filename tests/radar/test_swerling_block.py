@@ -49,6 +49,8 @@ def cells_of(crafts, scans, *, range_m=6000.0, heading=math.pi, pitch=0.0, roll=
         relative_heading_rad=np.broadcast_to(heading, shape).copy(),
         target_pitch_rad=np.broadcast_to(pitch, shape).copy(),
         target_roll_rad=np.broadcast_to(roll, shape).copy(),
+        own_alt_m=np.zeros(scans),
+        alt_m=azimuth,
         present=np.ones(shape, dtype=bool),
         roster=roster,
     )

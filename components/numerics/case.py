@@ -1,0 +1,57 @@
+"""What is a hard case, and how does its number become text?"""
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+DIGITS = 12
+
+
+@dataclass(frozen=True)
+class Case:
+    """One hard case with three results.
+
+    Parameters
+    ----------
+    what : str
+        The case and the quantity with its unit.
+    formula : str
+        The naive way.
+    naive, ours, reference : float
+    source : str
+        Where the reference comes from.
+    digits : int
+        Significant digits shown. Our last digits may depend on the machine's mathematical library:
+        show fewer than are exact.
+    """
+
+    what: str
+    formula: str
+    naive: float
+    ours: float
+    reference: float
+    source: str
+    digits: int = DIGITS
+
+    def text(self, value: float) -> str:
+        """Return a value as it is shown."""
+        if value != value:
+            return "NaN"
+        whole = float(value).is_integer() and abs(value) < 1e15
+        return str(int(value)) if whole else f"{float(value):.{self.digits}g}"
+
+
+def multiprecision() -> Any:
+    """Return the library mpmath, which the references are computed with.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module("mpmath")
+    except ImportError as error:
+        raise ImportError(
+            "the references need the library mpmath: pip install 'dsa-des[test]'"
+        ) from error

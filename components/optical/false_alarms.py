@@ -1,0 +1,99 @@
+"""Does a camera frame bring a false alarm, and where in the picture?
+
+Pure functions of uniform numbers in [0, 1), which the block draws with its own keys.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.optical.arrays import as_finite, flatten_together, require, unflatten
+
+#: AFRL flight tests with a Beech Bonanza (thesis section 2.4.1): 0.045 % and 0.01 %, read as the
+#: probability of a false detection per frame (assumption).
+AFRL_LOW_THRESHOLD = 0.00045
+AFRL_HIGH_THRESHOLD = 0.0001
+
+
+def false_alarm_in_frame(uniform: ArrayLike, false_alarm_probability: ArrayLike) -> Any:
+    """Say which frames bring a false alarm; a frame brings one at most.
+
+    Parameters
+    ----------
+    uniform : array_like
+        In [0, 1), one per frame.
+    false_alarm_probability : array_like
+        Per frame, in [0, 1]; `AFRL_LOW_THRESHOLD` or `AFRL_HIGH_THRESHOLD` for the thesis's camera.
+
+    Returns
+    -------
+    array of bool, the broadcast shape
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+    """
+    draws = _unit("uniform", uniform)
+    probability = as_finite("false_alarm_probability", false_alarm_probability)
+    allowed = (probability >= 0.0) & (probability <= 1.0)
+    require("false_alarm_probability", probability, allowed, "in [0, 1]")
+    return draws < probability
+
+
+def false_alarm_direction(
+    azimuth_uniform: ArrayLike,
+    elevation_uniform: ArrayLike,
+    *,
+    azimuth_start_rad: float,
+    azimuth_width_rad: float,
+    lowest_elevation_rad: float,
+    highest_elevation_rad: float,
+) -> tuple[Any, Any]:
+    """Return where in the picture false alarms appear: every pixel is as likely.
+
+    Parameters
+    ----------
+    azimuth_uniform, elevation_uniform : array_like
+        In [0, 1), one of each per false alarm.
+    azimuth_start_rad, azimuth_width_rad : float, rad
+        The field of view runs clockwise from the start over the width, (0, 2π].
+    lowest_elevation_rad, highest_elevation_rad : float, rad
+
+    Returns
+    -------
+    azimuth_rad, elevation_rad : arrays of the broadcast shape
+        Not yet rounded to the pixel grid; azimuth not wrapped.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+
+    Notes
+    -----
+    Evenly over azimuth and elevation, as pixels are; not over solid angle.
+    """
+    width = as_finite("azimuth_width_rad", azimuth_width_rad)
+    good = (width > 0.0) & (width <= 2.0 * np.pi * (1.0 + 1e-12))
+    require("azimuth_width_rad", width, good, "in (0, 2π]")
+    lowest = as_finite("lowest_elevation_rad", lowest_elevation_rad)
+    highest = as_finite("highest_elevation_rad", highest_elevation_rad)
+    require("highest_elevation_rad", highest, highest >= lowest, "at least the lowest elevation")
+    start = as_finite("azimuth_start_rad", azimuth_start_rad)
+    shape, (across, upwards) = flatten_together(
+        azimuth_uniform=_unit("azimuth_uniform", azimuth_uniform),
+        elevation_uniform=_unit("elevation_uniform", elevation_uniform),
+    )
+    azimuth = start + width * across
+    elevation = lowest + (highest - lowest) * upwards
+    return unflatten(azimuth, shape), unflatten(elevation, shape)
+
+
+def _unit(name: str, value: ArrayLike) -> Any:
+    array = as_finite(name, value)
+    require(name, array, (array >= 0.0) & (array < 1.0), "in [0, 1)")
+    return array

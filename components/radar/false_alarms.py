@@ -1,0 +1,306 @@
+"""How many false alarms does a radar scan bring, and where?
+
+Pure functions of uniform numbers in [0, 1), which the block draws with its own keys.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from components.radar.inputs import (
+    FloatArray,
+    as_numbers,
+    broadcast_flat,
+    checked_probability,
+    checked_pulses,
+    positive,
+    refuse,
+    unflatten,
+)
+from components.radar.threshold import detection_threshold
+
+MOST_CELLS = 10**15
+MOST_FALSE_ALARMS = 1e7
+
+
+@dataclass(frozen=True)
+class ResolutionCells:
+    """Describe the grid of resolution cells that fills a radar's field of view.
+
+    Build it with `resolution_cells`.
+
+    Parameters
+    ----------
+    azimuth, elevation, range : int
+        Number of cells along each axis.
+    azimuth_rad, elevation_rad, range_m : (float, float)
+        First edge and width of the field of view along each axis.
+    """
+
+    azimuth: int
+    elevation: int
+    range: int
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+    range_m: tuple[float, float]
+
+    @property
+    def count(self) -> int:
+        """Number of resolution cells."""
+        return self.azimuth * self.elevation * self.range
+
+
+def resolution_cells(
+    *,
+    azimuth_width_rad: float,
+    lowest_elevation_rad: float,
+    highest_elevation_rad: float,
+    nearest_m: float,
+    farthest_m: float,
+    azimuth_cell_rad: float,
+    elevation_cell_rad: float,
+    range_cell_m: float,
+    azimuth_start_rad: float = 0.0,
+) -> ResolutionCells:
+    """Return the grid of resolution cells of a field of view.
+
+    Parameters
+    ----------
+    azimuth_start_rad, azimuth_width_rad : float, rad
+        The field of view runs clockwise from the start over the width, (0, 2π].
+    lowest_elevation_rad, highest_elevation_rad : float, rad
+    nearest_m, farthest_m : float, m
+        Ranges processed; blind range excluded.
+    azimuth_cell_rad, elevation_cell_rad, range_cell_m : float
+        Size of a resolution cell, above 0. A remainder counts as a cell; the cells of an axis are
+        then made equally a little smaller, so that they fill the field of view.
+
+    Returns
+    -------
+    ResolutionCells
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or there would be over 1e15 cells.
+    """
+    values = {
+        "azimuth_cell_rad": azimuth_cell_rad,
+        "elevation_cell_rad": elevation_cell_rad,
+        "range_cell_m": range_cell_m,
+        "azimuth_width_rad": azimuth_width_rad,
+    }
+    for name, value in values.items():
+        positive(name, value)
+    if not azimuth_width_rad <= 2.0 * math.pi * (1.0 + 1e-12):
+        raise ValueError(f"azimuth_width_rad is {azimuth_width_rad:g}: it must be at most 2π")
+    if not lowest_elevation_rad <= highest_elevation_rad:
+        raise ValueError(
+            f"highest_elevation_rad is {highest_elevation_rad:g}: it must be at least "
+            f"lowest_elevation_rad, {lowest_elevation_rad:g}"
+        )
+    if not (0.0 <= nearest_m < farthest_m and math.isfinite(farthest_m)):
+        raise ValueError(
+            f"farthest_m is {farthest_m:g}: it must be finite and above nearest_m, {nearest_m:g}, "
+            "which must be 0 or more"
+        )
+    widths = (
+        (azimuth_width_rad, azimuth_cell_rad),
+        (highest_elevation_rad - lowest_elevation_rad, elevation_cell_rad),
+        (farthest_m - nearest_m, range_cell_m),
+    )
+    # A width that is a whole number of cells up to rounding has that many.
+    counts = [max(1, math.ceil(width / cell - 1e-9)) for width, cell in widths]
+    cells = ResolutionCells(
+        azimuth=counts[0],
+        elevation=counts[1],
+        range=counts[2],
+        azimuth_rad=(azimuth_start_rad, widths[0][0]),
+        elevation_rad=(lowest_elevation_rad, widths[1][0]),
+        range_m=(nearest_m, widths[2][0]),
+    )
+    if cells.count > MOST_CELLS:
+        raise ValueError(
+            f"the field of view has {cells.count:g} resolution cells: it must have at most 1e15; "
+            "make the cells larger"
+        )
+    return cells
+
+
+def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability: float) -> Any:
+    """Return the number of false alarms of each scan: Binomial(cells, Pfa) from one uniform each.
+
+    Parameters
+    ----------
+    uniform : array_like
+        In [0, 1), one per scan.
+    cells : int
+        Resolution cells looked at in a scan, 0 or more.
+    false_alarm_probability : float
+        Per cell and look, in [0, 1].
+
+    Returns
+    -------
+    array of int64, the shape of `uniform`
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or more than 1e7 false alarms are expected in a scan.
+
+    Notes
+    -----
+    The smallest count whose cumulative probability exceeds the uniform number. The probabilities
+    come from the most likely count outwards by exact ratios and are normalised by their own sum,
+    so that no factorial of a large number is needed; counts with a probability below 1e-20 of the
+    largest are left out. One table per (cells, Pfa), remembered.
+    """
+    number = _checked_cells(cells)
+    pfa = as_numbers("false_alarm_probability", false_alarm_probability)
+    refuse(
+        "false_alarm_probability",
+        pfa,
+        np.atleast_1d(~((pfa >= 0.0) & (pfa <= 1.0)) | (pfa.ndim > 0)),
+        "be one number in [0, 1]",
+    )
+    draws = _checked_uniform("uniform", uniform)
+    if number * float(pfa) > MOST_FALSE_ALARMS:
+        raise ValueError(
+            f"false_alarm_probability is {float(pfa):g}: with {number:g} cells it must be at most "
+            f"{MOST_FALSE_ALARMS / number:g}, for 1e7 false alarms in a scan"
+        )
+    first, cumulative = _binomial(number, float(pfa))
+    place = np.searchsorted(cumulative, draws.reshape(-1), side="right")
+    found = first + np.minimum(place, len(cumulative) - 1)
+    return unflatten(found.astype(np.int64), draws.shape)
+
+
+def false_alarm_positions(
+    azimuth_uniform: ArrayLike,
+    elevation_uniform: ArrayLike,
+    range_uniform: ArrayLike,
+    cells: ResolutionCells,
+) -> tuple[Any, Any, Any]:
+    """Return where false alarms appear: at the centre of a cell, every cell being as likely.
+
+    Two false alarms of a scan may fall into the same cell. That happens to a share of about Pfa/2
+    of them; a block that minds takes each cell once.
+
+    Parameters
+    ----------
+    azimuth_uniform, elevation_uniform, range_uniform : array_like
+        In [0, 1), one of each per false alarm.
+    cells : ResolutionCells
+
+    Returns
+    -------
+    azimuth_rad, elevation_rad, range_m : arrays of the broadcast shape
+        In the frame in which the field of view was given; azimuth not wrapped.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside [0, 1).
+    """
+    shape, flat = broadcast_flat(
+        azimuth_uniform=_checked_uniform("azimuth_uniform", azimuth_uniform),
+        elevation_uniform=_checked_uniform("elevation_uniform", elevation_uniform),
+        range_uniform=_checked_uniform("range_uniform", range_uniform),
+    )
+    axes = (
+        (cells.azimuth, cells.azimuth_rad),
+        (cells.elevation, cells.elevation_rad),
+        (cells.range, cells.range_m),
+    )
+    azimuth, elevation, distance = (
+        unflatten(_centre(uniform, count, *field), shape)
+        for uniform, (count, field) in zip(flat, axes, strict=True)
+    )
+    return azimuth, elevation, distance
+
+
+def false_alarm_snr(uniform: ArrayLike, *, false_alarm_probability: float, pulses: int = 1) -> Any:
+    """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
+
+    Parameters
+    ----------
+    uniform : array_like
+        In [0, 1), one per false alarm.
+    false_alarm_probability : float
+        Strictly between 0 and 1; it sets the threshold.
+    pulses : int
+        Pulses summed non-coherently.
+
+    Returns
+    -------
+    array, linear power ratio per pulse
+        Detector output over its mean for noise, minus 1; never below 0.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+
+    Notes
+    -----
+    The tail of Gamma(pulses, 1) beyond the threshold, inverted; for one pulse it is the threshold
+    plus an exponential number.
+    """
+    count = checked_pulses(pulses)
+    pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
+    draws = _checked_uniform("uniform", uniform)
+    flat = np.ascontiguousarray(draws).reshape(-1)
+    if float(count) == 1.0:
+        output = float(detection_threshold(1, pfa)) - np.log1p(-flat)
+    else:
+        from scipy.special import gammainccinv
+
+        output = gammainccinv(float(count), pfa * (1.0 - flat))
+    return unflatten(np.maximum(output / float(count) - 1.0, 0.0), draws.shape)
+
+
+def _centre(uniform: FloatArray, count: int, start: float, width: float) -> FloatArray:
+    cell = np.minimum(np.floor(uniform * count), count - 1.0)
+    return start + width * ((cell + 0.5) / count)
+
+
+def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:
+    array = as_numbers(name, value)
+    refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "lie in [0, 1)")
+    return array
+
+
+def _checked_cells(cells: int) -> int:
+    if isinstance(cells, bool) or int(cells) != cells or not 0 <= cells <= MOST_CELLS:
+        raise ValueError(f"cells is {cells!r}: it must be a whole number from 0 to 1e15")
+    return int(cells)
+
+
+@lru_cache(maxsize=256)
+def _binomial(cells: int, probability: float) -> tuple[int, NDArray[np.float64]]:
+    """Return the first count that matters and the cumulative probabilities from it on."""
+    if cells == 0 or probability == 0.0:
+        return 0, np.array([1.0])
+    if probability == 1.0:
+        return cells, np.array([1.0])
+    mode = min(cells, int((cells + 1) * probability))
+    spread = math.sqrt(max(cells * probability * (1.0 - probability), 1.0))
+    reach = int(10.0 * spread) + 60
+    first, last = max(0, mode - reach), min(cells, mode + reach)
+    odds = probability / (1.0 - probability)
+    up = np.arange(mode, last, dtype=np.float64)
+    down = np.arange(mode, first, -1, dtype=np.float64)
+    with np.errstate(under="ignore"):  # the tails fade to 0
+        above = np.cumprod((cells - up) / (up + 1.0) * odds)
+        below = np.cumprod(down / ((cells - down + 1.0) * odds))
+        weight = np.concatenate((below[::-1], [1.0], above))
+        cumulative = np.cumsum(weight)
+    cumulative /= cumulative[-1]
+    cumulative.flags.writeable = False
+    return first, cumulative

@@ -1,0 +1,133 @@
+"""What the air takes from a radar's echo: gas, rain and fog, on the way there and back."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
+from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
+from components.environment import Weather
+from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
+from components.sensor import Cells
+from dsa_des.effects import Effect, Verdict
+from dsa_des.types import FloatArray
+
+CellFactor = Callable[[Cells], FloatArray]
+
+
+class Attenuation(Effect):
+    """Loss along the slant path, evaluated once per run into a table over altitude."""
+
+    acts_on = "SNR"
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the arguments of the table for this effect and no other."""
+        raise TypeError(f"{type(self).__name__} has no settings")
+
+    def build(self, block: Any) -> CellFactor:
+        """Return the factor on every cell's SNR."""
+        weather = block.context.sections["weather"]
+        table = attenuation_table(
+            SPEED_OF_LIGHT_M_S / block.budget.wavelength,
+            **{"gas": False, **self.settings(weather, block)},
+        )
+
+        def factor(cells: Cells) -> FloatArray:
+            loss_db = one_way_attenuation_db(
+                cells.range_m, cells.of_row("own_alt_m"), cells.alt_m, table
+            )
+            return two_way_transmission(loss_db)
+
+        return factor
+
+    def bound(self, block: Any) -> dict[str, float]:
+        """Return the largest influence on Pd inside the radar's range, where it has one.
+
+        The loss is at most its sea-level value times the range, and Pd falls by at most
+        max |dPd / d ln SNR| per unit of ln SNR.
+        """
+        reach_m = block.reach.range_max_m
+        steepness = block.steepest_pd()
+        if not math.isfinite(reach_m) or steepness is None:
+            return {}
+        weather = block.context.sections["weather"]
+        table = attenuation_table(
+            SPEED_OF_LIGHT_M_S / block.budget.wavelength,
+            **{"gas": False, **self.settings(weather, block)},
+        )
+        most_db = 2.0 * worst_one_way_db(table, reach_m)
+        influence = steepness * most_db * math.log(10.0) / 10.0
+        return {"detection_probability": min(1.0, influence)}
+
+
+def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
+    """Return the largest one-way loss of any path up to `reach_m` long, dB."""
+    altitudes = np.arange(-1000.0, 40_001.0, 25.0)
+    level = one_way_attenuation_db(np.full(altitudes.shape, reach_m), altitudes, altitudes, table)
+    slanted = one_way_attenuation_db(
+        np.full(altitudes.shape, reach_m), altitudes, altitudes + reach_m, table
+    )
+    # Rain's coefficient depends on the path's elevation by a few per cent; 10 % covers it.
+    return 1.1 * float(max(level.max(), slanted.max()))
+
+
+class Gas(Attenuation):
+    """Oxygen and water vapour (ITU-R P.676-12, reference atmosphere P.835-6)."""
+
+    name = "gas attenuation"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] gas``."""
+        if block.context.sections["weather"].gas:
+            return Verdict(True, "[weather] gas is true", self.bound(block))
+        return Verdict(False, "[weather] gas is false")
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return gas only; with no gas called for, a table without it."""
+        return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
+
+
+class Rain(Attenuation):
+    """Rain below its upper edge (ITU-R P.838-3)."""
+
+    name = "rain"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] rain_rate_mm_h``."""
+        rate = block.context.sections["weather"].rain_rate_mm_h
+        because = f"[weather] rain_rate_mm_h is {rate:g}"
+        return Verdict(rate > 0, because, self.bound(block) if rate > 0 else {})
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return rain only."""
+        return {
+            "rain_rate_mm_h": weather.rain_rate_mm_h,
+            "rain_height_m": weather.rain_top_m,
+            "polarisation": block.p.polarisation,
+        }
+
+
+class Fog(Attenuation):
+    """Fog and cloud between two altitudes (ITU-R P.840-8)."""
+
+    name = "fog"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] fog_water_g_m3``."""
+        water = block.context.sections["weather"].fog_water_g_m3
+        because = f"[weather] fog_water_g_m3 is {water:g}"
+        return Verdict(water > 0, because, self.bound(block) if water > 0 else {})
+
+    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return fog only."""
+        return {
+            "fog_liquid_water_g_m3": weather.fog_water_g_m3,
+            "fog_base_m": weather.fog_base_m,
+            "fog_top_m": weather.fog_top_m,
+            "fog_temperature_k": weather.fog_temperature_c + 273.15,
+        }
+
+
+WEATHER_EFFECTS = (Gas(), Rain(), Fog())

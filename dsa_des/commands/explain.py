@@ -1,0 +1,85 @@
+"""``dsa-des explain``: which effects a scene calls for, which it does not, and because of what."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from dsa_des.commands.loading import load
+from dsa_des.effects import Planned
+from dsa_des.scene import Scene
+from dsa_des.simulation import Simulation
+
+
+def explain_scene(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    measure: bool,
+    simulate_everything: bool,
+) -> None:
+    """Print a table of every block's effects; with `measure`, run the scene to time them."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    loaded = load(scene, sets, swaps, seed, duration)
+    simulation = Simulation(loaded, simulate_everything=simulate_everything)
+    shares = measured_shares(loaded, simulate_everything) if measure else None
+    console = Console()
+    if not simulation.plan:
+        console.print("No block of this scene declares effects.")
+        return
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for heading in ("block", "effect", "largest influence"):
+        table.add_column(heading, no_wrap=heading == "block")
+    if shares is not None:
+        table.add_column("share of run time", justify="right")
+    for item in simulation.plan:
+        row = [item.block, item.sentence(), _bound(item)]
+        if shares is not None:
+            share = shares.get((item.block, item.effect.name))
+            row.append("" if share is None else f"{share:.1%}")
+        # Text, because [weather] would be taken for markup.
+        table.add_row(*(Text(cell) for cell in row))
+    console.print(table)
+
+
+def _bound(item: Planned) -> str:
+    return ", ".join(f"{q} {bound:.2g}" for q, bound in sorted(item.verdict.bound.items()))
+
+
+class _Timed:
+    """A built effect that adds up the processor time spent in it."""
+
+    def __init__(self, built: Callable[..., Any]) -> None:
+        self.built = built
+        self.cpu_s = 0.0
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        started = time.perf_counter()
+        try:
+            return self.built(*args, **kwargs)
+        finally:
+            self.cpu_s += time.perf_counter() - started
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.built, name)
+
+
+def measured_shares(
+    scene: Scene, simulate_everything: bool = False
+) -> dict[tuple[str, str], float]:
+    """Run a scene and return each built effect's share of the run time, by (block, effect)."""
+    timed: dict[tuple[str, str], _Timed] = {}
+
+    def wrap(item: Planned, built: Any) -> Any:
+        timed[item.block, item.effect.name] = _Timed(built)
+        return timed[item.block, item.effect.name]
+
+    simulation = Simulation(scene, simulate_everything=simulate_everything, wrap_effect=wrap)
+    started = time.perf_counter()
+    simulation.run()
+    whole = time.perf_counter() - started
+    return {key: effect.cpu_s / whole for key, effect in timed.items()}
