@@ -30,7 +30,10 @@ def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> N
     """Raise a ValueError naming the first bad element, if there is one."""
     if np.any(bad):
         first = float(np.broadcast_to(array, np.shape(bad))[bad].flat[0])
-        raise ValueError(f"{name} is {first:g}: it must {rule}")
+        # In full where six digits would show another number, as 1 for 1.0000001 pulses.
+        short = f"{first:g}"
+        shown = short if float(short) == first or first != first else repr(first)
+        raise ValueError(f"{name} is {shown}: it must {rule}")
 
 
 def positive(name: str, value: ArrayLike) -> FloatArray:

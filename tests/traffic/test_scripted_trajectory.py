@@ -162,6 +162,8 @@ def test_stationary_stays_for_ever_and_keeps_its_heading():
         st.tuples(st.floats(-60, 60), st.floats(-180, 180), st.floats(0, 10000), st.floats(5, 300)),
         min_size=1,
         max_size=5,
+        # Two waypoints in one place are refused when one is above the other (tested elsewhere).
+        unique_by=lambda point: (round(point[0], 3), round(point[1], 3) % 360.0),
     )
 )
 def test_waypoints_are_met_in_order_at_the_asked_speed(points):
@@ -174,12 +176,11 @@ def test_waypoints_are_met_in_order_at_the_asked_speed(points):
     )
     arrivals = [segment.start_s for segment in flight.segments[1:]]
     assert (np.diff(arrivals) > 0).all()
-    met = list(dict.fromkeys(points)) if len(arrivals) < len(points) else points
-    if len(met) == len(arrivals):
-        s = flight.at(np.array(arrivals))
-        for i, (lat, lon, alt, _) in enumerate(met):
-            # Nearly antipodal legs amplify the azimuth's last bit.
-            assert line_of_sight(lat, lon, alt, s.lat_deg[i], s.lon_deg[i], s.alt_m[i])[2] < 1e-4
+    assert len(arrivals) == len(points)
+    s = flight.at(np.array(arrivals))
+    for i, (lat, lon, alt, _) in enumerate(points):
+        # Nearly antipodal legs amplify the azimuth's last bit.
+        assert line_of_sight(lat, lon, alt, s.lat_deg[i], s.lon_deg[i], s.alt_m[i])[2] < 1e-4
     assert all(np.isfinite(c).all() for c in flight.at(np.linspace(0, 1e6, 50)).arrays())
     assert flight.at(1e7).alt_m == pytest.approx(points[-1][2])
 
