@@ -192,7 +192,8 @@ def test_bad_attitude_is_named():
 
 
 @fast
-@given(*[st.floats(allow_nan=False, allow_infinity=False, min_value=-1e150, max_value=1e150)] * 6)
+# Differences of two angles must stay within the 1e150 that is accepted.
+@given(*[st.floats(min_value=-4e149, max_value=4e149)] * 6)
 def test_any_finite_input_is_silent(a, b, c, yaw, pitch, roll):
     with np.errstate(all="raise"):
         body_angles(*ned_to_body(a, b, c, yaw, pitch, roll))

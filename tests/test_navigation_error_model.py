@@ -1,0 +1,95 @@
+"""The ownship's believed position and attitude."""
+
+import math
+
+import numpy as np
+import pymap3d
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from components.navigation_error import attitude_with_error, position_with_error
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(
+    lat=st.floats(-89.99, 89.99),
+    lon=st.floats(-180, 180),
+    north=st.floats(-30, 30),
+    east=st.floats(-30, 30),
+    down=st.floats(-30, 30),
+)
+def test_position_is_displaced_as_pymap3d_says(lat, lon, north, east, down):
+    ours = position_with_error(lat, lon, 1000.0, bias_north_east_down_m=(north, east, down))
+    truth = pymap3d.ned2geodetic(north, east, down, lat, lon, 1000.0)
+    apart = pymap3d.geodetic2ned(*ours, *truth)
+    # The tangent plane lies e²/2R above the ellipsoid; the rest is of the same order.
+    assert np.linalg.norm(apart) < 5e-4
+
+
+def test_position_across_the_pole():
+    lat, lon, alt = position_with_error(
+        90 - 1e-4, 20.0, 0.0, bias_north_east_down_m=(30.0, 0.0, 0.0)
+    )
+    assert lon % 360 == pytest.approx(200.0)
+    assert (90 - 1e-4) + (90 - lat) == pytest.approx(90 - 2e-4 + 30.0 / 111_694 + 1e-4, abs=1e-7)
+    assert alt == 0.0
+    at_pole = position_with_error(90.0, 0.0, 0.0, bias_north_east_down_m=(0.0, 30.0, 0.0))
+    assert at_pole[:2] == pytest.approx((90 - 30.0 / 111_694, 90.0), abs=1e-7)
+
+
+def test_without_error_every_bit_stays():
+    rng = np.random.Generator(np.random.PCG64(8))
+    truth = (rng.uniform(-90, 90, 99), rng.uniform(-720, 720, 99), rng.uniform(-100, 1e4, 99))
+    normals = tuple(rng.standard_normal((3, 99)))
+    for true, believed in zip(truth, position_with_error(*truth, normals=normals), strict=True):
+        np.testing.assert_array_equal(true, believed)
+    zeros = attitude_with_error(-0.0, -0.0, 0.5, normals=(1.0, 1.0, 1.0))
+    assert math.copysign(1.0, zeros[0]) == -1.0 and zeros[2] == 0.5
+
+
+def test_bias_and_spread_are_what_was_asked_for():
+    rng = np.random.Generator(np.random.PCG64(9))
+    number = 40_000
+    normals = tuple(rng.standard_normal((3, number)))
+    position = position_with_error(
+        40.0,
+        5.0,
+        300.0,
+        bias_north_east_down_m=(5.0, -3.0, 2.0),
+        sigma_north_east_down_m=(2.0, 1.0, 4.0),
+        normals=normals,
+    )
+    errors = pymap3d.geodetic2ned(*position, 40.0, 5.0, 300.0)
+    for error, bias, sigma in zip(errors, (5.0, -3.0, 2.0), (2.0, 1.0, 4.0), strict=True):
+        assert np.mean(error) == pytest.approx(bias, abs=4 * sigma / math.sqrt(number) + 1e-4)
+        assert np.std(error) == pytest.approx(sigma, rel=0.02)
+    attitude = attitude_with_error(
+        0.1, 0.2, 0.3, bias_rad=(0.01, 0.0, 0.0), sigma_rad=(0.0, 0.002, 0.0), normals=normals
+    )
+    assert np.all(attitude[0] == 0.1 + 0.01) and np.all(attitude[2] == 0.3)
+    assert np.std(attitude[1]) == pytest.approx(0.002, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: position_with_error(91.0, 0.0, 0.0), "lat_deg is 91"),
+        (lambda: position_with_error(math.nan, 0.0, 0.0), "lat_deg is nan"),
+        (
+            lambda: position_with_error(0.0, 0.0, 0.0, sigma_north_east_down_m=(-1.0, 0.0, 0.0)),
+            "sigma_north_east_down_m is -1: .*0 or more",
+        ),
+        (
+            lambda: position_with_error(0.0, 0.0, 0.0, bias_north_east_down_m=(0.0, 1e6, 0.0)),
+            "position error is 1000000.0",
+        ),
+        (
+            lambda: attitude_with_error(0.0, 0.0, 0.0, bias_rad=(math.inf, 0.0, 0.0)),
+            "bias_rad is inf",
+        ),
+    ],
+)
+def test_bad_input_is_named(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
