@@ -58,8 +58,9 @@ def position_with_error(
     Notes
     -----
     The displacement is an arc along a sphere with the local radii of the ellipsoid, so it also
-    works across a pole. For an error of e metres it is wrong by about e²/6400 km · tan(latitude) at
-    most a few times: 0.02 mm for 10 m at mid-latitudes.
+    works across a pole. Against a straight displacement in the tangent plane an error of 10 m
+    comes out 0.1 µm off horizontally and, as it follows the Earth, 8 µm lower (100 m: 8 µm and
+    0.8 mm), at any latitude.
     """
     north, east, down = _errors(
         "north_east_down_m", bias_north_east_down_m, sigma_north_east_down_m, normals

@@ -149,6 +149,8 @@ class ScanClock:
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
+        if end > MAX_TICK:
+            raise ValueError(f"end is {end}: ticks must stay below {MAX_TICK} (64 bits)")
         if end <= start:
             empty = np.empty(0, dtype=np.int64)
             return empty, empty

@@ -15,7 +15,10 @@ from dsa_des.types import FloatArray
 
 
 class ElectroOpticalParameters(CameraParameters):
-    """Parameters of an electro-optical camera; sun and reflectances matter with a background."""
+    """Parameters of an electro-optical camera; sun and reflectances matter with a background.
+
+    Haze is the scene's, not the camera's: ``visibility_km`` in the table ``[weather]``.
+    """
 
     background: Literal["none", "auto", "sky", "ground"] = Field(
         default="none",
@@ -40,11 +43,6 @@ class ElectroOpticalParameters(CameraParameters):
     ground_reflectance: float = Field(
         default=0.2, gt=0, le=1, description="Diffuse reflectance of the ground; 0.2 is grass."
     )
-    visibility_km: float | None = Field(
-        default=None,
-        gt=0,
-        description="Meteorological visibility (2 % contrast), km; clear air by default.",
-    )
 
 
 class ElectroOptical(Camera):
@@ -68,30 +66,22 @@ class ElectroOptical(Camera):
         )
 
     def contrast(self, cells: Cells) -> FloatArray:
-        """Return each target's contrast gain: constant, or by daylight and haze."""
+        """Return each target's contrast gain before the weather: constant, or by daylight."""
         constant: FloatArray = cells.of_target(cells.roster.column("contrast"))
         p = self.p
-        if p.background == "none" and p.visibility_km is None:
-            return constant
         if p.background == "none":
-            daylight = {}
-        else:
-            daylight = {
-                "model": "daylight",
-                "background": p.background,
-                "sky": p.sky,
-                "sun_azimuth_rad": math.radians(p.sun_azimuth_deg),
-                "sun_elevation_rad": math.radians(p.sun_elevation_deg),
-                "sun_exclusion_rad": math.radians(p.sun_exclusion_deg),
-                "ground_reflectance": p.ground_reflectance,
-                "paint_reflectance": cells.of_target(cells.roster.column("paint_reflectance")),
-            }
+            return constant
         gain = contrast_gain(
+            model="daylight",
             contrast=constant,
             azimuth_rad=cells.azimuth_rad,
             elevation_rad=cells.elevation_rad,
-            range_m=cells.range_m,
-            visibility_m=None if p.visibility_km is None else p.visibility_km * 1000.0,
-            **daylight,
+            sun_azimuth_rad=math.radians(p.sun_azimuth_deg),
+            sun_elevation_rad=math.radians(p.sun_elevation_deg),
+            sun_exclusion_rad=math.radians(p.sun_exclusion_deg),
+            paint_reflectance=cells.of_target(cells.roster.column("paint_reflectance")),
+            ground_reflectance=p.ground_reflectance,
+            sky=p.sky,
+            background=p.background,
         )
         return np.asarray(gain)

@@ -22,7 +22,23 @@ def gas(frequency_ghz, dry_pressure_hpa, temperature_k, vapour_density_g_m3):
 def main():
     rng = random.Random(7)
     rows = []
-    for frequency in (1, 10, 22.235, 35, 50, 57.6, 60, 77, 94, 118.75, 140, 183.31, 220, 325.15, 350):
+    for frequency in (
+        1,
+        10,
+        22.235,
+        35,
+        50,
+        57.6,
+        60,
+        77,
+        94,
+        118.75,
+        140,
+        183.31,
+        220,
+        325.15,
+        350,
+    ):
         for _ in range(4):
             case = (frequency, rng.uniform(50, 1050), rng.uniform(200, 310), rng.uniform(0, 20))
             rows.append(("gas", *case, gas(*case)))

@@ -24,7 +24,9 @@ with open(Path(__file__).with_name("itur_table.csv"), newline="") as _file:
 def rows_of(quantity):
     chosen = [row for row in ITUR if row["quantity"] == quantity]
     assert len(chosen) >= 10
-    return [[float(row[key]) for key in ("a", "b", "c", "d", "value") if row[key]] for row in chosen]
+    return [
+        [float(row[key]) for key in ("a", "b", "c", "d", "value") if row[key]] for row in chosen
+    ]
 
 
 def vapour_pressure_hpa(temperature_k, density):

@@ -134,8 +134,6 @@ def test_backgrounds(crafts):
     cells = cells_of(crafts)
     constant = np.array([0.6, 1.0, 1.4])[cells.target]
     np.testing.assert_array_equal(eo().contrast(cells), constant)
-    haze = eo(visibility_km=8).contrast(cells)
-    np.testing.assert_allclose(haze, constant * np.exp(-3.912 * cells.range_m / 8e3), rtol=1e-13)
     for background in ("auto", "sky", "ground"):
         camera = eo(
             background=background,
@@ -144,15 +142,12 @@ def test_backgrounds(crafts):
             sun_elevation_deg=25,
             sun_exclusion_deg=30,
             ground_reflectance=0.4,
-            visibility_km=20,
         )
         expected = contrast_gain(
             model="daylight",
             contrast=constant,
             azimuth_rad=cells.azimuth_rad,
             elevation_rad=cells.elevation_rad,
-            range_m=cells.range_m,
-            visibility_m=20_000.0,
             sun_azimuth_rad=math.radians(100),
             sun_elevation_rad=math.radians(25),
             sun_exclusion_rad=math.radians(30),
@@ -169,8 +164,9 @@ def test_backgrounds(crafts):
 def scene(configs, tmp_path, area_file):
     """Write first light with other parameters of its cameras and three turning intruders."""
 
-    def write(eo, ir):
+    def write(eo, ir, weather=""):
         lines = [f'extends = "{configs / "first_light.toml"}"', "duration_s = 20"]
+        lines += ["[weather]", weather] if weather else []
         lines += ["[blocks.eo]", eo, "[blocks.ir]", ir]
         areas = 'front_m2 = 12, side_m2 = 30, horizontal_m2 = 90, silhouette_table = "areas.csv"'
         for i, engine in enumerate(("propeller", "turbofan", "turbojet")):
@@ -196,16 +192,16 @@ def run(path, window=None):
 
 
 CAMERAS = [
-    ('silhouette = "aspect_table"', 'silhouette = "aspect_table"\nplume = true'),
-    ('background = "auto"\nvisibility_km = 12\nsun_azimuth_deg = 20', "plume = true"),
-    ('silhouette = "convex_hull"\nbackground = "ground"', 'silhouette = "thesis"'),
-    ("visibility_km = 5\ndynamic_weight = 2", 'silhouette = "convex_hull"\nplume = true'),
+    ('silhouette = "aspect_table"', 'silhouette = "aspect_table"\nplume = true', ""),
+    ('background = "auto"\nsun_azimuth_deg = 20', "plume = true", "visibility_km = 12"),
+    ('silhouette = "convex_hull"\nbackground = "ground"', 'silhouette = "thesis"', ""),
+    ("dynamic_weight = 2", 'silhouette = "convex_hull"\nplume = true', "visibility_km = 5"),
 ]
 
 
-@pytest.mark.parametrize(("eo", "ir"), CAMERAS)
-def test_windows_do_not_change_a_bit(scene, eo, ir):
-    path = scene(eo, ir)
+@pytest.mark.parametrize(("eo", "ir", "weather"), CAMERAS)
+def test_windows_do_not_change_a_bit(scene, eo, ir, weather):
+    path = scene(eo, ir, weather)
     one, many = run(path, window=1), run(path)
     assert one.keys() == many.keys()
     for name, table in one.items():
@@ -213,12 +209,31 @@ def test_windows_do_not_change_a_bit(scene, eo, ir):
     assert {"eo", "ir"} <= set(one["detections"]["block"].to_pylist())
 
 
+def test_haze_takes_its_share_of_the_daylight_contrast_once(scene):
+    """Koschmieder: confidence + threshold is a·Q·P, and P falls by exp(-3.912 R/V)."""
+
+    def signatures(weather):
+        path = scene('background = "sky"\nthreshold = -1', "", weather)
+        table = run(path)["detections"].to_pylist()
+        rows = [row for row in table if row["block"] == "eo"]
+        return {
+            (row["scan"], row["target"]): (row["confidence"] - 1.0, row["true_range_m"])
+            for row in rows
+        }
+
+    clear, hazy = signatures(""), signatures("visibility_km = 4")
+    assert clear.keys() == hazy.keys() and len(clear) > 100
+    for key, (signature, range_m) in clear.items():
+        expected = signature * math.exp(-3.912 * range_m / 4e3)
+        assert hazy[key][0] == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
 @pytest.mark.parametrize(
     ("eo", "key"),
     [
         ('background = "sun"', "blocks.eo.background"),
         ("sun_elevation_deg = 0", "blocks.eo.sun_elevation_deg"),
-        ("visibility_km = 0", "blocks.eo.visibility_km"),
+        ("ground_reflectance = 0", "blocks.eo.ground_reflectance"),
         ('silhouette = "mesh"', "blocks.eo.silhouette"),
     ],
 )
