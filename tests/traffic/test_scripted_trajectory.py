@@ -68,7 +68,8 @@ def test_speed_is_that_at_flight_altitude(lat, lon, azimuth, speed, alt):
     flight = ScriptedTrajectory(
         "s", lat_deg=lat, lon_deg=lon, alt_m=alt, heading_deg=azimuth, speed_mps=speed
     )
-    assert speeds(flight, np.arange(0, 2000, 100.0)) == pytest.approx(speed, rel=1e-6)
+    # The path's radius is taken once: over 600 km at 12 km that is 2.3e-6 (worst of 4,000).
+    assert speeds(flight, np.arange(0, 2000, 100.0)) == pytest.approx(speed, rel=3e-6)
 
 
 @pytest.mark.parametrize("rate", [3.0, -3.0, 0.5])
