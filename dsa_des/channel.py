@@ -10,6 +10,7 @@ import numpy as np
 
 from dsa_des.message import Message
 from dsa_des.types import IntArray
+from dsa_des.wire_faults import WireFaults
 
 
 class Channel:
@@ -21,11 +22,14 @@ class Channel:
         Name of the sending block.
     delay_ticks : int
         Time on the wire.
+    faults : WireFaults, optional
+        Loss and lateness of single rows; late rows may be overtaken.
     """
 
-    def __init__(self, source: str, delay_ticks: int = 0) -> None:
+    def __init__(self, source: str, delay_ticks: int = 0, faults: WireFaults | None = None) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
+        self._faults = faults
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
 
@@ -33,31 +37,56 @@ class Channel:
         """Make `message` the last arrived one, as if it had come at `tick`."""
         self._last = (np.array([tick], dtype=np.int64), message)
 
-    def push(self, message: Message) -> IntArray:
-        """Deposit a message and return the ticks at which its rows arrive."""
-        arrivals = message.tick + self.delay_ticks if self.delay_ticks else message.tick
+    def push(self, message: Message, sent: int | None = None) -> IntArray:
+        """Deposit a message and return the ticks at which its rows arrive, in order.
+
+        Parameters
+        ----------
+        message : Message
+        sent : int, optional
+            The tick at which it was sent, when that is later than the rows' own.
+        """
+        ticks = message.tick if sent is None else np.full(len(message), sent, dtype=np.int64)
+        arrivals = ticks + self.delay_ticks if self.delay_ticks else ticks
+        if self._faults is not None:
+            kept = np.flatnonzero(self._faults.kept(message.tick))
+            arrivals = arrivals[kept] + self._faults.lateness(message.tick[kept])
+            order = np.argsort(arrivals, kind="stable")
+            arrivals, message = arrivals[order], message.take(kept[order])
+            if len(kept) == 0:
+                return arrivals
         self._waiting.append((arrivals, message))
         return arrivals
 
     def next_arrivals(self, end: int) -> IntArray:
-        """Return the ticks of the rows that arrive before `end` and were not collected yet."""
+        """Return the ticks at which rows arrive before `end` that were not collected yet."""
         ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
+        if self._faults is not None and ticks:
+            return np.unique(np.concatenate(ticks))  # late rows overtake and may coincide
         return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     def collect(self, end: int) -> tuple[IntArray, Message] | None:
-        """Remove and return the rows that arrive before `end`, or None."""
+        """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
         taken: list[tuple[IntArray, Message]] = []
+        left: deque[tuple[IntArray, Message]] = deque()
         while self._waiting:
-            arrivals, message = self._waiting[0]
-            if arrivals[-1] < end:
-                taken.append(self._waiting.popleft())
+            arrivals, message = self._waiting.popleft()
+            count = len(arrivals) if arrivals[-1] < end else int(np.searchsorted(arrivals, end))
+            if count == len(arrivals):
+                taken.append((arrivals, message))
                 continue
-            count = int(np.searchsorted(arrivals, end))
             if count:
                 taken.append((arrivals[:count], message.take(slice(0, count))))
-                self._waiting[0] = (arrivals[count:], message.take(slice(count, len(message))))
-            break
-        return _joined(taken)
+            left.append((arrivals[count:], message.take(slice(count, len(message)))))
+            if self._faults is None:
+                break  # rows behind these arrive later still
+        left.extend(self._waiting)
+        self._waiting = left
+        joined = _joined(taken)
+        if self._faults is not None and joined is not None and len(taken) > 1:
+            order = np.argsort(joined[0], kind="stable")
+            joined = joined[0][order], joined[1].take(order)
+        return joined
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds at each of `ticks` (in order, all before `end`).

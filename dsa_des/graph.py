@@ -5,7 +5,7 @@ of their names. (A topological sort would do as well, but which of the many it g
 the order in the file.)
 """
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 
 import networkx as nx
 
@@ -131,19 +131,22 @@ def depths(graph: nx.DiGraph) -> dict[str, int]:
     return depth
 
 
-def windowed_blocks(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[str]:
+def windowed_blocks(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: Collection[str] = ()
+) -> set[str]:
     """Return the blocks that may run in look-ahead windows.
 
     A block runs at the widest grain that it and everything upstream allow: it must declare
-    itself windowed, have no process of its own, be in no feedback loop, and be fed by windowed
-    blocks only.
+    itself windowed, have no process of its own, queue for no shared processor (`queued`), be in
+    no feedback loop, and be fed by windowed blocks only.
     """
     looped = in_cycles(graph)
     acyclic = graph.subgraph(name for name in graph if name not in looped)
     windowed: set[str] = set()
     for name in nx.topological_sort(acyclic):
         cls = classes[name]
-        if cls.windowed and cls.process is None and windowed.issuperset(graph.predecessors(name)):
+        alone = cls.process is None and name not in queued
+        if cls.windowed and alone and windowed.issuperset(graph.predecessors(name)):
             windowed.add(name)
     return windowed
 

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block_options import BlockOptions
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.registry import UnknownType, find
@@ -79,7 +80,7 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
     except UnknownType as error:
         return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
     block = blocks[name]
-    known = {"type", *cls.Parameters.model_fields}
+    known = {"type", *BlockOptions.model_fields, *cls.Parameters.model_fields}
     dropped = sorted(key for key in block if key not in known)
     for parameter in dropped:
         del block[parameter]

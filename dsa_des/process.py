@@ -6,6 +6,7 @@ the others by depth; ties within a depth go by name, or at random under ``shuffl
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from dsa_des.clock import ScanClock
 from dsa_des.component import Component
 from dsa_des.events import Bell, WakeUp
 from dsa_des.message import Message
+from dsa_des.processors import Processor
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -65,6 +67,7 @@ class Node:
     clock: ScanClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
+    processor: Processor | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
@@ -163,6 +166,8 @@ class Node:
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
+        if self.processor is not None and self.processor.refuses(self.name):
+            return
         scan = self._scan_at.get(tick, -1)
         ticks = np.array([tick], dtype=np.int64)
         self._run(ticks, np.array([scan], dtype=np.int64), tick, tick + 1)
@@ -292,8 +297,14 @@ class Node:
                 )
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
-            for channel, node, target_port in self.subscribers.get(port, []):
-                arrivals = channel.push(message)
-                if not node.windowed and target_port in node._trigger_ports:
-                    for arrival in arrivals.tolist():
-                        node.wake_at(arrival)
+            if self.processor is None:
+                self._deliver(port, message)
+            else:
+                self.processor.submit(self.name, partial(self._deliver, port, message))
+
+    def _deliver(self, port: str, message: Message, sent: int | None = None) -> None:
+        for channel, node, target_port in self.subscribers.get(port, []):
+            arrivals = channel.push(message, sent)
+            if not node.windowed and target_port in node._trigger_ports:
+                for arrival in arrivals.tolist():
+                    node.wake_at(arrival)

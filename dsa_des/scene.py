@@ -1,7 +1,7 @@
 """From a scene file to a scene that can be run, with every problem reported at once."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -9,30 +9,34 @@ from typing import Any
 import networkx as nx
 from pydantic import ValidationError
 
+from dsa_des.block_options import BlockOptions, split_options, with_latencies
 from dsa_des.clock import parse_rational
 from dsa_des.component import Component, Parameters
 from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
-from dsa_des.graph import build_graph, check_graph
+from dsa_des.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.overrides import apply_set, apply_swap
+from dsa_des.processors import ProcessorParameters
 from dsa_des.registry import UnknownType, find
 from dsa_des.scene_checks import check_activity, check_lookalikes, check_times
-from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, read_scene_file
+from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, dotted, read_scene_file
 from dsa_des.sections import section_models
 from dsa_des.wiring import Wire, read_wires
 
-_TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires")
+_TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
 _TOLERANCE = "accuracy"
 _MAX_SEED = 2**63
 
 
 @dataclass(frozen=True)
 class Block:
-    """One block of a scene: its name, its type as written, its class and its parameters."""
+    """One block of a scene: its name, its type as written, its class, its own parameters, and
+    what its table says to the engine."""
 
     name: str
     type_name: str
     cls: type[Component]
     parameters: Parameters
+    options: BlockOptions = BlockOptions()
 
 
 @dataclass
@@ -56,6 +60,8 @@ class Scene:
         The resolution in which every clock, offset and delay of the scene is exact.
     sections : dict
         Tables that belong to no block, by name; those the scene leaves out have their defaults.
+    processors : dict
+        Shared processors by name.
     dropped : list of str
         Dotted keys of parameters that a swap dropped.
     """
@@ -70,6 +76,7 @@ class Scene:
     graph: nx.DiGraph
     ticks_per_s: int
     sections: dict[str, Parameters] = field(default_factory=dict)
+    processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
 
     @property
@@ -82,6 +89,11 @@ class Scene:
     def classes(self) -> dict[str, type[Component]]:
         """Class of each block."""
         return {name: block.cls for name, block in self.blocks.items()}
+
+    def look_ahead_blocks(self) -> set[str]:
+        """Return the blocks that may run in look-ahead windows."""
+        queued = [name for name, block in self.blocks.items() if block.options.processor]
+        return windowed_blocks(self.graph, self.classes, queued)
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""
@@ -96,9 +108,15 @@ class Scene:
             values = section.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
             if values:
                 tables[name] = values
+        if self.processors:
+            tables["processors"] = {
+                name: parameters.model_dump(mode="json")
+                for name, parameters in self.processors.items()
+            }
         tables["blocks"] = {
             name: {
                 "type": block.type_name,
+                **block.options.model_dump(mode="json", exclude_none=True, exclude_defaults=True),
                 **block.parameters.model_dump(mode="json", exclude_none=True),
             }
             for name, block in self.blocks.items()
@@ -167,7 +185,11 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     sections = _sections(scene_file, problems)
     classes, blocks = _blocks(scene_file, problems)
     unsure: set[str] = set()
-    wires = read_wires(scene_file, classes, problems, unsure)
+    processors = _processors(scene_file, blocks, problems)
+    wires = with_latencies(
+        read_wires(scene_file, classes, problems, unsure),
+        {name: block.options for name, block in blocks.items()},
+    )
     graph = build_graph(list(classes), wires)
     check_graph(scene_file, graph, classes, problems, unsure)
     ticks_per_s = check_times(scene_file, blocks, wires, duration, problems)
@@ -186,6 +208,7 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
         graph,
         ticks_per_s,
         sections,
+        processors,
     )
 
 
@@ -266,15 +289,41 @@ def _blocks(
             problems.append(scene_file.problem((*key, "type"), str(error), str(type_name)))
             continue
         classes[name] = cls
-        given = {k: v for k, v in table.items() if k != "type"}
+        extra, given = split_options(table, cls.Parameters)
         try:
             parameters = cls.Parameters.model_validate(given)
+            options = BlockOptions.model_validate(extra)
         except ValidationError as error:
             problems += _explain(scene_file, key, str(type_name), cls.Parameters, error)
             continue
         check_lookalikes(scene_file, key, given, cls.Parameters, problems)
-        blocks[name] = Block(name, str(type_name), cls, parameters)
+        blocks[name] = Block(name, str(type_name), cls, parameters, options)
     return classes, blocks
+
+
+def _processors(
+    scene_file: SceneFile, blocks: Mapping[str, Block], problems: list[Problem]
+) -> dict[str, ProcessorParameters]:
+    tables = scene_file.data.get("processors", {})
+    if not isinstance(tables, dict):
+        problems.append(scene_file.problem(("processors",), "must hold one table per processor"))
+        return {}
+    found: dict[str, ProcessorParameters] = {}
+    for name in sorted(tables):
+        key: Key = ("processors", name)
+        if not isinstance(tables[name], dict):
+            problems.append(scene_file.problem(key, "must be a table", tables[name]))
+            continue
+        try:
+            found[name] = ProcessorParameters.model_validate(tables[name])
+        except ValidationError as error:
+            problems += _explain(scene_file, key, f"[{dotted(key)}]", ProcessorParameters, error)
+    for name, block in blocks.items():
+        wanted = block.options.processor
+        if wanted is not None and wanted not in tables:
+            message = f"the scene has no such processor{did_you_mean(wanted, tables)}"
+            problems.append(scene_file.problem(("blocks", name, "processor"), message, str(wanted)))
+    return found
 
 
 def _explain(
@@ -354,7 +403,8 @@ def _plain(value: Fraction) -> int | float | str:
 
 
 def _wire_table(wire: Wire) -> dict[str, Any] | str:
-    if not wire.delayed and wire.holds is None:
+    plain = Wire(wire.source, wire.output, wire.target, wire.input)
+    if plain == replace(wire, latency_s=plain.latency_s, queued=plain.queued):
         return str(wire)
     table: dict[str, Any] = {
         "from": f"{wire.source}.{wire.output}",
@@ -364,6 +414,10 @@ def _wire_table(wire: Wire) -> dict[str, Any] | str:
         table["delay"] = f"{wire.delay_scans} scan{'s' if wire.delay_scans > 1 else ''}"
     elif wire.delay_s:
         table["delay_s"] = _plain(wire.delay_s)
+    if wire.jitter_s:
+        table["jitter_s"] = _plain(wire.jitter_s)
+    if wire.drop_probability:
+        table["drop_probability"] = wire.drop_probability
     if wire.holds is not None:
         table["holds"] = wire.holds
     return table

@@ -52,7 +52,7 @@ def check_times(
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
     specs = {name: block.cls.clock_of(block.parameters) for name, block in blocks.items()}
     clocks = {name: spec for name, spec in specs.items() if spec is not None}
-    times = [wire.delay_s for wire in wires]
+    times = [wire.total_delay_s for wire in wires]
     for spec in clocks.values():
         times += spec.exact_times()
     ticks_per_s = resolution(times)
@@ -70,7 +70,7 @@ def check_times(
         value = scene.data.get("duration_s")
         problems.append(scene.problem(("duration_s",), limit, value))
     for wire in wires:
-        if wire.delay_s >= longest_s:
+        if wire.total_delay_s + wire.jitter_s >= longest_s:
             problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
     for name, spec in clocks.items():
         _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)

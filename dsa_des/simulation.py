@@ -21,13 +21,17 @@ from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.effects import Planned, plan
 from dsa_des.errors import BlockFailure, Problem, SceneError
-from dsa_des.graph import depths, window_order, windowed_blocks
+from dsa_des.graph import depths, window_order
+from dsa_des.message import Message
 from dsa_des.pinpoint import pinpoint
 from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Demand, Node
+from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
+from dsa_des.wire_faults import WireFaults
+from dsa_des.wiring import Wire
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 32768
@@ -196,8 +200,9 @@ class Simulation:
 
     def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
         graph = self.scene.graph
-        windowed = set() if window == 1 else windowed_blocks(graph, self.scene.classes)
+        windowed = set() if window == 1 else self.scene.look_ahead_blocks()
         order = window_order(graph, windowed)
+        processors = self._build_processors()
         shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
         nodes = {}
         for number, (name, component) in enumerate(sorted(self.components.items())):
@@ -212,14 +217,45 @@ class Simulation:
             if spec is not None:
                 draw = component.context.streams.scan_normals(name, "clock jitter")
                 node.clock = ScanClock(spec, self.ticks_per_s, draw)
+            node.processor = processors.get(self.scene.blocks[name].options.processor or "")
             node.on_demand = component.clocked == "demand" and spec is None
             nodes[name] = node
         return nodes
 
+    def _build_processors(self) -> dict[str, Processor]:
+        """Start the shared processors of the scene."""
+        streams = Streams(self.scene.seed)
+        processors = {}
+        for name, parameters in self.scene.processors.items():
+            stream = streams.stream(name, "service time")
+            try:
+                processors[name] = Processor(
+                    name, parameters, self.env, self.ticks_per_s, stream, self._record
+                )
+            except ValueError as error:
+                raise SceneError([self._problem("processors", error)]) from error
+            processors[name].start()
+        return processors
+
+    def _record(self, block: str, message: Message) -> None:
+        if self.recorder is not None:
+            self.recorder.record(block, message)
+
+    def _faults(self, wire: Wire) -> WireFaults | None:
+        if not wire.jitter_s and not wire.drop_probability:
+            return None
+        streams = Streams(self.scene.seed)
+        return WireFaults(
+            float(wire.jitter_s * self.ticks_per_s),
+            wire.drop_probability,
+            streams.stream(str(wire), "wire jitter"),
+            streams.stream(str(wire), "wire loss"),
+        )
+
     def _connect(self) -> None:
         for wire in self.scene.wires:
-            delay = int(wire.delay_s * self.ticks_per_s) + self._scan_delay(wire)
-            channel = Channel(wire.source, delay)
+            delay = round(wire.total_delay_s * self.ticks_per_s) + self._scan_delay(wire)
+            channel = Channel(wire.source, delay, self._faults(wire))
             if isinstance(wire.holds, dict):
                 declared = self.nodes[wire.target].component.inputs[wire.input].message
                 try:
@@ -300,7 +336,10 @@ class Simulation:
         end = self.end_tick
         if self.recorder is not None:
             outputs = [o for c in self.components.values() for o in c.outputs.values()]
-            self.recorder.open([output.message for output in outputs], self.ticks_per_s)
+            messages: list[type[Message]] = [output.message for output in outputs]
+            if self.scene.processors:
+                messages.append(Processing)
+            self.recorder.open(messages, self.ticks_per_s)
         for node in self.nodes.values():
             node.start()
         for window in self._windows(end):

@@ -23,7 +23,7 @@ from dsa_des.scene_file import Key, SceneFile
 
 _END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
 _SCANS = re.compile(r"(\d+) scans?")
-_KEYS = ("from", "to", "delay_s", "delay", "holds")
+_KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "holds")
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,14 @@ class Wire:
         Delay counted in scans of the receiving block's clock (of the sender's when it has none).
     holds : None, "nothing" or mapping
         What the input holds before the first message; required of a feedback wire.
+    jitter_s : Fraction
+        Largest extra delay; each message takes a uniformly drawn part of it.
+    drop_probability : float
+        Share of the messages that are lost.
+    latency_s : Fraction
+        Processing time of the sending block, given in its table.
+    queued : bool
+        Whether the sending block's messages go through a shared processor.
     """
 
     source: str
@@ -49,11 +57,20 @@ class Wire:
     delay_s: Fraction = Fraction(0)
     delay_scans: int = 0
     holds: Any = None
+    jitter_s: Fraction = Fraction(0)
+    drop_probability: float = 0.0
+    latency_s: Fraction = Fraction(0)
+    queued: bool = False
 
     @property
     def delayed(self) -> bool:
-        """Whether messages take time on this wire."""
-        return self.delay_s > 0 or self.delay_scans > 0
+        """Whether messages surely arrive later than they were made."""
+        return self.total_delay_s > 0 or self.delay_scans > 0 or self.queued
+
+    @property
+    def total_delay_s(self) -> Fraction:
+        """Time on the wire and, before it, in the sending block."""
+        return self.delay_s + self.latency_s
 
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
@@ -143,19 +160,30 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
         if not match or int(match[1]) == 0:
             raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
         options["delay_scans"] = int(match[1])
-    if "delay_s" in entry:
-        try:
-            options["delay_s"] = parse_rational(entry["delay_s"])
-        except ValueError as error:
-            raise _WireError(f"delay_s {error}", entry["delay_s"]) from None
-        if options["delay_s"] < 0:
-            raise _WireError("delay_s must be 0 or greater", entry["delay_s"])
+    for key in ("delay_s", "jitter_s"):
+        if key in entry:
+            options[key] = _seconds(key, entry[key])
+    if "drop_probability" in entry:
+        share = entry["drop_probability"]
+        if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
+            raise _WireError("drop_probability must be a number from 0 to 1", share)
+        options["drop_probability"] = float(share)
     if "holds" in entry:
         holds = entry["holds"]
         if holds != "nothing" and not isinstance(holds, dict):
             raise _WireError("holds must be 'nothing' or a table of the message's fields", holds)
         options["holds"] = holds
     return options
+
+
+def _seconds(key: str, value: Any) -> Fraction:
+    try:
+        seconds = parse_rational(value)
+    except ValueError as error:
+        raise _WireError(f"{key} {error}", value) from None
+    if seconds < 0:
+        raise _WireError(f"{key} must be 0 or greater", value)
+    return seconds
 
 
 def _connect(

@@ -9,7 +9,7 @@ import networkx as nx
 
 from dsa_des.commands.loading import load
 from dsa_des.errors import UsageError
-from dsa_des.graph import depths, windowed_blocks
+from dsa_des.graph import depths
 from dsa_des.scene import Scene
 from dsa_des.wiring import Wire
 
@@ -53,7 +53,7 @@ def _print_table(scene: Scene) -> None:
     from rich.table import Table
 
     depth = depths(scene.graph)
-    windowed = windowed_blocks(scene.graph, scene.classes)
+    windowed = scene.look_ahead_blocks()
     table = Table(title=f"{scene.title}: blocks in the order they run within an instant")
     for heading in ("depth", "block", "type", "runs", "fed by"):
         table.add_column(heading)
