@@ -1,4 +1,9 @@
-"""Tables of a scene that all blocks can read: ``[weather]`` and ``[accuracy]``."""
+"""Tables of a scene that all blocks can read.
+
+They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
+"""
+
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -41,3 +46,50 @@ class Accuracy(Parameters):
     )
     angle_deg: float | None = Field(default=None, gt=0, description="Error of any angle, deg.")
     range_m: float | None = Field(default=None, gt=0, description="Error of any range, m.")
+
+
+PositionError = Annotated[float, Field(ge=-10_000, le=10_000)]
+PositionNoise = Annotated[float, Field(ge=0, le=1000)]
+AttitudeError = Annotated[float, Field(ge=-180, le=180)]
+AttitudeNoise = Annotated[float, Field(ge=0, le=30)]
+
+
+class Navigation(Parameters):
+    """Errors of the ownship's navigation (TECVOL, thesis §2.3.1), believed minus true."""
+
+    position_bias_m: tuple[PositionError, PositionError, PositionError] = Field(
+        default=(0.0, 0.0, 0.0), description="Constant error north, east and down, m."
+    )
+    position_noise_m: tuple[PositionNoise, PositionNoise, PositionNoise] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Standard deviation of the white noise north, east and down, m.",
+    )
+    attitude_bias_deg: tuple[AttitudeError, AttitudeError, AttitudeError] = Field(
+        default=(0.0, 0.0, 0.0), description="Constant error of yaw, pitch and roll, deg."
+    )
+    attitude_noise_deg: tuple[AttitudeNoise, AttitudeNoise, AttitudeNoise] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Standard deviation of the white noise of yaw, pitch and roll, deg.",
+    )
+
+
+class Terrain(Parameters):
+    """Flat ground, whose echo a radar may hear; by default there is none."""
+
+    height_m: float | None = Field(
+        default=None,
+        ge=-1000,
+        le=10_000,
+        description="Altitude of the ground, below the ownship's, m; none by default.",
+    )
+    clutter_gamma_db: float = Field(
+        default=-15.0,
+        ge=-100,
+        le=100,
+        description="Reflectivity of the ground, gamma of sigma0 = gamma sin(grazing angle), dB: "
+        "about -20 desert or sea, -15 farmland, -10 woodland, -5 a town (assumption).",
+    )
+    clutter_mean: Literal["constant", "fluctuating"] = Field(
+        default="fluctuating",
+        description="Whether the clutter's mean fluctuates from look to look (thesis §5.3.2).",
+    )

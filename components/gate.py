@@ -1,9 +1,11 @@
 """The simulation decision: which sensor needs to look at which target (thesis §3.4, errata 4b)."""
 
+from typing import Any
+
 import numpy as np
 
 from components.messages import GatedTargets, RelativeTargets
-from components.reach import Decision, Reach
+from components.reach import Decision, FarthestLook, Reach, farthest_look
 from dsa_des.component import Component
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
@@ -20,6 +22,14 @@ class Gate(Component):
     inputs = {"targets": Input(RelativeTargets, "trigger", "Targets as seen from the ownship.")}
     outputs = {"targets": Output(GatedTargets, "The same, with a decision for each sensor.")}
     windowed = True
+
+    def request(self, port: str) -> FarthestLook:
+        """Ask for the targets that some sensor may look at."""
+        return farthest_look(consumer.request for consumer in self.context.consumers)
+
+    def offer(self, port: str) -> Any:
+        """Pass on what we were offered."""
+        return self.context.producers[0].offer if self.context.producers else None
 
     def setup(self) -> None:
         """Learn the reach of every sensor downstream."""

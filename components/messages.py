@@ -4,9 +4,10 @@ All messages hold rows (one per scan, see `dsa_des.message`). Angles are in radi
 clockwise and elevation upward.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -28,7 +29,9 @@ class TrafficStates(Message):
     present : (rows, targets) of bool
         Whether both the ownship and the target are there; the other fields are finite anyway.
     roster : Roster
-        What the targets are.
+        What all targets of the run are.
+    columns : (targets,) of int
+        Which of them the arrays hold, ascending; the others are out of everybody's reach.
     """
 
     own_lat_deg: FloatArray
@@ -45,6 +48,12 @@ class TrafficStates(Message):
     roll_rad: FloatArray
     present: BoolArray
     roster: Roster = static()
+    columns: IntArray = static()
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of all parts, over the targets of any of them."""
+        return super().concatenate(over_same_targets(parts))
 
 
 @dataclass(eq=False)
@@ -65,6 +74,11 @@ class RelativeTargets(Message):
         Altitudes above the ellipsoid, for what changes with height.
     present : (rows, targets) of bool
     roster : Roster
+    columns : (targets,) of int
+        Which targets of the roster the arrays hold.
+    believed : dict of (rows,), or None
+        What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
+        ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
     """
 
     azimuth_rad: FloatArray
@@ -79,6 +93,13 @@ class RelativeTargets(Message):
     alt_m: FloatArray
     present: BoolArray
     roster: Roster = static()
+    columns: IntArray = static()
+    believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of all parts, over the targets of any of them."""
+        return super().concatenate(over_same_targets(parts))
 
 
 @dataclass(eq=False)
@@ -134,7 +155,12 @@ class Detections(Message):
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
     extras : dict of (entries,)
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
-        ``detection_probability``, ``pixels``.
+        ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
+        detections to be declared (recorded as true where no rule is in force). A sweeping radar
+        has ``illuminated_s``, when its beam passed. Where the ownship's navigation errs, there are
+        the line of sight in NED by what it believes of its attitude, ``ned_azimuth_rad`` and
+        ``ned_elevation_rad``, and where it believes to be, ``own_lat_deg``, ``own_lon_deg`` and
+        ``own_alt_m``.
     roster : Roster
     """
 
@@ -147,6 +173,7 @@ class Detections(Message):
             "skipped_off": "int64",
             "skipped_field_of_view": "int64",
             "skipped_range": "int64",
+            "skipped_culled": "int64",
         },
         "detections": {
             "scan": "int64",
@@ -161,6 +188,13 @@ class Detections(Message):
             "snr_db": "float64",
             "detection_probability": "float64",
             "pixels": "float64",
+            "declared": "bool",
+            "illuminated_s": "float64",
+            "ned_azimuth_rad": "float64",
+            "ned_elevation_rad": "float64",
+            "own_lat_deg": "float64",
+            "own_lon_deg": "float64",
+            "own_alt_m": "float64",
         },
     }
 
@@ -176,7 +210,7 @@ class Detections(Message):
     true_azimuth_rad: FloatArray = per_entry()
     true_elevation_rad: FloatArray = per_entry()
     true_range_m: FloatArray = per_entry()
-    extras: dict[str, FloatArray] = per_entry()
+    extras: dict[str, AnyArray] = per_entry()
     roster: Roster = static()
 
     def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
@@ -201,6 +235,8 @@ class Detections(Message):
             "true_azimuth_rad": self.true_azimuth_rad,
             "true_elevation_rad": self.true_elevation_rad,
             "true_range_m": self.true_range_m,
+            # A sensor without a rule declares what it detects; nobody is behind a false alarm.
+            "declared": self.target >= 0,
             **self.extras,
         }
         return {"scans": scans, "detections": detections}
@@ -347,3 +383,29 @@ def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
         "+".join(name for i, name in enumerate(sensors) if int(mask) >> i & 1) for mask in masks
     )
     return Text(codes.reshape(-1), names)
+
+
+def over_same_targets(parts: Sequence[Any]) -> list[Any]:
+    """Return messages widened to the union of their targets; added ones are not present."""
+    first = parts[0].columns
+    if all(part.columns is first or np.array_equal(part.columns, first) for part in parts):
+        return list(parts)
+    columns = np.unique(np.concatenate([part.columns for part in parts]))
+    return [_widened(part, columns) for part in parts]
+
+
+def _widened(part: Any, columns: IntArray) -> Any:
+    place = np.searchsorted(columns, part.columns)
+    result = copy(part)
+    for name, values in vars(part).items():
+        if isinstance(values, np.ndarray) and values.ndim == 2:
+            wide = np.zeros((len(values), len(columns)), dtype=values.dtype)
+            wide[:, place] = values
+            setattr(result, name, wide)
+    if isinstance(part, GatedTargets):
+        result.decisions = {
+            sensor: decision.widened(place, len(columns))
+            for sensor, decision in part.decisions.items()
+        }
+    result.columns = columns
+    return result

@@ -89,7 +89,7 @@ def position_with_error(
             LARGEST_POSITION_ERROR_M,
             f"be within ±{LARGEST_POSITION_ERROR_M:g} m",
         )
-    new_lat, new_lon = _displaced(lat, lon, alt, north, east)
+    new_lat, new_lon = _displaced(lat, lon, alt - down, north, east)
     stays = (north == 0.0) & (east == 0.0)
     return (
         unflatten(np.where(stays, lat, new_lat), shape),

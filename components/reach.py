@@ -1,6 +1,7 @@
 """A sensor's reach, and the decision whether a target needs its physics (thesis §3.4)."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,6 +16,8 @@ ReasonArray = npt.NDArray[np.uint8]
 #: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
 EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
 SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+#: Targets that were not even moved, because no sensor could have looked at them.
+CULLED = "culled"
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,32 @@ class Reach:
         return reason
 
 
+@dataclass(frozen=True)
+class FarthestLook:
+    """What a block asks of the traffic: targets up to this range; farther ones matter to nobody.
+
+    Parameters
+    ----------
+    range_m : float
+        Infinite where somebody has no limit.
+    """
+
+    range_m: float
+
+
+def farthest_look(requests: Iterable[object]) -> FarthestLook:
+    """Return the farthest of what consumers ask for; who does not say asks for everything."""
+    farthest = 0.0
+    for request in requests:
+        if isinstance(request, Reach):
+            farthest = max(farthest, request.range_max_m if request.enabled else 0.0)
+        elif isinstance(request, FarthestLook):
+            farthest = max(farthest, request.range_m)
+        else:
+            farthest = math.inf
+    return FarthestLook(farthest)
+
+
 @dataclass(eq=False)
 class Decision:
     """The decision for one sensor over the rows of a message.
@@ -80,6 +109,12 @@ class Decision:
     def take_rows(self, rows: slice | IntArray) -> "Decision":
         """Return the decision for some of the rows."""
         return Decision(self.place[rows], self.reason)
+
+    def widened(self, place: IntArray, width: int) -> "Decision":
+        """Return the decision over `width` targets, ours at `place`, the others absent."""
+        reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
+        reason[:, place] = self.reason
+        return Decision(self.place, reason)
 
     @classmethod
     def join_rows(cls, parts: list[Self]) -> "Decision":

@@ -7,62 +7,24 @@ engine's business.
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, Field
 
+from components.declaration_rule import Declaration
 from components.geometry.angles import wrap_pi
 from components.messages import Detections, GatedTargets, RelativeTargets, SensorOffer
-from components.reach import EVALUATE, SKIP_REASONS, Reach, ReasonArray
+from components.mounting import BodyAxes, Mounting
+from components.navigation import NavigationReport
+from components.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.resolution import round_to_grid
-from dsa_des.component import ClockedParameters, Component
+from components.sensor_parameters import SensorParameters
+from dsa_des.component import Component
+from dsa_des.effects import Effect
 from dsa_des.ports import Input, Output
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.wake import Wake
-
-
-def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
-    if not all(-360 <= angle <= 360 for angle in value):
-        raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
-    return value
-
-
-def _elevations(value: tuple[float, float]) -> tuple[float, float]:
-    if not -90 <= value[0] <= value[1] <= 90:
-        raise ValueError("must hold two angles in [-90, 90], the lower one first")
-    return value
-
-
-class SensorParameters(ClockedParameters):
-    """Parameters of every sensor; angles in degrees in the ownship's body axes."""
-
-    enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(_azimuths)] = Field(
-        default=(-180.0, 180.0),
-        description="Field of view in azimuth, clockwise from the first to the second, deg.",
-    )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(_elevations)] = Field(
-        default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
-    )
-    range_km: float | None = Field(
-        default=None, gt=0, description="Farthest range that is looked at, km; none by default."
-    )
-    azimuth_resolution_deg: float = Field(
-        default=0.0, ge=0, description="Grid step of measured azimuth, deg; 0 measures exactly."
-    )
-    elevation_resolution_deg: float = Field(
-        default=0.0, ge=0, description="Grid step of measured elevation, deg; 0 measures exactly."
-    )
-
-    def reach(self) -> Reach:
-        """Return the sensor's reach."""
-        return Reach(
-            (math.radians(self.azimuth_deg[0]), math.radians(self.azimuth_deg[1])),
-            (math.radians(self.elevation_deg[0]), math.radians(self.elevation_deg[1])),
-            math.inf if self.range_km is None else self.range_km * 1000.0,
-            self.enabled,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +41,7 @@ class Look:
 
     detected: BoolArray
     confidence: FloatArray
-    extras: dict[str, FloatArray] = field(default_factory=dict)
+    extras: dict[str, AnyArray] = field(default_factory=dict)
 
 
 class Cells:
@@ -95,10 +57,17 @@ class Cells:
     wanted : (scans, targets) of bool
     scans : (scans,)
         Scan numbers.
+    scan_ticks : (scans,), optional
+        When each scan is; needed by what compares one scan with the next.
     """
 
     def __init__(
-        self, targets: RelativeTargets, rows: IntArray, wanted: BoolArray, scans: IntArray
+        self,
+        targets: RelativeTargets,
+        rows: IntArray,
+        wanted: BoolArray,
+        scans: IntArray,
+        scan_ticks: IntArray | None = None,
     ) -> None:
         self._targets = targets
         self.roster = targets.roster
@@ -107,8 +76,10 @@ class Cells:
         #: Index of each cell's scan within this look, and of its target in the roster.
         self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
+        self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
         self._flat = rows[self.row] * width + self.target
+        self.target = targets.columns[self.target]
         self._everything = len(place) == targets.range_m.size
         self._gathered: dict[str, AnyArray] = {}
 
@@ -138,8 +109,18 @@ class Cells:
         return stream.uniform(self.roster.keys[self.target], self.scan, draw)
 
 
+#: Effects that every sensor has, after its own.
+SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
+
+_BODY_AXES = BodyAxes()
+
+
 class Sensor(Component):
-    """A block that looks at the targets at its own scan instants and reports detections."""
+    """A block that looks at the targets at its own scan instants and reports detections.
+
+    Effects that act on the ``report`` are called with the detections, the targets and the
+    message's row of each scan, and return the detections that are sent.
+    """
 
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
@@ -147,6 +128,12 @@ class Sensor(Component):
     windowed = True
     #: Whether detections carry a range.
     measures_range = False
+    effects = SENSOR_EFFECTS
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        own = tuple(effect for effect in cls.effects if effect not in SENSOR_EFFECTS)
+        cls.effects = own + SENSOR_EFFECTS
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -157,11 +144,29 @@ class Sensor(Component):
 
     def request(self, port: str) -> Any:
         """Ask whoever feeds us for the targets in our reach."""
-        return self.reach
+        return self._reach_from_body
 
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""
         return SensorOffer(self.measures_range, max(self.azimuth_step_rad, self.elevation_step_rad))
+
+    @cached_property
+    def axes(self) -> BodyAxes:
+        """The sensor's axes; known once the scene's effects are."""
+        mounted = self.built("axes")
+        return mounted[0] if mounted else _BODY_AXES
+
+    @cached_property
+    def _reach_from_body(self) -> Reach:
+        return self.axes.reach(self.reach)
+
+    @cached_property
+    def _judgements(self) -> list[Any]:
+        return self.built("declaration")
+
+    @cached_property
+    def _reporting(self) -> list[Any]:
+        return self.built("report")
 
     def look(self, cells: Cells) -> Look:
         """Decide for each cell whether it is detected; the physics of the sensor."""
@@ -175,18 +180,21 @@ class Sensor(Component):
         targets, rows = held
         rows, reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
-        cells = Cells(targets, rows, wanted, wake.scans)
+        cells = Cells(targets, rows, wanted, wake.scans, wake.ticks)
         look = self.look(cells)
+        for judge in self._judgements:
+            look = judge(cells, look)
         found = np.flatnonzero(look.detected)
         per_scan = np.bincount(cells.row[found], minlength=len(wake))
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
-        azimuth, elevation, range_m = self.measure(p, q, r)
-        return Detections(
+        azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
+        azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        detections = Detections(
             tick=wake.ticks,
             scan=wake.scans,
             evaluated=wanted.sum(axis=1),
-            skipped=_skipped(reason),
+            skipped=_skipped(reason, len(targets.roster)),
             offsets=np.concatenate(([0], np.cumsum(per_scan))),
             target=cells.target[found],
             azimuth_rad=azimuth,
@@ -199,6 +207,16 @@ class Sensor(Component):
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
         )
+        for report in self._reporting:
+            detections = report(detections, targets, rows)
+        return detections
+
+    def report(self) -> dict[str, Any]:
+        """Return when each target was first declared, if the sensor has a rule for it."""
+        declarations = self.context.effects.get("declaration")
+        if declarations is None or self.p.declare_m is None:
+            return {}
+        return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
 
     def _decide(self, targets: RelativeTargets, rows: IntArray) -> tuple[IntArray, ReasonArray]:
         """Return message rows and reasons for each scan, from the gate's decision if it has one."""
@@ -210,7 +228,7 @@ class Sensor(Component):
                     return rows, decision.reason
                 return rows, decision.reason[place]
         part = targets.take(rows)
-        reason = self.reach.decide(
+        reason = self._reach_from_body.decide(
             part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
         )
         return rows, reason
@@ -218,7 +236,7 @@ class Sensor(Component):
     def measure(
         self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a true line of sight to the sensor's grid, inside its field of view (§3.5.1).
+        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
 
         Returns
         -------
@@ -250,5 +268,7 @@ class Sensor(Component):
         return wrap_pi(round_to_grid(unwrapped, step, limit_low=low, limit_high=high))
 
 
-def _skipped(reason: ReasonArray) -> dict[str, IntArray]:
-    return {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}
+def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:
+    skipped = {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}
+    skipped[CULLED] = np.full(len(reason), everybody - reason.shape[1])
+    return skipped

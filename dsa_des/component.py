@@ -147,6 +147,8 @@ class Context:
     effects : dict
         What was built of this block's effects, by name, in the order of their declaration; known
         when `Component.setup` is called.
+    simulate_everything : bool
+        Whether a block must not leave out work that cannot change a result.
     """
 
     streams: Streams
@@ -156,6 +158,7 @@ class Context:
     producers: list[Producer] = field(default_factory=list)
     sections: Mapping[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
+    simulate_everything: bool = False
 
 
 class Component:

@@ -7,9 +7,10 @@ nothing that is recorded.
 
 import random
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import count, pairwise
 from typing import Any
 
@@ -47,16 +48,25 @@ class Outcome:
         Simulated time.
     cpu_s : float
         Processor time of the simulation itself.
-    report : dict
-        Sections of the summary that blocks gave (`Component.report`).
     windowed : list of str
         Blocks that ran in look-ahead windows.
+    components : mapping
+        The blocks, for `report`.
     """
 
     duration_s: float
     cpu_s: float
-    report: dict[str, Any] = field(default_factory=dict)
-    windowed: list[str] = field(default_factory=list)
+    windowed: list[str]
+    components: Mapping[str, Component]
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
+        sections: dict[str, Any] = {}
+        for component in self.components.values():
+            for section, content in component.report().items():
+                sections.setdefault(section, {}).update(content)
+        return sections
 
 
 class Simulation:
@@ -113,7 +123,7 @@ class Simulation:
         self._window = window
         self._cuts = sorted(cuts)
         self._depth = depths(scene.graph)
-        self.components = self._build_components()
+        self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
@@ -123,12 +133,17 @@ class Simulation:
 
     # -- building ------------------------------------------------------------------------------
 
-    def _build_components(self) -> dict[str, Component]:
+    def _build_components(self, simulate_everything: bool) -> dict[str, Component]:
         streams = Streams(self.scene.seed)
         components: dict[str, Component] = {}
         problems: list[Problem] = []
         for name, block in self.scene.blocks.items():
-            context = Context(streams, self.ticks_per_s, sections=self.scene.sections)
+            context = Context(
+                streams,
+                self.ticks_per_s,
+                sections=self.scene.sections,
+                simulate_everything=simulate_everything,
+            )
             try:
                 components[name] = block.cls(name, block.parameters, context)
             except (ValueError, OSError) as error:
@@ -177,17 +192,20 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
+        # Offers go down the chain first, so that a block may pass on what it was offered;
+        # requests then go up it, while the blocks are set up.
+        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
+            self.components[name].context.producers = [
+                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
+                for wire in self.scene.wires
+                if wire.target == name
+            ]
         for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
             component = self.components[name]
             component.context.consumers = [
                 Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
                 for wire in self.scene.wires
                 if wire.source == name
-            ]
-            component.context.producers = [
-                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
-                for wire in self.scene.wires
-                if wire.target == name
             ]
             try:
                 component.setup()
@@ -354,8 +372,8 @@ class Simulation:
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,
-            self._reports(),
             sorted(name for name, node in self.nodes.items() if node.windowed),
+            self.components,
         )
 
     def _windows(self, end: int) -> Iterator[tuple[int, int]]:
@@ -381,13 +399,6 @@ class Simulation:
                 if exact is not None:
                     raise exact from exact.__cause__
             raise failure from cause
-
-    def _reports(self) -> dict[str, Any]:
-        sections: dict[str, Any] = {}
-        for component in self.components.values():
-            for section, content in component.report().items():
-                sections.setdefault(section, {}).update(content)
-        return sections
 
     def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""

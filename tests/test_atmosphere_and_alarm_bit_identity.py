@@ -20,12 +20,12 @@ from components.optical.false_alarms import false_alarm_direction, false_alarm_i
 from components.radar.beam_sweep import illumination_offset_s
 from components.radar.clutter import clutter_detection_probability
 from components.radar.false_alarms import (
-    ResolutionCells,
     false_alarm_count,
     false_alarm_positions,
     false_alarm_snr,
 )
 from components.radar.ground_clutter import ground_clutter_rcs_m2
+from components.radar.resolution_cells import ResolutionCells
 
 COUNT = 10_000
 WEATHER = attenuation_table(

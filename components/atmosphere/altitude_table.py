@@ -104,8 +104,9 @@ def attenuation_table(
     Notes
     -----
     Recommendations ITU-R P.676-12, P.835-6, P.838-3, P.839-4 and P.840-8. The gases between nodes
-    are interpolated linearly: with 25 m steps the error is below 3e-5 of their attenuation at
-    altitudes up to 12 km. Below -1 km and above 40 km they stay as they are there.
+    are interpolated linearly: with 25 m steps the error is below 3e-5 of their attenuation up to
+    15 km, and 4.5e-4 within the one step that holds the tropopause (11 km). Below -1 km and above
+    40 km they stay as they are there.
     """
     rain_rate = float(not_negative("rain_rate_mm_h", rain_rate_mm_h))
     water = float(not_negative("fog_liquid_water_g_m3", fog_liquid_water_g_m3))

@@ -46,6 +46,7 @@ class Detected:
             # Codes of a row group speak of that row group's names only.
             lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
             for name, index in _by_name(rows["block"]):
+                index = index[code[index] >= 0]  # a false alarm has no place to be marked at
                 index = index[:: max(1, len(index) // most)]
                 part = (rows["time_s"][index], rows["true_range_m"][index], lookup[code[index]])
                 parts.setdefault(name, []).append(part)

@@ -48,9 +48,10 @@ class SensorSummary:
         Returns
         -------
         dict
-            ``{"sensors": {block: {"scans", "evaluated", "detections", "skipped",
-            "first_detection", "last_detection"}}}``. ``evaluated`` counts target evaluations over
-            all scans, ``skipped`` targets not evaluated, by reason. A detection is
+            ``{"sensors": {block: {"scans", "evaluated", "detections", "false_alarms", "skipped",
+            "first_detection", "last_detection"}}}``. ``detections`` are those of targets,
+            ``false_alarms`` all others. ``evaluated`` counts target evaluations over all scans,
+            ``skipped`` targets not evaluated, by reason. A detection is
             ``{"time_s", "range_m", "target"}`` or None; ``range_m`` is the true slant range at
             that instant, for every sensor, also those that measure none; of several targets
             detected in one instant it is the nearest.
@@ -86,6 +87,7 @@ class _Sensor:
         self.scans = 0
         self.evaluated = 0
         self.detections = 0
+        self.false_alarms = 0
         self.skipped = dict.fromkeys(SKIP_COLUMNS, 0)
         self.first: _Sighting | None = None
         self.last: _Sighting | None = None
@@ -98,6 +100,12 @@ class _Sensor:
                 self.skipped[name] += int(_numbers(columns, name)[rows].sum())
 
     def add_detections(self, columns: Columns, rows: IntArray) -> None:
+        true = rows[_codes(columns["target"])[rows] >= 0]
+        self.false_alarms += len(rows) - len(true)
+        if len(true):
+            self._add_true(columns, true)
+
+    def _add_true(self, columns: Columns, rows: IntArray) -> None:
         self.detections += len(rows)
         tick = _numbers(columns, "tick")
         if self.first is None or self.first.tick == tick[rows[0]]:
@@ -113,6 +121,7 @@ class _Sensor:
             "scans": self.scans,
             "evaluated": self.evaluated,
             "detections": self.detections,
+            "false_alarms": self.false_alarms,
             "skipped": {name.removeprefix(_SKIPPED): n for name, n in self.skipped.items()},
             "first_detection": None if self.first is None else self.first.result(),
             "last_detection": None if self.last is None else self.last.result(),
@@ -152,6 +161,11 @@ def _nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
     if one is None or math.isnan(one.range_m):
         return other
     return other if other.range_m < one.range_m else one
+
+
+def _codes(column: Any) -> IntArray:
+    assert isinstance(column, Text)
+    return np.asarray(column.codes)
 
 
 def _numbers(columns: Columns, name: str) -> Any:

@@ -6,7 +6,9 @@ import numpy as np
 from pydantic import Field
 
 from components.fusion.coincidence import latest_in_gate, same_instant
+from components.fusion.false_alarms import pass_false_alarms
 from components.messages import Detections, FusedDetections, SensorOffer
+from components.true_entries import true_entries
 from dsa_des.component import Component, NonNegativeRational, Parameters
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
@@ -29,7 +31,7 @@ class PickBest(Component):
     Range comes from a sensor that measures it, angles from one that does not (an optical one)
     where there is one; among equals the finest angular resolution wins, then the name. What is
     missing is taken from what there is. Output comes at every instant a sensor reports, for the
-    targets detected then.
+    targets detected then. False alarms pass through alone: only a target ties detections together.
     """
 
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
@@ -61,9 +63,13 @@ class PickBest(Component):
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""
-        arrivals = {new.source: new for new in wake.arrivals("detections")}
-        if not arrivals:
+        reported = {new.source: new for new in wake.arrivals("detections")}
+        if not reported:
             return None
+        arrivals = {
+            name: Arrivals(name, new.tick, true_entries(new.message))
+            for name, new in reported.items()
+        }
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
@@ -79,7 +85,8 @@ class PickBest(Component):
             entries = {
                 name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
             }
-        return self._combine(wake.ticks, row, target, arrivals, entries)
+        fused = self._combine(wake.ticks, row, target, arrivals, entries)
+        return pass_false_alarms(fused, reported, [self.sensors[i] for i in self._by_range])
 
     def _with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""

@@ -15,9 +15,12 @@ from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
 from components.messages import RelativeTargets, TrafficStates
+from components.navigation import NavigationErrors
+from components.reach import FarthestLook, farthest_look
 from dsa_des.component import Component, Parameters
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
+from dsa_des.types import FloatArray
 from dsa_des.wake import Wake
 
 
@@ -38,7 +41,22 @@ class Transform(Component):
     outputs = {"targets": Output(RelativeTargets, "Targets as seen from the ownship.")}
     Parameters = TransformParameters
     windowed = True
+    effects = (NavigationErrors(),)
     line_of_sight: ClassVar[Callable[..., tuple[Any, Any, Any]]]
+
+    def setup(self) -> None:
+        """Take what the ownship believes of itself."""
+        self._beliefs: list[Callable[[TrafficStates], dict[str, FloatArray]]] = self.built(
+            "ownship"
+        )
+
+    def request(self, port: str) -> FarthestLook:
+        """Ask for the targets that somebody downstream may look at."""
+        return farthest_look(consumer.request for consumer in self.context.consumers)
+
+    def offer(self, port: str) -> Any:
+        """Pass on what we were offered."""
+        return self.context.producers[0].offer if self.context.producers else None
 
     def run(self, wake: Wake) -> Message | None:
         """Transform every target at every instant."""
@@ -76,7 +94,15 @@ class Transform(Component):
             alt_m=states.alt_m,
             present=states.present,
             roster=states.roster,
+            columns=states.columns,
+            believed=self._believed(states),
         )
+
+    def _believed(self, states: TrafficStates) -> dict[str, FloatArray] | None:
+        """Return what the ownship believes of itself, if that is not the truth."""
+        for belief in self._beliefs:
+            return belief(states)
+        return None
 
 
 class FlatEarth(Transform):

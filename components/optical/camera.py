@@ -1,17 +1,22 @@
 """What EO and IR cameras have in common: pixels, signature, threshold (thesis §3.5.2)."""
 
 import math
-from typing import Any, Literal
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
-from components.optical.line_of_sight_rate import line_of_sight_rate
+from components.optical.dynamic_signature import DynamicSignature
+from components.optical.farthest_range import farthest_detection_m
+from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import confidence, pixels_covered, total_signature
 from components.optical.weather_effects import Visibility
 from components.sensor import Cells, Look, Sensor, SensorParameters
+from dsa_des.effects import Effect
 from dsa_des.types import FloatArray
-from dsa_des.wake import Wake
+
+CellValues = Callable[[Cells], FloatArray]
 
 
 class CameraParameters(SensorParameters):
@@ -31,6 +36,9 @@ class CameraParameters(SensorParameters):
         default="exact",
         description="How the line of sight's rate is formed: turning angle, or eq. 16-17.",
     )
+    false_alarms_per_frame: float = Field(
+        default=0.0, ge=0, le=1, description="Probability that a frame brings a false alarm."
+    )
 
 
 class Camera(Sensor):
@@ -41,7 +49,14 @@ class Camera(Sensor):
     """
 
     Parameters = CameraParameters
-    effects = (Visibility(),)
+    #: Columns of the roster that hold the areas and the contrast it sees.
+    areas: ClassVar[str] = ""
+    contrasts: ClassVar[str] = ""
+    effects: ClassVar[tuple[Effect, ...]] = (
+        DynamicSignature(),
+        Visibility(),
+        FrameFalseAlarms(),
+    )
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -55,13 +70,19 @@ class Camera(Sensor):
             self.azimuth_step_rad = self.pixel_azimuth_rad
         if not parameters.elevation_resolution_deg:
             self.elevation_step_rad = self.pixel_elevation_rad
-        self._contrast_factors: list[Any] = []
-        # Tick and NED angles of the last scan, one column per target; NaN where it saw none.
-        self._last_look: tuple[int, FloatArray, FloatArray] | None = None
+        self._areas: list[CellValues] = []
+        self._contrast_factors: list[CellValues] = []
+        self._signatures: list[CellValues] = []
 
     def setup(self) -> None:
-        """Take what the scene's effects do to the contrast."""
+        """Take what the scene's effects add to areas and signatures, and do to the contrast."""
+        self._areas = self.built("area")
         self._contrast_factors = self.built("contrast")
+        self._signatures = self.built("signature")
+        if not self.context.simulate_everything:
+            farthest_m = farthest_detection_m(self, self.areas, self.contrasts)
+            nearer_m = min(self.reach.range_max_m, farthest_m)
+            self.reach = replace(self.reach, range_max_m=nearer_m)
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell, m²."""
@@ -71,56 +92,25 @@ class Camera(Sensor):
         """Return the contrast gain P of each cell."""
         raise TypeError(f"{type(self).__name__} has no contrast(cells)")
 
-    def run(self, wake: Wake) -> Any:
-        """Look at every target in reach at every scan of the wake."""
-        self._ticks = wake.ticks
-        return super().run(wake)
-
     def look(self, cells: Cells) -> Look:
         """Compare every target's signature with the threshold."""
+        area = self.area(cells)
+        for added in self._areas:
+            area = area + added(cells)
         pixels = pixels_covered(
-            self.area(cells),
+            area,
             cells.range_m,
             pixel_azimuth_rad=self.pixel_azimuth_rad,
             pixel_elevation_rad=self.pixel_elevation_rad,
             sensor_pixels=float(self.p.azimuth_pixels * self.p.elevation_pixels),
         )
-        rate = self._rate(cells) if self.p.dynamic_weight > 0 else 0.0
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
             contrast = contrast * factor(cells)
         signature = total_signature(
-            pixels,
-            rate,
-            contrast_gain=contrast,
-            static_weight=self.p.static_weight,
-            dynamic_weight=self.p.dynamic_weight,
+            pixels, contrast_gain=contrast, static_weight=self.p.static_weight
         )
+        for added in self._signatures:
+            signature = signature + added(cells)
         margin = confidence(signature, self.p.threshold)
         return Look(margin >= 0.0, margin, {"pixels": pixels})
-
-    def _rate(self, cells: Cells) -> FloatArray:
-        """Return each cell's rate of the line of sight since the scan before, rad/s.
-
-        A target's first look has none, nor has the first after a scan that did not see it.
-        """
-        scans, targets = len(self._ticks), len(cells.roster)
-        azimuth = np.full((scans + 1, targets), np.nan)
-        elevation = np.full((scans + 1, targets), np.nan)
-        tick = np.concatenate(([0], self._ticks))
-        if self._last_look is not None:
-            tick[0], azimuth[0], elevation[0] = self._last_look
-        azimuth[cells.row + 1, cells.target] = cells.azimuth_rad
-        elevation[cells.row + 1, cells.target] = cells.elevation_rad
-        self._last_look = (int(tick[-1]), azimuth[-1].copy(), elevation[-1].copy())
-        before = azimuth[cells.row, cells.target]
-        interval = (tick[1:] - tick[:-1])[cells.row] / self.context.ticks_per_s
-        return line_of_sight_rate(
-            cells.azimuth_rad,
-            cells.elevation_rad,
-            before,
-            elevation[cells.row, cells.target],
-            np.where(np.isnan(before), 1.0, interval),
-            seen_before=~np.isnan(before),
-            model=self.p.rate,
-        )

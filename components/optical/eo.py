@@ -1,13 +1,11 @@
 """The electro-optical camera (``optical.eo``, thesis §3.5.2)."""
 
-import math
 from typing import Literal
 
-import numpy as np
 from pydantic import Field
 
+from components.optical.background import Background
 from components.optical.camera import Camera, CameraParameters
-from components.optical.contrast import contrast_gain
 from components.optical.silhouette import visible_area
 from components.optical.tabulated_area import tabulated_area
 from components.sensor import Cells
@@ -49,6 +47,8 @@ class ElectroOptical(Camera):
     """An electro-optical camera that sees a target's silhouette against its background."""
 
     Parameters = ElectroOpticalParameters
+    areas, contrasts = "eo", "contrast"
+    effects = (Background(), *Camera.effects)
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the silhouette of sphere, cylinder and plane (eq. 9-13, errata 9), m²."""
@@ -66,22 +66,5 @@ class ElectroOptical(Camera):
         )
 
     def contrast(self, cells: Cells) -> FloatArray:
-        """Return each target's contrast gain before the weather: constant, or by daylight."""
-        constant: FloatArray = cells.of_target(cells.roster.column("contrast"))
-        p = self.p
-        if p.background == "none":
-            return constant
-        gain = contrast_gain(
-            model="daylight",
-            contrast=constant,
-            azimuth_rad=cells.azimuth_rad,
-            elevation_rad=cells.elevation_rad,
-            sun_azimuth_rad=math.radians(p.sun_azimuth_deg),
-            sun_elevation_rad=math.radians(p.sun_elevation_deg),
-            sun_exclusion_rad=math.radians(p.sun_exclusion_deg),
-            paint_reflectance=cells.of_target(cells.roster.column("paint_reflectance")),
-            ground_reflectance=p.ground_reflectance,
-            sky=p.sky,
-            background=p.background,
-        )
-        return np.asarray(gain)
+        """Return each target's own contrast gain, before background and weather."""
+        return cells.of_target(cells.roster.column("contrast"))

@@ -4,7 +4,8 @@ import numpy as np
 from pydantic import Field
 
 from components.optical.camera import Camera, CameraParameters
-from components.optical.infrared_area import infrared_area, plume_area
+from components.optical.infrared_area import infrared_area
+from components.optical.plume import Plume
 from components.optical.tabulated_area import tabulated_area
 from components.sensor import Cells
 from dsa_des.types import FloatArray
@@ -24,40 +25,25 @@ class Infrared(Camera):
     """An infrared camera that sees a target's warm areas, its front and back unequal."""
 
     Parameters = InfraredParameters
+    areas, contrasts = "ir", "contrast_ir"
+    effects = (Plume(), *Camera.effects)
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the warm silhouette with its own back (eq. 20-21, errata 12), m²."""
         if self.p.silhouette == "aspect_table":
-            area = tabulated_area(cells, "ir.silhouette_table")
-        else:
-            area = infrared_area(
-                cells.relative_heading_rad,
-                cells.target_pitch_rad,
-                cells.target_roll_rad,
-                cells.elevation_rad,
-                front_m2=cells.of_target(cells.roster.column("ir.front_m2")),
-                back_m2=cells.of_target(cells.roster.column("ir.back_m2")),
-                side_m2=cells.of_target(cells.roster.column("ir.side_m2")),
-                horizontal_m2=cells.of_target(cells.roster.column("ir.horizontal_m2")),
-                model=self.p.silhouette,
-            )
-        return area + self._plumes(cells) if self.p.plume else area
-
-    def _plumes(self, cells: Cells) -> FloatArray:
-        engines = cells.of_target(cells.roster.engines)
-        back = cells.of_target(cells.roster.column("ir.back_m2"))
-        plumes = np.zeros(len(cells))
-        for engine in np.unique(engines).tolist():
-            chosen = np.flatnonzero(engines == engine)
-            plumes[chosen] = plume_area(
-                cells.relative_heading_rad[chosen],
-                cells.target_pitch_rad[chosen],
-                cells.target_roll_rad[chosen],
-                cells.elevation_rad[chosen],
-                back_m2=back[chosen],
-                engine=engine,
-            )
-        return plumes
+            return tabulated_area(cells, "ir.silhouette_table")
+        area = infrared_area(
+            cells.relative_heading_rad,
+            cells.target_pitch_rad,
+            cells.target_roll_rad,
+            cells.elevation_rad,
+            front_m2=cells.of_target(cells.roster.column("ir.front_m2")),
+            back_m2=cells.of_target(cells.roster.column("ir.back_m2")),
+            side_m2=cells.of_target(cells.roster.column("ir.side_m2")),
+            horizontal_m2=cells.of_target(cells.roster.column("ir.horizontal_m2")),
+            model=self.p.silhouette,
+        )
+        return np.asarray(area)
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's contrast gain for IR."""

@@ -24,7 +24,8 @@ def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: floa
     threshold : (m,) array
         In [0, largest_threshold], in the unit in which noise alone is Exponential(1).
     largest_threshold : float
-        At most 240 (a false-alarm probability of 1e-104). It sets the number of terms, so that an element's bits depend on nothing else.
+        At most 240 (a false-alarm probability of 1e-104). It sets the number of terms, so that
+        an element's bits depend on nothing else.
 
     Returns
     -------

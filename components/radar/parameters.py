@@ -16,6 +16,11 @@ class RadarParameters(SensorParameters):
     range_resolution_m: float = Field(
         default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
     )
+    beam_sweep: bool = Field(
+        default=False,
+        description="Whether a beam sweeps clockwise over the field of view once per scan; when "
+        "it lights each detection is recorded.",
+    )
 
 
 class Calibration(Parameters):
@@ -55,6 +60,16 @@ class LinkBudgetParameters(RadarParameters):
     false_alarm_probability: float = Field(
         default=0.05, gt=0, lt=1, description="Probability of false alarm per look and cell."
     )
+    false_alarms: bool = Field(
+        default=False, description="Whether noise is reported too, in any resolution cell."
+    )
+    cell_false_alarm_probability: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="Probability of false alarm per scan and resolution cell, for false_alarms; "
+        "by default false_alarm_probability.",
+    )
     polarisation: Literal["horizontal", "vertical", "circular"] = Field(
         default="circular", description="Polarisation of the wave; rain attenuates each unlike."
     )
@@ -72,6 +87,13 @@ class LinkBudgetParameters(RadarParameters):
                 "set one of them"
             )
         return self
+
+    @property
+    def cell_pfa(self) -> float:
+        """Probability of false alarm per scan and resolution cell."""
+        if self.cell_false_alarm_probability is None:
+            return self.false_alarm_probability
+        return self.cell_false_alarm_probability
 
     def link_budget(self) -> LinkBudget:
         """Return the link budget, its bandwidth calibrated where the scene asks for it."""

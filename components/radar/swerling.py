@@ -6,9 +6,10 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.radar.aspect_rcs import mean_rcs_m2
+from components.radar.clutter import clutter_detection_probability
 from components.radar.detection import detection_probability
 from components.radar.parameters import LinkBudgetParameters
+from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.sensor import Cells, Look
@@ -59,37 +60,44 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
+    effects = (RcsFluctuation(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
+        # Until the scene's effects are known, as the targets' own models call for.
+        self._models: ModelsOfCells = models_of(parameters.swerling)
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
         self._reference_db: dict[int, float] = {}
+
+    def setup(self) -> None:
+        """Take the scene's effects; without fluctuation every target is steady."""
+        super().setup()
+        (self._models,) = self.built("RCS") or [steady]
+
+    def false_alarm_zero_db(self) -> float:
+        """Return the SNR that the radar's own model needs for `reference_pd`; steady if none."""
+        return self._reference((self.p.swerling or 0) % 5)
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
         snr = self.snr(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
+        cnr = self.clutter_cnr(cells)
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
         for model, chosen in self._detection_models(cells):
-            pd[chosen] = detection_probability(
-                snr[chosen],
-                pulses=self.p.pulses,
-                false_alarm_probability=self.p.false_alarm_probability,
-                model=f"swerling{model}",
-                method=self.p.detection,
-            )
+            pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
         detected = echo & (cells.draws(self._draws) < pd)
         return Look(detected, confidence, {"snr_db": snr_db, "detection_probability": pd})
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
-        if self.p.fluctuation == "probability":
+        if self.p.fluctuation == "probability" or self._models is steady:
             return super().snr(cells)
-        rcs = mean_rcs_m2(cells)
+        rcs = self._mean_rcs_m2(cells)
         keys = cells.roster.keys[cells.target]
         for model, chosen in self._models(cells):
             target, scan = keys[chosen], cells.scan[chosen]
@@ -101,6 +109,29 @@ class SwerlingRadar(LinkBudgetRadar):
                 rcs[chosen], draw, pulses=self.p.pulses, model=f"swerling{model}"
             )
         return self.echo_snr(cells, rcs)
+
+    def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
+        """Return Pd of one model's cells; where there is clutter, of the echo within it."""
+        pd = np.asarray(
+            detection_probability(
+                snr,
+                pulses=self.p.pulses,
+                false_alarm_probability=self.p.false_alarm_probability,
+                model=f"swerling{model}",
+                method=self.p.detection,
+            )
+        )
+        if cnr is None or not cnr.any():
+            return pd
+        cluttered = np.flatnonzero(cnr)
+        pd[cluttered] = clutter_detection_probability(
+            snr[cluttered],
+            cnr[cluttered],
+            false_alarm_probability=self.p.false_alarm_probability,
+            model=f"swerling{model}",
+            clutter=self.context.sections["terrain"].clutter_mean,
+        )
+        return pd
 
     def steepest_pd(self) -> float:
         """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid."""
@@ -122,16 +153,6 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.fluctuation == "sampled":
             return [(0, slice(None))]
         return self._models(cells)
-
-    def _models(self, cells: Cells) -> list[tuple[int, Any]]:
-        """Return each fluctuation model with the cells it holds for."""
-        if self.p.swerling is not None:
-            return [(self.p.swerling % 5, slice(None))]
-        models = cells.of_target(cells.roster.swerling)
-        found = np.unique(models).tolist()
-        if len(found) == 1:
-            return [(found[0], slice(None))]
-        return [(model, np.flatnonzero(models == model)) for model in found]
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:

@@ -1,16 +1,29 @@
 """A radar that detects above a fixed SNR (``radar.threshold``, thesis §3.5.1)."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
+from components.aircraft import Roster
+from components.known_targets import known_targets
+from components.messages import Detections
 from components.radar.aspect_rcs import mean_rcs_m2
+from components.radar.beam_effects import BeamSweep
+from components.radar.clutter_effects import GroundClutter
+from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.parameters import LinkBudgetParameters, budget_report
+from components.radar.radar_block import Radar
+from components.radar.range_effects import BlindRange
+from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
-from components.radar.weather_effects import WEATHER_EFFECTS, CellFactor
-from components.sensor import Cells, Look, Sensor
+from components.radar.weather_effects import WEATHER_EFFECTS
+from components.sensor import Cells, Look
+from dsa_des.effects import Effect
 from dsa_des.types import FloatArray
+from dsa_des.wake import Wake
 
 
 class ThresholdParameters(LinkBudgetParameters):
@@ -22,32 +35,78 @@ class ThresholdParameters(LinkBudgetParameters):
     )
 
 
-class LinkBudgetRadar(Sensor):
+class LinkBudgetRadar(Radar):
     """A radar whose decision rests on the SNR of its link budget."""
 
     Parameters = LinkBudgetParameters
-    measures_range = True
-    effects = WEATHER_EFFECTS
+    effects: ClassVar[tuple[Effect, ...]] = (
+        AspectRcs(),
+        *WEATHER_EFFECTS,
+        BlindRange(),
+        GroundClutter(),
+        FalseAlarms(),
+        BeamSweep(),
+    )
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.budget = parameters.link_budget()
-        self._snr_factors: list[CellFactor] = []
+        # Until the scene's effects are known, all that the parameters and targets call for.
+        self._echo_budget = self.budget
+        self._mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
+        self._clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
+        self._roster: Roster | None = None
 
     def setup(self) -> None:
-        """Take what the scene's effects do to the SNR."""
-        self._snr_factors = self.built("SNR")
+        """Take what the scene's effects do to the SNR, and leave out what it does not call for."""
+        super().setup()
+        self._echo_budget = self._without_blind_range()
+        (self._mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
+        (self._clutter_rcs_m2,) = self.built("clutter") or [None]
+
+    def _without_blind_range(self) -> Any:
+        """Return the link budget that ends where the antenna's far field does."""
+        far_field = replace(self.budget, minimum_range_m=None)
+        # A minimum range inside the near field is the scene's word that there are echoes.
+        return far_field if far_field.nearest_m < self.budget.nearest_m else self.budget
+
+    def run(self, wake: Wake) -> Detections | None:
+        """Look at every target in reach at every scan of the wake."""
+        held = wake.held("targets")
+        if held is not None and held[0].roster is not self._roster:
+            self._roster = held[0].roster
+            self._check_announced(self._roster)
+        return super().run(wake)
+
+    def _check_announced(self, roster: Roster) -> None:
+        """Refuse targets that the effects' verdicts have not seen."""
+        known = known_targets(self.context)
+        if known and not any(roster.names == other.names for other in known):
+            raise ValueError(
+                "these targets were not announced before the run, and others were: a traffic "
+                "block must announce its targets (components.known_targets)"
+            )
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.echo_snr(cells, mean_rcs_m2(cells))
+        return self.echo_snr(cells, self._mean_rcs_m2(cells))
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""
-        snr = self.budget.snr(cells.range_m, rcs_m2)
-        for factor in self._snr_factors:
+        snr = self._echo_budget.snr(cells.range_m, rcs_m2)
+        for factor in self.snr_factors:
             snr = snr * factor(cells)
         return snr
+
+    def clutter_cnr(self, cells: Cells) -> FloatArray | None:
+        """Return each cell's clutter-to-noise ratio (linear), or None where there is no ground."""
+        if self._clutter_rcs_m2 is None:
+            return None
+        return self.echo_snr(cells, self._clutter_rcs_m2(cells))
+
+    def false_alarm_zero_db(self) -> float:
+        """Return the SNR in dB at which the confidence of a false alarm is 0."""
+        raise TypeError(f"{type(self).__name__} does not say what its confidence is measured from")
 
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any target, or None where Pd jumps."""
@@ -71,7 +130,8 @@ class LinkBudgetRadar(Sensor):
 class ThresholdRadar(LinkBudgetRadar):
     """Detects a target when its mean SNR reaches a threshold.
 
-    Confidence is the SNR above the threshold in dB.
+    Confidence is the SNR above the threshold in dB. Ground clutter counts as more noise: where
+    there is some, the SNR is that over noise and clutter (the recorded one is over noise alone).
     """
 
     Parameters = ThresholdParameters
@@ -86,10 +146,17 @@ class ThresholdRadar(LinkBudgetRadar):
             model = "swerling1" if known is None else f"swerling{known.swerling}"
             self.threshold_db = self.required_snr_db(pd, model)
 
+    def false_alarm_zero_db(self) -> float:
+        """Return the threshold."""
+        return self.threshold_db
+
     def look(self, cells: Cells) -> Look:
         """Compare every cell's SNR with the threshold."""
         snr = self.snr(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         margin = snr_db - self.threshold_db
+        cnr = self.clutter_cnr(cells)
+        if cnr is not None:
+            margin = margin - 10.0 * np.log10(1.0 + cnr)
         return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db})

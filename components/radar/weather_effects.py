@@ -1,7 +1,6 @@
 """What the air takes from a radar's echo: gas, rain and fog, on the way there and back."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,12 +8,11 @@ import numpy as np
 from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
 from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
 from components.environment import Weather
+from components.radar.radar_block import CellFactor
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
 from components.sensor import Cells
 from dsa_des.effects import Effect, Verdict
 from dsa_des.types import FloatArray
-
-CellFactor = Callable[[Cells], FloatArray]
 
 
 class Attenuation(Effect):

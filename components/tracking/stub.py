@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from components.messages import FusedDetections, Tracks
+from components.true_entries import true_entries
 from dsa_des.component import Component, Parameters
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
@@ -25,7 +26,8 @@ class StubParameters(Parameters):
 class TrackerStub(Component):
     """Holds the last fused measurement of each target, its age, and which sensors gave it.
 
-    Tracks are sent at every instant at which at least one target was updated.
+    Tracks are sent at every instant at which at least one target was updated. A false alarm belongs
+    to no target and is left out: a stub does not start tracks.
     """
 
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
@@ -43,6 +45,7 @@ class TrackerStub(Component):
         fused = wake["fused"]
         if fused is None:
             return None
+        fused = true_entries(fused)
         counts = np.diff(fused.offsets)
         updated = np.flatnonzero(counts)
         if len(updated) == 0:

@@ -40,6 +40,8 @@ class Segment:
         The formula's table. For "hold": lat_deg, lon_deg, alt_m, climb_mps, yaw_rad, rate_rad_s.
     pitch_rad, roll_rad : float
         The attitude that follows from the motion.
+    speed_mps : float
+        Along the path, climb included.
     """
 
     kind: Kind
@@ -47,6 +49,7 @@ class Segment:
     parameters: FloatArray
     pitch_rad: float
     roll_rad: float
+    speed_mps: float
 
 
 def hold_state(
@@ -233,7 +236,9 @@ class LegBuilder:
         """Note a segment and move to its end."""
         if duration == 0.0:
             return duration
-        segment = Segment(kind, self.time, table, pitch, roll)
+        # A hold's table has its climb in row 3; elsewhere the pitch is that of the path.
+        speed = abs(float(table[3])) if kind == "hold" else self.speed / math.cos(pitch)
+        segment = Segment(kind, self.time, table, pitch, roll, speed)
         self.segments.append(segment)
         if duration is not None:
             self.time += duration

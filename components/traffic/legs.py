@@ -217,6 +217,11 @@ class ScriptedTrajectory:
         )
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present).reshaped(times.shape)
 
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along the path at any time."""
+        return max((segment.speed_mps for segment in self.segments), default=0.0)
+
     def interval_present(self) -> tuple[float, float]:
         """Return the first and last times the aircraft is there; the last may be infinite."""
         return self.start_time_s, self.end_time_s

@@ -1,5 +1,6 @@
 """What every traffic source has in common: states at the instants that sensors ask for."""
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, ClassVar, Protocol
@@ -10,7 +11,10 @@ from pydantic import Field
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.messages import TrafficStates
+from components.reach import farthest_look
+from components.traffic.culling import Culling
 from components.traffic.state import TrajectoryState
+from components.traffic.terrain_check import check_above_terrain
 from dsa_des.clock import ClockSpec
 from dsa_des.component import Component, Parameters, PositiveRational
 from dsa_des.message import Message
@@ -68,16 +72,36 @@ class TrafficSource(Component):
         rate = parameters.update_rate_hz
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
+    def offer(self, port: str) -> Roster:
+        """Say what the targets are."""
+        return self.roster
+
+    def setup(self) -> None:
+        """Learn how far anybody looks; what stays beyond it is not moved."""
+        terrain = self.context.sections.get("terrain")
+        if terrain is not None and terrain.height_m is not None:
+            check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
+        self._everybody = np.arange(len(self.roster))
+        self._culling: Culling | None = None
+        reach_m = farthest_look(c.request for c in self.context.consumers).range_m
+        on_demand = self.clock_of(self.p) is None
+        if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
+            subset = type(self.fleet)
+            self._culling = Culling(self.own, self.targets, self.fleet, subset, reach_m)
+
     @property
     def width(self) -> int:
-        """Number of targets."""
-        return len(self.roster)
+        """Number of targets that are moved at the start."""
+        return len(self.roster) if self._culling is None else len(self._culling.active(0, 0)[0])
 
     def run(self, wake: Wake) -> Message:
-        """Return the state of all aircraft at every instant."""
+        """Return the state of all aircraft that may matter, at every instant."""
         time_s = wake.time_s
         own = self.own.at(time_s)
-        states = self.fleet.at(time_s)
+        columns, fleet = self._everybody, self.fleet
+        if self._culling is not None:
+            columns, fleet = self._culling.active(float(time_s[0]), float(time_s[-1]))
+        states = fleet.at(time_s)
         return TrafficStates(
             tick=wake.ticks,
             own_lat_deg=own.lat_deg,
@@ -94,6 +118,7 @@ class TrafficSource(Component):
             roll_rad=states.roll_rad,
             present=states.present & own.present[:, np.newaxis],
             roster=self.roster,
+            columns=columns,
         )
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:

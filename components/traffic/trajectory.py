@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M
+from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight
 from components.traffic.attitude_from_path import attitude_from_path, fit_path
 from components.traffic.normals import (
     FloatArray,
@@ -118,6 +118,7 @@ class SampledTrajectory:
         )
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
         self.coefficients = self._fit_segments()
+        self.max_speed_mps = self._speed_bound()
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give the aircraft's state at some times.
@@ -141,6 +142,26 @@ class SampledTrajectory:
     def interval_present(self) -> tuple[float, float]:
         """Return the times of the first and the last sample, both included."""
         return float(self.sample_times_s[0]), float(self.sample_times_s[-1])
+
+    def _speed_bound(self) -> float:
+        """Return a speed that the interpolated path never exceeds.
+
+        A cubic's velocity is a mix of its end velocities (weights adding up to 1 at most) and of
+        1.5 times its mean velocity at most.
+        """
+        if len(self.sample_times_s) < 2:
+            return 0.0
+        at = slice(None, -1), slice(1, None)
+        _, _, step_m = line_of_sight(
+            *(column[rows] for rows in at for column in (self.lat_deg, self.lon_deg, self.alt_m)),
+            validate=False,
+        )
+        # Chords are shorter than paths on the ground by far less than one per cent.
+        mean = 1.01 * float(np.max(step_m / np.diff(self.sample_times_s)))
+        if self.velocity_enu_mps is None:
+            return mean
+        east, north, up = self.velocity_enu_mps
+        return 1.5 * mean + float(np.max(np.sqrt(east**2 + north**2 + up**2)))
 
     def _fit_segments(self) -> FloatArray:
         """Tabulate each segment's polynomials; the last sample is a segment of its own."""

@@ -1,6 +1,7 @@
 """Attenuation along a path, and what it does to a radar's range."""
 
 import math
+from itertools import pairwise
 
 import mpmath
 import numpy as np
@@ -67,7 +68,7 @@ def mean_of_table(own, target):
     """Return the mean over altitude of the piecewise linear table, constant beyond its ends."""
     gas, step = CLEAR.gas_db_km, 25
     cumulative = [mpmath.mpf(0)]
-    for below, above in zip(gas[:-1], gas[1:], strict=True):
+    for below, above in pairwise(gas):
         cumulative.append(cumulative[-1] + (mpmath.mpf(float(below)) + float(above)) / 2)
     low, high = (mpmath.mpf(x) for x in sorted((own, target)))
 

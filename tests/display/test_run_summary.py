@@ -73,7 +73,13 @@ def test_scans_are_counted_with_what_was_skipped():
     result = sensors_of([("scans", scans(rows))])
     assert (result["eo"]["scans"], result["eo"]["evaluated"]) == (3, 3)
     assert (result["radar"]["scans"], result["radar"]["evaluated"]) == (1, 3)
-    assert result["eo"]["skipped"] == {"absent": 0, "off": 0, "field_of_view": 0, "range": 6}
+    assert result["eo"]["skipped"] == {
+        "absent": 0,
+        "off": 0,
+        "field_of_view": 0,
+        "range": 6,
+        "culled": 0,
+    }
 
 
 @pytest.mark.parametrize("cut", range(1, len(SEEN)))
@@ -92,7 +98,8 @@ def test_a_sensor_that_saw_nothing_is_there():
         "scans": 0,
         "evaluated": 0,
         "detections": 0,
-        "skipped": {"absent": 0, "off": 0, "field_of_view": 0, "range": 0},
+        "false_alarms": 0,
+        "skipped": {"absent": 0, "off": 0, "field_of_view": 0, "range": 0, "culled": 0},
         "first_detection": None,
         "last_detection": None,
     }

@@ -99,7 +99,7 @@ EDGES = [
         lambda: clutter_detection_probability(
             100.0, 100.0, false_alarm_probability=1e-6, model="swerling0", clutter="constant"
         ),
-        0.8808,
+        0.88316,
         1e-3,
     ),
     (

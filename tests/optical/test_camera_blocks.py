@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from components.aircraft import Aircraft, Roster
+from components.optical.background import Background
 from components.optical.contrast import contrast_gain
 from components.optical.eo import ElectroOptical, ElectroOpticalParameters
 from components.optical.infrared_area import infrared_area
 from components.optical.ir import Infrared, InfraredParameters
+from components.optical.plume import Plume
 from components.optical.silhouette import visible_area
 from dsa_des.component import Context
 from dsa_des.errors import SceneError
@@ -118,9 +120,8 @@ def test_tabulated_silhouettes(crafts):
 @pytest.mark.parametrize("silhouette", ["exact", "aspect_table"])
 def test_plume_by_engine(crafts, silhouette):
     cells = cells_of(crafts)
-    extra = ir(silhouette=silhouette, plume=True).area(cells) - ir(silhouette=silhouette).area(
-        cells
-    )
+    camera = ir(silhouette=silhouette, plume=True)
+    extra = Plume().build(camera)(cells)
     for index, engine in enumerate(("propeller", "turbofan", "turbojet")):
         chosen = cells.target == index
         view = [angles[chosen] for angles in view_of(cells)]
@@ -134,6 +135,7 @@ def test_backgrounds(crafts):
     cells = cells_of(crafts)
     constant = np.array([0.6, 1.0, 1.4])[cells.target]
     np.testing.assert_array_equal(eo().contrast(cells), constant)
+    assert not Background().verdict(eo()).simulated
     for background in ("auto", "sky", "ground"):
         camera = eo(
             background=background,
@@ -156,7 +158,8 @@ def test_backgrounds(crafts):
             sky="partly_cloudy",
             background=background,
         )
-        np.testing.assert_array_equal(camera.contrast(cells), expected)
+        seen = camera.contrast(cells) * Background().build(camera)(cells)
+        np.testing.assert_array_equal(seen, expected)
         assert np.any(expected == 0.0) and np.any(expected > 0.0)  # some look into the sun
 
 

@@ -8,12 +8,11 @@ import pytest
 from scipy.special import bdtr, gammaincc
 
 from components.radar.false_alarms import (
-    ResolutionCells,
     false_alarm_count,
     false_alarm_positions,
     false_alarm_snr,
-    resolution_cells,
 )
+from components.radar.resolution_cells import ResolutionCells, resolution_cells
 
 # The thesis's radar: ±110° by ±20° at 1°, 76.2 m cells out to 6.5 km.
 OASYS = resolution_cells(

@@ -53,6 +53,7 @@ def cells_of(crafts, scans, *, range_m=6000.0, heading=math.pi, pitch=0.0, roll=
         alt_m=azimuth,
         present=np.ones(shape, dtype=bool),
         roster=roster,
+        columns=np.arange(len(crafts)),
     )
     rows = np.arange(scans)
     return Cells(targets, rows, targets.present, rows)

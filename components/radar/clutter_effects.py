@@ -1,0 +1,69 @@
+"""What does the ground's echo do to a radar's detections?"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.radar.ground_clutter import ground_clutter_rcs_m2, height_above_terrain_m
+from components.sensor import Cells
+from dsa_des.effects import Effect, Verdict
+from dsa_des.types import FloatArray
+
+_CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
+
+
+class GroundClutter(Effect):
+    """Echo of flat terrain in the cell of each target, where the beam meets it.
+
+    The beam points at the target and is as wide as a resolution cell; clutter more than two
+    beamwidths off its axis is 0. The air takes from the echo of the ground what it takes from the
+    target's. Clutter that is detected where no target is, is not reported.
+    """
+
+    name = "ground clutter"
+    acts_on = "clutter"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] height_m``."""
+        terrain = _terrain(block)
+        if terrain is None:
+            return Verdict(False, "[terrain] height_m is not given")
+        return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
+        terrain = _terrain(block)
+        if terrain is None:
+            return lambda cells: np.zeros(len(cells))
+        for name in _CELL:
+            if getattr(block.p, name) == 0:
+                raise ValueError(
+                    f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
+                )
+        if block.p.pulses > 1:
+            raise ValueError(
+                f"pulses is {block.p.pulses}: ground clutter is known for one look only; set it "
+                "to 1, with integration_gain_db for pulses integrated coherently"
+            )
+
+        def clutter_rcs_m2(cells: Cells) -> FloatArray:
+            height_m = height_above_terrain_m(cells.of_row("own_alt_m"), terrain.height_m)
+            rcs = ground_clutter_rcs_m2(
+                cells.range_m,
+                cells.elevation_rad,
+                height_m,
+                gamma_db=terrain.clutter_gamma_db,
+                azimuth_beamwidth_rad=block.azimuth_step_rad,
+                elevation_beamwidth_rad=block.elevation_step_rad,
+                range_resolution_m=block.range_step_m,
+            )
+            return np.asarray(rcs)
+
+        return clutter_rcs_m2
+
+
+def _terrain(block: Any) -> Any:
+    """Return the scene's terrain, or None where there is none."""
+    terrain = block.context.sections.get("terrain")
+    return None if terrain is None or terrain.height_m is None else terrain

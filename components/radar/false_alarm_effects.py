@@ -1,0 +1,116 @@
+"""What does noise alone add to a radar's report?"""
+
+from typing import Any
+
+import numpy as np
+
+from components.false_detections import add_false_detections
+from components.messages import Detections, RelativeTargets
+from components.radar.false_alarms import false_alarm_count, false_alarm_snr
+from components.radar.field_of_view import cells_of_radar
+from dsa_des.effects import Effect, Verdict
+from dsa_des.types import IntArray
+
+MOST_PER_SCAN = 1e5
+
+_NO_TARGET = np.uint64(0)
+
+
+class FalseAlarms(Effect):
+    """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
+
+    Every resolution cell from the minimum range to ``range_km`` may bring one. They are reported
+    on the sensor's grid after the true detections of their scan, with no target and nothing true.
+    """
+
+    name = "false alarms"
+    acts_on = "report"
+    # A report that holds none is what there is without it.
+    neutral = False
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, and whether the radar is switched on."""
+        if block.p.false_alarms and not block.p.enabled:
+            return Verdict(False, "enabled is false")
+        return Verdict(block.p.false_alarms, f"false_alarms is {str(block.p.false_alarms).lower()}")
+
+    def build(self, block: Any) -> "NoiseReports":
+        """Return what adds false alarms to a report."""
+        return NoiseReports(block)
+
+
+class NoiseReports:
+    """Draws each scan's false alarms with keys of their own.
+
+    Parameters
+    ----------
+    block : Sensor
+        A radar with a link budget.
+
+    Raises
+    ------
+    ValueError
+        If the resolution cells are not known, or more than 1e5 false alarms are expected by scan.
+    """
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        self._cells = cells_of_radar(block)
+        self._pfa = block.p.cell_pfa
+        expected = self._cells.count * self._pfa
+        if expected > MOST_PER_SCAN:
+            key = "cell_false_alarm_probability"
+            if getattr(block.p, key) is None:
+                key += " (not given: false_alarm_probability)"
+            raise ValueError(
+                f"{key} is {self._pfa:g}: with {self._cells.count:,} "
+                f"resolution cells that makes {expected:,.0f} false alarms by scan, and at most "
+                f"{MOST_PER_SCAN:,.0f} are allowed; it must be at most "
+                f"{MOST_PER_SCAN / self._cells.count:.3g}"
+            )
+        self._counts = block.stream("false alarms")
+        self._places = block.stream("false alarm places")
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray
+    ) -> Detections:
+        """Return the report with the false alarms of its scans."""
+        count = false_alarm_count(
+            self._counts.uniform(_NO_TARGET, detections.scan),
+            cells=self._cells.count,
+            false_alarm_probability=self._pfa,
+        )
+        row = np.repeat(np.arange(len(count)), count)
+        if len(row) == 0:
+            return detections
+        # Keyed by its number within the scan, where detections are keyed by target.
+        number = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)).astype(
+            np.uint64
+        )
+        scan = detections.scan[row]
+        across, upwards, outwards, power = (
+            self._places.uniform(number, scan, draw) for draw in range(4)
+        )
+        azimuth, elevation, range_m = self._block.measure(
+            _between(across, self._cells.azimuth_rad),
+            _between(upwards, self._cells.elevation_rad),
+            _between(outwards, self._cells.range_m),
+        )
+        azimuth, elevation = self._block.axes.to_body(azimuth, elevation)
+        snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=self._block.p.pulses)
+        # Noise may barely cross a low threshold; -60 dB stands for nothing.
+        snr_db = 10.0 * np.log10(np.maximum(snr, 1e-6))
+        return add_false_detections(
+            detections,
+            row,
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            range_m=range_m,
+            confidence=snr_db - self._block.false_alarm_zero_db(),
+            extras={"snr_db": snr_db},
+        )
+
+
+def _between(uniform: Any, field: tuple[float, float]) -> Any:
+    start, width = field
+    return start + width * uniform

@@ -1,0 +1,60 @@
+"""How wide is a radar's field of view, and which resolution cells fill it?"""
+
+import math
+from typing import Any
+
+from components.radar.resolution_cells import ResolutionCells, resolution_cells
+from components.reach import Reach
+
+
+def azimuth_width_rad(reach: Reach) -> float:
+    """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
+    low, high = reach.azimuth_rad
+    width = high - low if high > low else high - low + 2.0 * math.pi
+    return min(width, 2.0 * math.pi)
+
+
+def cells_of_radar(block: Any) -> ResolutionCells:
+    """Return the resolution cells of a radar block's field of view.
+
+    Parameters
+    ----------
+    block : Sensor
+        A radar with a link budget.
+
+    Returns
+    -------
+    ResolutionCells
+        From the minimum range to ``range_km``.
+
+    Raises
+    ------
+    ValueError
+        If a resolution is 0, ``range_km`` is not given, or there is no range between the two.
+    """
+    p = block.p
+    for name in ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m"):
+        if getattr(p, name) == 0:
+            raise ValueError(
+                f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"
+            )
+    if p.range_km is None:
+        raise ValueError(
+            "range_km is not given: false alarms are counted by resolution cells up to it"
+        )
+    if block.budget.nearest_m >= block.reach.range_max_m:
+        raise ValueError(
+            f"range_km is {p.range_km:g}: it must be above the minimum range, "
+            f"{block.budget.nearest_m / 1000:g} km"
+        )
+    return resolution_cells(
+        azimuth_start_rad=block.reach.azimuth_rad[0],
+        azimuth_width_rad=azimuth_width_rad(block.reach),
+        lowest_elevation_rad=block.reach.elevation_rad[0],
+        highest_elevation_rad=block.reach.elevation_rad[1],
+        nearest_m=block.budget.nearest_m,
+        farthest_m=block.reach.range_max_m,
+        azimuth_cell_rad=block.azimuth_step_rad,
+        elevation_cell_rad=block.elevation_step_rad,
+        range_cell_m=block.range_step_m,
+    )

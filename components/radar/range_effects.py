@@ -1,0 +1,33 @@
+"""How close may a target come before a radar no longer hears it?"""
+
+from typing import Any
+
+import numpy as np
+
+from components.radar.radar_block import CellFactor
+from components.sensor import Cells
+from dsa_des.effects import Effect, Verdict
+from dsa_des.types import FloatArray
+
+
+class BlindRange(Effect):
+    """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
+
+    name = "blind range"
+    acts_on = "SNR"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``minimum_range_m``."""
+        nearest = block.p.minimum_range_m
+        if nearest is None:
+            return Verdict(False, "minimum_range_m is not given")
+        return Verdict(True, f"minimum_range_m is {nearest:g}")
+
+    def build(self, block: Any) -> CellFactor:
+        """Return the factor on every cell's SNR: 0 closer than the minimum range, else 1."""
+        nearest_m = 0.0 if block.p.minimum_range_m is None else block.p.minimum_range_m
+
+        def factor(cells: Cells) -> FloatArray:
+            return np.where(cells.range_m < nearest_m, 0.0, 1.0)
+
+        return factor

@@ -1,0 +1,247 @@
+"""The radar's effects: what calls for them, and what they do to a run."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dsa_des.errors import SceneError
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+INTRUDERS = """
+[[blocks.traffic.intruders]]
+name = "a"
+swerling = {swerling}
+{table}
+east_m = 60
+north_m = 4000
+up_m = 30
+heading_deg = 180
+speed_mps = 60
+[[blocks.traffic.intruders]]
+name = "b"
+swerling = 0
+east_m = 3000
+north_m = 5000
+heading_deg = 250
+speed_mps = 80
+"""
+CELLS = "cell_false_alarm_probability = 2e-6\nfalse_alarms = true\n"
+
+
+@pytest.fixture
+def scene(configs, tmp_path):
+    """Write a scene: keys of the radar, tables beside the blocks, first target's model."""
+
+    def write(radar="", sections="", swerling=1, table="", duration_s=12):
+        path = tmp_path / "scene.toml"
+        path.write_text(
+            f'extends = "{configs / "first_light.toml"}"\nduration_s = {duration_s}\n'
+            f"{sections}\n[blocks.radar]\n{radar}\n"
+            + INTRUDERS.format(swerling=swerling, table=table),
+            encoding="utf-8",
+        )
+        return path
+
+    return write
+
+
+def simulate(path, swap=(), **options):
+    memory = MemorySink()
+    simulation = Simulation(load_scene(path, swaps=swap), recorder=Recorder([memory]), **options)
+    simulation.run()
+    return simulation, memory.tables()
+
+
+def plan_of(path, block="radar", **options):
+    simulation = Simulation(load_scene(path), **options)
+    return {item.effect.name: item for item in simulation.plan if item.block == block}
+
+
+def radar_rows(tables, table="detections"):
+    return [row for row in tables[table].to_pylist() if row["block"] == "radar"]
+
+
+def same(one, other):
+    """Say whether two runs recorded the same, but for the cells that were not looked at."""
+    assert one.keys() == other.keys()
+    return all(one[name].equals(other[name]) for name in one if name != "scans")
+
+
+SENTENCES = [
+    ({}, "RCS fluctuation: simulated, target 'a' has swerling 1"),
+    ({"swerling": 5}, "RCS fluctuation: not simulated, every target has swerling 0 or 5"),
+    ({"radar": "swerling = 5"}, "RCS fluctuation: not simulated, swerling is 5"),
+    ({"radar": "swerling = 3", "swerling": 0}, "RCS fluctuation: simulated, swerling is 3"),
+    ({}, "aspect RCS: not simulated, no target has an rcs_table"),
+    ({"table": 'rcs_table = "rcs.csv"'}, "aspect RCS: simulated, target 'a' has an rcs_table"),
+    ({}, "blind range: not simulated, minimum_range_m is not given"),
+    ({"radar": "minimum_range_m = 300"}, "blind range: simulated, minimum_range_m is 300"),
+    ({}, "false alarms: not simulated, false_alarms is false"),
+    ({"radar": CELLS}, "false alarms: simulated, false_alarms is true"),
+    ({"radar": CELLS + "enabled = false"}, "false alarms: not simulated, enabled is false"),
+    ({}, "beam sweep: not simulated, beam_sweep is false"),
+    ({"radar": "beam_sweep = true"}, "beam sweep: simulated, beam_sweep is true"),
+]
+
+
+@pytest.fixture
+def rcs_file(tmp_path):
+    lines = [f"{az},{el},{az / 20}" for el in (-90, 0, 90) for az in (0, 90, 180, 270)]
+    flat = [line.rsplit(",", 1)[0] + ",0" if ",0," not in line else line for line in lines]
+    (tmp_path / "rcs.csv").write_text("\n".join(["az_deg,el_deg,dbsm", *flat]), encoding="utf-8")
+
+
+@pytest.mark.parametrize(("changes", "sentence"), SENTENCES)
+def test_the_reason_is_in_the_scene(scene, rcs_file, changes, sentence):
+    plan = plan_of(scene(**changes))
+    assert plan[sentence.split(":")[0]].sentence() == sentence
+
+
+VARIANTS = [
+    {},
+    {"swerling": 0},
+    {"swerling": 0, "radar": 'fluctuation = "sampled"'},
+    {"swerling": 2, "radar": 'fluctuation = "sampled"\npulses = 3\nintegration_gain_db = 0'},
+    {"radar": "minimum_range_m = 2000"},
+    {"radar": "minimum_range_m = 0.5"},
+    {"table": 'rcs_table = "rcs.csv"'},
+    {"radar": CELLS},
+    {"radar": CELLS + "beam_sweep = true"},
+    {"radar": 'type = "radar.threshold"\nminimum_range_m = 2000\n' + CELLS},
+]
+
+
+@pytest.mark.parametrize("changes", VARIANTS)
+def test_neither_windows_nor_neutral_effects_change_a_bit(scene, rcs_file, changes):
+    path = scene(**changes)
+    _, whole = simulate(path)
+    assert radar_rows(whole)
+    for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):
+        assert same(whole, simulate(path, **options)[1]), options
+
+
+def test_the_range_boundary_is_blind_and_sweeps_too(scene):
+    path = scene("minimum_range_m = 3900\nbeam_sweep = true\n")
+    swap = ["radar=radar.range_boundary"]
+    _, whole = simulate(path, swap=swap)
+    rows = radar_rows(whole)
+    assert rows and min(row["true_range_m"] for row in rows) >= 3900
+    assert all(0 <= row["illuminated_s"] - row["time_s"] <= 0.2 for row in rows)
+    for options in ({"window": 1}, {"simulate_everything": True}):
+        assert same(whole, simulate(path, swap=swap, **options)[1])
+
+
+def test_no_echo_in_the_blind_range_and_the_same_one_beyond(scene):
+    """The minimum range takes detections away and touches no other."""
+    _, whole = simulate(scene())
+    _, blind = simulate(scene("minimum_range_m = 3500"))
+    near = [row for row in radar_rows(whole) if row["true_range_m"] < 3500]
+    assert near
+    assert radar_rows(blind) == [row for row in radar_rows(whole) if row not in near]
+
+
+def test_false_alarms_are_binomial_and_have_no_target(scene):
+    """Pfa x cells by scan, within 4 sigma over a run; nothing true; others' draws unmoved."""
+    simulation, tables = simulate(scene(CELLS, duration_s=120))
+    _, without = simulate(scene(duration_s=120))
+    rows = radar_rows(tables)
+    false = [row for row in rows if row["target"] is None]
+    assert [row for row in rows if row["target"] is not None] == radar_rows(without)
+    cells = 220 * 40 * math.ceil((15000 - simulation.components["radar"].budget.nearest_m) / 76.2)
+    scans = 120 * 5
+    mean = cells * 2e-6
+    counts = np.zeros(scans)
+    np.add.at(counts, [row["scan"] for row in false], 1)
+    assert abs(counts.mean() - mean) < 4 * math.sqrt(mean / scans)
+    assert counts.var() == pytest.approx(mean, rel=0.25)
+    true_columns = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
+    assert all(row[name] is None for row in false for name in true_columns)
+    assert not any(row["declared"] for row in false)
+    # On the grid of the radar, all over its field of view, and above the threshold of noise.
+    degrees = np.degrees([row["azimuth_rad"] for row in false])
+    np.testing.assert_allclose(degrees, np.round(degrees), atol=1e-9)
+    assert np.abs(degrees).max() <= 110 + 1e-9
+    assert abs(degrees.mean()) < 4 * 127 / math.sqrt(len(false) * 4)
+    assert min(row["snr_db"] for row in false) >= 10 * math.log10(-math.log(2e-6) - 1) - 1e-9
+    # After the true ones of their scan.
+    order = [(row["tick"], row["target"] is None) for row in rows]
+    assert order == sorted(order)
+
+
+def test_false_alarms_show_downstream_and_start_no_track(scene):
+    _, tables = simulate(scene(CELLS))
+    _, without = simulate(scene())
+    false = [row for row in radar_rows(tables) if row["target"] is None]
+    fused = [row for row in tables["fused"].to_pylist() if row["target"] is None]
+    assert false and len(fused) == len(false)
+    for one, other in zip(fused, false, strict=True):
+        assert one["sensors"] == one["angle_source"] == one["range_source"] == "radar"
+        for name in ("tick", "azimuth_rad", "elevation_rad", "range_m", "true_range_m"):
+            assert one[name] == other[name]
+    rest = [row for row in tables["fused"].to_pylist() if row["target"] is not None]
+    assert rest == without["fused"].to_pylist()
+    assert tables["tracks"].equals(without["tracks"])
+
+
+@pytest.mark.parametrize("gate", [0, 0.3])
+def test_false_alarms_pass_fusion_in_any_window(scene, gate):
+    path = scene(CELLS, f"[blocks.fusion]\ncoincidence_s = {gate}\n")
+    _, whole = simulate(path)
+    assert any(row["target"] is None for row in whole["fused"].to_pylist())
+    for window in (1, 7):
+        assert same(whole, simulate(path, window=window)[1])
+
+
+def test_the_summary_counts_false_alarms_apart(scene):
+    from components.display.summary import SensorSummary
+    from dsa_des.recording import ObserverSink
+
+    observer = SensorSummary(["radar"])
+    sink = ObserverSink([observer])
+    memory = MemorySink()
+    Simulation(load_scene(scene(CELLS)), recorder=Recorder([sink, memory])).run()
+    rows = radar_rows(memory.tables())
+    found = observer.result()["sensors"]["radar"]
+    assert found["false_alarms"] == sum(row["target"] is None for row in rows) > 0
+    assert found["detections"] + found["false_alarms"] == len(rows)
+    assert found["first_detection"]["target"] in ("a", "b")
+
+
+BAD = [
+    (
+        "false_alarms = true",
+        r"false_alarm_probability\) is 0.05: with 13,860,000 .* at most 0.00722",
+    ),
+    ("false_alarms = true\nrange_resolution_m = 0", "range_resolution_m is 0"),
+    (CELLS + "azimuth_resolution_deg = 0", "azimuth_resolution_deg is 0"),
+    (CELLS + "minimum_range_m = 6000\nrange_km = 5", "range_km is 5: it must be above"),
+    ("cell_false_alarm_probability = 1.5", "less than 1"),
+]
+
+
+@pytest.mark.parametrize(("radar", "message"), BAD)
+def test_false_alarms_need_cells_and_a_sane_number(scene, radar, message):
+    # The thesis's radar with 8 times its cells: 693,000 false alarms by scan at Pfa 0.05.
+    if radar == "false_alarms = true":
+        radar += "\nrange_resolution_m = 9.525"
+    with pytest.raises(SceneError, match=message):
+        Simulation(load_scene(scene(radar)))
+
+
+def test_each_target_is_lit_at_its_own_instant(scene):
+    """A 220 deg sweep in 0.2 s: azimuth -110 at the scan's start, +110 at its end."""
+    _, tables = simulate(scene("beam_sweep = true\n" + CELLS))
+    rows = radar_rows(tables)
+    assert {row["target"] for row in rows} == {"a", "b", None}
+    for row in rows:
+        true = row["true_azimuth_rad"]
+        azimuth = math.degrees(row["azimuth_rad"] if true is None else true)
+        assert row["illuminated_s"] == pytest.approx(
+            row["time_s"] + 0.2 * (azimuth + 110) / 220, abs=1e-12
+        )
+    _, without = simulate(scene(CELLS))
+    lit = [{**row, "illuminated_s": None} for row in rows]
+    assert lit == radar_rows(without)

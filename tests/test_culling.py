@@ -1,0 +1,169 @@
+"""Targets that cannot come in reach are not moved, and nothing else changes."""
+
+import math
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from components.geometry.ellipsoid import line_of_sight
+from components.messages import TrafficStates
+from components.traffic.culling import Culling
+from components.traffic.fleet import ScriptedFleet
+from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints
+from components.traffic.trajectory import SampledTrajectory
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+OWN = ScriptedTrajectory("own", lat_deg=52.0, lon_deg=4.0, alt_m=1000, speed_mps=50)
+
+
+def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
+    draw = random.Random(seed)
+    made = []
+    for i in range(count):
+        speed = draw.uniform(0, 150)
+        legs = draw.choice(
+            [
+                (),
+                (Straight(duration_s=40), Turn(rate_deg_s=draw.uniform(1, 5))),
+                (
+                    Waypoints(
+                        (
+                            Waypoint(
+                                east_m=0, north_m=draw.uniform(0, 9e3), up_m=500, speed_mps=90
+                            ),
+                            Waypoint(east_m=3e4, north_m=0, up_m=0, speed_mps=140),
+                        )
+                    ),
+                ),
+            ]
+        )
+        made.append(
+            ScriptedTrajectory.from_offset(
+                f"t{i}",
+                east_m=draw.uniform(-5e4, 5e4),
+                north_m=draw.uniform(-5e4, 5e4),
+                up_m=draw.uniform(-500, 3000),
+                reference=(52.0, 4.0, 1000.0),
+                heading_deg=draw.uniform(0, 360),
+                speed_mps=speed if legs == () else speed + 1,
+                climb_mps=draw.uniform(-5, 5),
+                legs=legs,
+            )
+        )
+    return made
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whoever_comes_in_reach_is_active(seed: int) -> None:
+    targets = flights(60, seed)
+    fleet = ScriptedFleet(targets)
+    culling = Culling(OWN, targets, fleet, ScriptedFleet, 15_000.0)
+    left_out = 0
+    for start in np.arange(0, 300, 7.3):
+        times = np.linspace(start, start + 13.0, 60)
+        columns, subset = culling.active(times[0], times[-1])
+        own, all_states = OWN.at(times), fleet.at(times)
+        _, _, range_m = line_of_sight(
+            own.lat_deg[:, None], own.lon_deg[:, None], own.alt_m[:, None],
+            all_states.lat_deg, all_states.lon_deg, all_states.alt_m,
+        )  # fmt: skip
+        near = np.flatnonzero((range_m <= 15_000.0).any(axis=0))
+        assert set(near) <= set(columns.tolist())
+        left_out += len(targets) - len(columns)
+        # The few are moved exactly as they would be among all.
+        np.testing.assert_array_equal(subset.at(times).lat_deg, all_states.lat_deg[:, columns])
+    assert left_out > 500
+
+
+def test_speed_bounds_hold_for_sampled_flights() -> None:
+    rng = np.random.default_rng(2)
+    time_s = np.cumsum(rng.uniform(0.5, 3.0, 40))
+    track = np.cumsum(rng.uniform(-0.2, 0.2, 40))
+    east, north = 80 * np.sin(track), 80 * np.cos(track)
+    lat = 52 + np.cumsum(np.append(0, north[:-1] * np.diff(time_s))) / 111_000
+    lon = 4 + np.cumsum(np.append(0, east[:-1] * np.diff(time_s))) / 68_000
+    for velocity in (None, (east, north, np.zeros(40))):
+        flight = SampledTrajectory(
+            "s", time_s, lat, lon, np.full(40, 900.0), velocity_enu_mps=velocity
+        )
+        fine = np.linspace(time_s[0], time_s[-1], 20_001)
+        state = flight.at(fine)
+        _, _, step = line_of_sight(
+            state.lat_deg[:-1], state.lon_deg[:-1], state.alt_m[:-1],
+            state.lat_deg[1:], state.lon_deg[1:], state.alt_m[1:],
+        )  # fmt: skip
+        fastest = float(np.max(step / np.diff(fine)))
+        assert fastest <= flight.max_speed_mps < 4 * fastest
+
+
+def sparse_scene(folder: Path, configs: Path, optics: bool) -> Path:
+    draw = random.Random(9)
+    lines = [
+        f'extends = "{(configs / "detect_and_sense.toml").as_posix()}"',
+        "duration_s = 120",
+        "seed = 4",
+        "[blocks.eo]",
+        f"scan_rate_hz = 2\nenabled = {str(optics).lower()}",
+        "[blocks.ir]",
+        "scan_rate_hz = 1",
+        "[blocks.traffic]",
+        'type = "traffic.scripted"',
+        "ownship = { lat_deg = 52, lon_deg = 4.4, alt_m = 1000, heading_deg = 30, speed_mps = 60 }",
+    ]
+    for i in range(200):
+        far = draw.random() < 0.9
+        lines += [
+            "[[blocks.traffic.intruders]]",
+            f'name = "t{i}"',
+            f"east_m = {draw.uniform(60e3, 300e3) if far else draw.uniform(-9e3, 9e3)}",
+            f"north_m = {draw.uniform(-20e3, 20e3)}",
+            "up_m = 100",
+            f"heading_deg = {draw.uniform(0, 360)}",
+            f"speed_mps = {draw.uniform(30, 150)}",
+        ]
+    path = folder / "sparse.toml"
+    path.write_text("\n".join(lines))
+    return path
+
+
+@pytest.mark.parametrize("optics", [False, True])
+def test_culling_changes_nothing_but_the_counts(
+    tmp_path: Path, configs: Path, optics: bool
+) -> None:
+    scene = load_scene(sparse_scene(tmp_path, configs, optics))
+
+    def run(**options: object) -> tuple[dict, int]:
+        sink = MemorySink()
+        moved = 0
+
+        class Counting(Recorder):
+            def record(self, block: str, message: object) -> None:
+                nonlocal moved
+                if isinstance(message, TrafficStates):
+                    moved += message.lat_deg.size
+                super().record(block, message)
+
+        Simulation(scene, recorder=Counting([sink]), **options).run()
+        return sink.tables(), moved
+
+    planned, cells = run()
+    whole, all_cells = run(simulate_everything=True)
+    assert cells < all_cells / 3
+    for name in ("detections", "fused", "tracks"):
+        assert planned[name].num_rows > 0
+        assert planned[name].equals(whole[name]), name
+    counts = [c for c in whole["scans"].column_names if c.startswith("skipped_")] + ["evaluated"]
+    rest = [c for c in whole["scans"].column_names if c not in counts]
+    assert planned["scans"].select(rest).equals(whole["scans"].select(rest))
+    for tables in (planned, whole):
+        total = sum(np.array(tables["scans"][c]) for c in counts)
+        assert (total == 200).all()
+    assert math.fsum(np.array(planned["scans"]["skipped_culled"])) > 0
+    for window in (1, 5):
+        again, _ = run(window=window)
+        for name in ("detections", "fused", "tracks"):
+            assert planned[name].equals(again[name]), (name, window)
