@@ -38,10 +38,6 @@ def known_targets(context: Context) -> tuple[Roster, ...]:
     Returns
     -------
     tuple of Roster
-        Those that the blocks feeding us offer, else all that were announced. Empty where there are
-        neither: the targets may then be anything.
+        Empty where no traffic block announces its targets: they may then be anything.
     """
-    offered = tuple(p.offer for p in context.producers if isinstance(p.offer, Roster))
-    if offered:
-        return offered
     return tuple(_announced.get(context.streams, ()))

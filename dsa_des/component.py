@@ -235,6 +235,10 @@ class Component:
         """Return sections of the run's summary that only this block knows."""
         return {}
 
+    def left_out(self) -> list[str]:
+        """Say, after `setup`, what work this block spares itself and why no result can notice."""
+        return []
+
     def built(self, acts_on: str) -> list[Any]:
         """Return what was built of the effects that act on a quantity, in declared order."""
         return [

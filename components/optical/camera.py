@@ -84,6 +84,16 @@ class Camera(Sensor):
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
+    def left_out(self) -> list[str]:
+        """Say beyond which range nothing can reach the threshold."""
+        if self.reach.range_max_m >= self.p.reach().range_max_m:
+            return []
+        range_km = self.reach.range_max_m / 1000.0
+        return [
+            f"targets beyond {range_km:.2f} km: not looked at, even the largest of them, seen from "
+            "its largest side, cannot reach the threshold there"
+        ]
+
     def area(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell, m²."""
         raise TypeError(f"{type(self).__name__} has no area(cells)")

@@ -26,14 +26,14 @@ class GroundClutter(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] height_m``."""
-        terrain = _terrain(block)
+        terrain = terrain_of(block)
         if terrain is None:
             return Verdict(False, "[terrain] height_m is not given")
         return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
 
     def build(self, block: Any) -> Callable[[Cells], FloatArray]:
         """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
-        terrain = _terrain(block)
+        terrain = terrain_of(block)
         if terrain is None:
             return lambda cells: np.zeros(len(cells))
         for name in _CELL:
@@ -63,7 +63,7 @@ class GroundClutter(Effect):
         return clutter_rcs_m2
 
 
-def _terrain(block: Any) -> Any:
-    """Return the scene's terrain, or None where there is none."""
+def terrain_of(block: Any) -> Any:
+    """Return the terrain of a block's scene, or None where there is none."""
     terrain = block.context.sections.get("terrain")
     return None if terrain is None or terrain.height_m is None else terrain

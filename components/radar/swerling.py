@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.radar.clutter import clutter_detection_probability
+from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
@@ -133,8 +134,13 @@ class SwerlingRadar(LinkBudgetRadar):
         )
         return pd
 
-    def steepest_pd(self) -> float:
-        """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid."""
+    def steepest_pd(self) -> float | None:
+        """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
+
+        None where there is ground clutter, which the same loss takes as well.
+        """
+        if terrain_of(self) is not None:
+            return None
         log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
         steepest = 0.0
         for model in range(5):

@@ -124,7 +124,7 @@ class LinkBudgetRadar(Radar):
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use."""
-        return budget_report(self.name, self.budget)
+        return {**super().report(), **budget_report(self.name, self.budget)}
 
 
 class ThresholdRadar(LinkBudgetRadar):

@@ -48,6 +48,7 @@ class Culling:
     ) -> None:
         self._own, self._targets, self._fleet = own, targets, fleet
         self._subset = subset
+        self.reach_m = reach_m
         speeds = np.array([target.max_speed_mps for target in targets]) + own.max_speed_mps
         half = EPOCH_S / 2.0
         self._near_m: FloatArray = reach_m + speeds * (_SPEED_MARGIN * half) + _RANGE_MARGIN_M

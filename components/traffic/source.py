@@ -94,6 +94,13 @@ class TrafficSource(Component):
         """Number of targets that are moved at the start."""
         return len(self.roster) if self._culling is None else len(self._culling.active(0, 0)[0])
 
+    def left_out(self) -> list[str]:
+        """Say how far targets matter."""
+        if self._culling is None:
+            return []
+        reach_km = self._culling.reach_m / 1000.0
+        return [f"targets beyond {reach_km:.2f} km: not moved, no sensor looks farther"]
+
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
         time_s = wake.time_s

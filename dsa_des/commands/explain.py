@@ -28,9 +28,6 @@ def explain_scene(
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = Console()
-    if not simulation.plan:
-        console.print("No block of this scene declares effects.")
-        return
     table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("block", "effect", "largest influence"):
         table.add_column(heading, no_wrap=heading == "block")
@@ -43,6 +40,12 @@ def explain_scene(
             row.append("" if share is None else f"{share:.1%}")
         # Text, because [weather] would be taken for markup.
         table.add_row(*(Text(cell) for cell in row))
+    for name, component in simulation.components.items():
+        for sentence in component.left_out():
+            table.add_row(name, Text(sentence))
+    if not table.row_count:
+        console.print("No block of this scene declares effects.")
+        return
     console.print(table)
 
 

@@ -245,3 +245,25 @@ def test_each_target_is_lit_at_its_own_instant(scene):
     _, without = simulate(scene(CELLS))
     lit = [{**row, "illuminated_s": None} for row in rows]
     assert lit == radar_rows(without)
+
+
+def test_unannounced_targets(scene, monkeypatch):
+    """Traffic that announces nothing may bring anything; a mix of both is refused, not guessed."""
+    from components.aircraft import Aircraft, Roster
+    from components.known_targets import announce_targets
+    from components.traffic import scripted
+    from dsa_des.errors import BlockFailure
+
+    path = scene(swerling=0)
+    _, announced = simulate(path)
+    monkeypatch.setattr(scripted, "announce_targets", lambda context, roster: None)
+    because = "the targets are not known before the run"
+    plan = plan_of(path)
+    assert plan["RCS fluctuation"].because == plan["aspect RCS"].because == because
+    assert same(announced, simulate(path)[1])
+    others = Roster.of([("somebody else", Aircraft())])
+    monkeypatch.setattr(
+        scripted, "announce_targets", lambda context, roster: announce_targets(context, others)
+    )
+    with pytest.raises(BlockFailure, match="not announced"):
+        simulate(path)

@@ -1,0 +1,162 @@
+"""Terrain in a scene: where its echo reaches a radar, and what it does to detections there."""
+
+import math
+
+import numpy as np
+import pytest
+
+from components.radar.clutter import clutter_detection_probability
+from components.radar.detection import detection_probability
+from components.radar.ground_clutter import ground_clutter_rcs_m2
+from dsa_des.errors import SceneError
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+SCENE = """
+extends = "{base}"
+duration_s = 20
+{terrain}
+[blocks.radar]
+{radar}
+[blocks.traffic]
+ownship = {{ lat_deg = 52.0, lon_deg = 4.4, alt_m = 1000, heading_deg = 0, climb_mps = {climb}, \
+speed_mps = 50, pitch_deg = 0 }}
+[[blocks.traffic.intruders]]
+name = "low"
+swerling = {swerling}
+east_m = 0
+north_m = 8500
+up_m = -850
+heading_deg = 180
+speed_mps = 60
+[[blocks.traffic.intruders]]
+name = "level"
+swerling = {swerling}
+east_m = 100
+north_m = 6000
+up_m = 0
+heading_deg = 180
+speed_mps = 60
+"""
+GROUND = "[terrain]\nheight_m = 60\nclutter_gamma_db = -20\n"
+
+
+@pytest.fixture
+def scene(configs, tmp_path):
+    def write(terrain=GROUND, radar="", swerling=1, climb=0):
+        path = tmp_path / "scene.toml"
+        path.write_text(
+            SCENE.format(
+                base=configs / "first_light.toml",
+                terrain=terrain,
+                radar=radar,
+                swerling=swerling,
+                climb=climb,
+            ),
+            encoding="utf-8",
+        )
+        return path
+
+    return write
+
+
+def simulate(path, swaps=(), **options):
+    memory = MemorySink()
+    simulation = Simulation(load_scene(path, swaps=swaps), recorder=Recorder([memory]), **options)
+    simulation.run()
+    return simulation, memory.tables()
+
+
+def radar_rows(tables, target):
+    rows = tables["detections"].to_pylist()
+    return [row for row in rows if row["block"] == "radar" and row["target"] == target]
+
+
+@pytest.mark.parametrize("swerling", [0, 1, 3])
+@pytest.mark.parametrize("mean", ["constant", "fluctuating"])
+def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling):
+    """Shnidman's treatment (thesis §5.3.2) at the CNR of the radar equation, detection by one."""
+    path = scene(GROUND + f'clutter_mean = "{mean}"\n', swerling=swerling)
+    simulation, tables = simulate(path)
+    rows = radar_rows(tables, "low")
+    assert len(rows) > 50
+    ranges = np.array([row["true_range_m"] for row in rows])
+    # The ownship is level, so its body elevation is that of the NED frame.
+    elevation = np.array([row["true_elevation_rad"] for row in rows])
+    clutter = ground_clutter_rcs_m2(
+        ranges,
+        elevation,
+        940.0,
+        gamma_db=-20.0,
+        azimuth_beamwidth_rad=math.radians(1),
+        elevation_beamwidth_rad=math.radians(1),
+        range_resolution_m=76.2,
+    )
+    cnr = simulation.components["radar"].budget.snr(ranges, clutter)
+    assert cnr.max() > 0.3
+    snr = 10.0 ** (np.array([row["snr_db"] for row in rows]) / 10.0)
+    expected = clutter_detection_probability(
+        snr, cnr, false_alarm_probability=0.05, model=f"swerling{swerling}", clutter=mean
+    )
+    found = np.array([row["detection_probability"] for row in rows])
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    clear = detection_probability(snr, false_alarm_probability=0.05, model=f"swerling{swerling}")
+    assert np.max(np.abs(found - clear)) > 1e-5
+
+
+def test_clutter_is_only_where_the_beam_meets_the_ground(scene):
+    """The target at our own altitude is 12 beamwidths and more above the ground."""
+    _, ground = simulate(scene())
+    _, none = simulate(scene(""))
+    assert radar_rows(ground, "level") == radar_rows(none, "level") != []
+    assert radar_rows(ground, "low") != radar_rows(none, "low")
+
+
+def test_clutter_hides_a_low_target_from_a_threshold_radar(scene):
+    swaps = ["radar=radar.threshold"]
+    first = []
+    for terrain in ("", GROUND.replace("-20", "-37"), GROUND.replace("-20", "-5")):
+        _, tables = simulate(scene(terrain), swaps)
+        seen = [row["true_range_m"] for row in radar_rows(tables, "low")]
+        first.append(max(seen, default=0.0))
+        assert radar_rows(tables, "level")
+    assert first[0] > first[1] > first[2]
+
+
+@pytest.mark.parametrize("swap", [[], ["radar=radar.threshold"]])
+@pytest.mark.parametrize("terrain", ["", GROUND])
+def test_neither_windows_nor_neutral_effects_change_a_bit(scene, terrain, swap):
+    path = scene(terrain)
+    _, whole = simulate(path, swap)
+    for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):
+        _, other = simulate(path, swap, **options)
+        assert all(whole[name].equals(other[name]) for name in whole if name != "scans"), options
+
+
+def test_the_reason_is_in_the_scene(scene):
+    for terrain, sentence in (
+        ("", "ground clutter: not simulated, [terrain] height_m is not given"),
+        (GROUND, "ground clutter: simulated, [terrain] height_m is 60"),
+    ):
+        plan = Simulation(load_scene(scene(terrain))).plan
+        found = [item.sentence() for item in plan if item.block == "radar"]
+        assert sentence in found
+
+
+BAD = [
+    ({"terrain": "[terrain]\nheight_m = 1200"}, r"\[terrain\] height_m is 1200.*1000 m at 0 s"),
+    ({"terrain": "[terrain]\nheight_m = 1000"}, r"\[terrain\] height_m is 1000: it must be below"),
+    ({"terrain": "[terrain]\nheight_m = 500", "climb": -40}, r"500: .* is at 480 m at 13 s"),
+    ({"radar": "range_resolution_m = 0"}, "range_resolution_m is 0: ground clutter"),
+    ({"radar": "elevation_resolution_deg = 0"}, "elevation_resolution_deg is 0: ground clutter"),
+    ({"radar": "pulses = 3\nintegration_gain_db = 0"}, "pulses is 3: ground clutter"),
+    ({"terrain": '[terrain]\nclutter_mean = "wavering"'}, "constant"),
+    ({"terrain": "[terrain]\nheight_m = 99999"}, "less than or equal to 10000"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), BAD)
+def test_bad_terrain_is_a_problem_of_the_scene(scene, changes, message):
+    with pytest.raises(SceneError, match=message):
+        Simulation(load_scene(scene(**changes)))
