@@ -107,4 +107,4 @@ def _first(found: list[tuple[str, Aircraft]]) -> str:
 
 
 def _more(found: list[tuple[str, Aircraft]]) -> str:
-    return "" if len(found) == 1 else f" (and {len(found) - 1} more have one)"
+    return "" if len(found) == 1 else f" (and {len(found) - 1} more like it)"

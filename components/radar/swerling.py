@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability
+from components.radar.detection_rung import ExactDetection
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
@@ -61,12 +62,13 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
-    effects = (RcsFluctuation(), *LinkBudgetRadar.effects)
+    effects = (RcsFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         # Until the scene's effects are known, as the targets' own models call for.
         self._models: ModelsOfCells = models_of(parameters.swerling)
+        self._method: str = parameters.detection
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
         self._reference_db: dict[int, float] = {}
@@ -75,6 +77,8 @@ class SwerlingRadar(LinkBudgetRadar):
         """Take the scene's effects; without fluctuation every target is steady."""
         super().setup()
         (self._models,) = self.built("RCS") or [steady]
+        if self.p.detection == "exact":
+            (self._method,) = self.built("method of Pd") or ["table"]
 
     def false_alarm_zero_db(self) -> float:
         """Return the SNR that the radar's own model needs for `reference_pd`; steady if none."""
@@ -119,7 +123,7 @@ class SwerlingRadar(LinkBudgetRadar):
                 pulses=self.p.pulses,
                 false_alarm_probability=self.p.false_alarm_probability,
                 model=f"swerling{model}",
-                method=self.p.detection,
+                method=self._method,
             )
         )
         if cnr is None or not cnr.any():

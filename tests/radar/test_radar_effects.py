@@ -267,3 +267,18 @@ def test_unannounced_targets(scene, monkeypatch):
     )
     with pytest.raises(BlockFailure, match="not announced"):
         simulate(path)
+
+
+def test_all_effects_together_in_any_window(scene):
+    """A turned radar over ground, in rain, with noise and a sweeping beam."""
+    radar = (
+        CELLS + 'beam_sweep = true\nfluctuation = "sampled"\nminimum_range_m = 500\n'
+        "mount_azimuth_deg = 20\nmount_roll_deg = 5\n"
+    )
+    path = scene(radar, "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 2\ngas = true\n")
+    _, whole = simulate(path)
+    rows = radar_rows(whole)
+    assert {row["target"] for row in rows} >= {"a", None}
+    assert all(0 <= row["illuminated_s"] - row["time_s"] <= 0.2 for row in rows)
+    for options in ({"window": 1}, {"window": 7}, {"shuffle_ties": 3}):
+        assert same(whole, simulate(path, **options)[1]), options
