@@ -137,7 +137,9 @@ class Sensor(Component):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.reach: Reach = parameters.reach()
+        #: As the scene states it, and as it is used: work that can give nothing may be left out.
+        self.stated_reach: Reach = parameters.reach()
+        self.reach = self.stated_reach
         self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
         self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))

@@ -51,7 +51,8 @@ def draw_plan(
     """
     marks = positions(flights, detected)
     looks = {
-        name: getattr(simulation.components.get(name), "reach", None) for name in detected.sensors
+        name: getattr(simulation.components.get(name), "stated_reach", None)
+        for name in detected.sensors
     }
     reaches = {name: reach for name, reach in looks.items() if isinstance(reach, Reach)}
     outlines = {

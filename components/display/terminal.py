@@ -22,6 +22,13 @@ def show(console: Any, summary: dict[str, Any]) -> None:
             ("sensor", "scans>", "detections>", "", "time [s]>", "true range>", "target"),
             _sensor_rows(summary["sensors"]),
         )
+        alarms = [
+            f"{name} {entry['false_alarms']:,}"
+            for name, entry in summary["sensors"].items()
+            if entry.get("false_alarms")
+        ]
+        if alarms:
+            _print_line(console, f"False alarms (not counted above): {', '.join(alarms)}")
     if summary.get("fused"):
         _print_table(
             console,

@@ -86,7 +86,7 @@ class Camera(Sensor):
 
     def left_out(self) -> list[str]:
         """Say beyond which range nothing can reach the threshold."""
-        if self.reach.range_max_m >= self.p.reach().range_max_m:
+        if self.reach.range_max_m >= self.stated_reach.range_max_m:
             return []
         range_km = self.reach.range_max_m / 1000.0
         return [
