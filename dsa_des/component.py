@@ -23,14 +23,15 @@ if TYPE_CHECKING:
     from dsa_des.wake import Wake
 
 
-def _as_written(value: Fraction) -> int | float | str:
+def as_written(value: Fraction) -> int | float | str:
+    """Return an exact number the way a scene would hold it."""
     if value.denominator == 1:
         return int(value)
     return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
 #: An exact rate or time: a number or text such as "30000/1001".
-Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(_as_written)]
+Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(as_written)]
 PositiveRational = Annotated[Rational, Field(gt=0)]
 NonNegativeRational = Annotated[Rational, Field(ge=0)]
 

@@ -11,10 +11,11 @@ from pydantic import ValidationError
 
 from dsa_des.block_options import BlockOptions, split_options, with_latencies
 from dsa_des.clock import parse_rational
-from dsa_des.component import Component, Parameters
-from dsa_des.errors import Problem, SceneError, did_you_mean, nearest
+from dsa_des.component import Component, Parameters, as_written
+from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.overrides import apply_set, apply_swap
+from dsa_des.parameter_errors import explain
 from dsa_des.processors import ProcessorParameters
 from dsa_des.registry import UnknownType, find
 from dsa_des.scene_checks import check_activity, check_lookalikes, check_times
@@ -101,7 +102,7 @@ class Scene:
         if self.description:
             tables["description"] = self.description
         if self.duration_s is not None:
-            tables["duration_s"] = _plain(self.duration_s)
+            tables["duration_s"] = as_written(self.duration_s)
         tables["seed"] = self.seed
         tables["wires"] = [_wire_table(wire) for wire in self.wires]
         for name, section in self.sections.items():
@@ -258,7 +259,7 @@ def _sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, Param
         try:
             sections[name] = model.model_validate(table)
         except ValidationError as error:
-            problems += _explain(scene_file, (name,), f"[{name}]", model, error)
+            problems += explain(scene_file, (name,), f"[{name}]", model, error)
     return sections
 
 
@@ -294,7 +295,7 @@ def _blocks(
             parameters = cls.Parameters.model_validate(given)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
-            problems += _explain(scene_file, key, str(type_name), cls.Parameters, error)
+            problems += explain(scene_file, key, str(type_name), cls.Parameters, error)
             continue
         check_lookalikes(scene_file, key, given, cls.Parameters, problems)
         blocks[name] = Block(name, str(type_name), cls, parameters, options)
@@ -317,89 +318,13 @@ def _processors(
         try:
             found[name] = ProcessorParameters.model_validate(tables[name])
         except ValidationError as error:
-            problems += _explain(scene_file, key, f"[{dotted(key)}]", ProcessorParameters, error)
+            problems += explain(scene_file, key, f"[{dotted(key)}]", ProcessorParameters, error)
     for name, block in blocks.items():
         wanted = block.options.processor
         if wanted is not None and wanted not in tables:
             message = f"the scene has no such processor{did_you_mean(wanted, tables)}"
             problems.append(scene_file.problem(("blocks", name, "processor"), message, str(wanted)))
     return found
-
-
-def _explain(
-    scene_file: SceneFile, key: Key, what: str, model: Any, error: ValidationError
-) -> list[Problem]:
-    problems = []
-    for item in error.errors(include_url=False):
-        at = _existing_path(scene_file, key, item["loc"])
-        if item["type"] == "extra_forbidden":
-            allowed = _sibling_names(model, item["loc"])
-            hint = did_you_mean(str(item["loc"][-1]), allowed)
-            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
-        elif item["type"] == "missing":
-            given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
-            close = nearest(str(item["loc"][-1]), given)
-            hint = f" ({close!r} is given)" if close else ""
-            problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
-        else:
-            message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
-            message = message.replace("Input should be", "must be", 1)
-            message = message.replace(
-                "a valid number, unable to parse string as a number", "a number"
-            )
-            problems.append(scene_file.problem(at, message, _shown(item["input"])))
-    return problems
-
-
-def _shown(value: Any) -> Any:
-    return str(value) if isinstance(value, str) else value
-
-
-def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
-    """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
-    value: Any = scene_file.data
-    for part in key:
-        value = value[part]
-    path: list[str | int] = list(key)
-    for position, part in enumerate(loc):
-        found = (isinstance(value, Mapping) and part in value) or (
-            isinstance(value, list) and isinstance(part, int) and part < len(value)
-        )
-        if found:
-            value = value[part]
-        elif position < len(loc) - 1 or not isinstance(value, Mapping):
-            continue
-        path.append(part)
-    return tuple(path)
-
-
-def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
-    """Return the names allowed where `loc` points, following nested models as far as they go."""
-    names = list(model.model_fields)
-    for part in loc[:-1]:
-        found = model.model_fields.get(part) if isinstance(part, str) else None
-        if found is not None:
-            nested = _nested_model(found.annotation)
-            if nested is None:
-                return []
-            model, names = nested, list(nested.model_fields)
-    return names
-
-
-def _nested_model(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, Parameters):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        nested = _nested_model(argument)
-        if nested is not None:
-            return nested
-    return None
-
-
-def _plain(value: Fraction) -> int | float | str:
-    if value.denominator == 1:
-        return int(value)
-    return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
 def _wire_table(wire: Wire) -> dict[str, Any] | str:
@@ -413,9 +338,9 @@ def _wire_table(wire: Wire) -> dict[str, Any] | str:
     if wire.delay_scans:
         table["delay"] = f"{wire.delay_scans} scan{'s' if wire.delay_scans > 1 else ''}"
     elif wire.delay_s:
-        table["delay_s"] = _plain(wire.delay_s)
+        table["delay_s"] = as_written(wire.delay_s)
     if wire.jitter_s:
-        table["jitter_s"] = _plain(wire.jitter_s)
+        table["jitter_s"] = as_written(wire.jitter_s)
     if wire.drop_probability:
         table["drop_probability"] = wire.drop_probability
     if wire.holds is not None:

@@ -17,22 +17,20 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dsa_des.channel import Channel
 from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
+from dsa_des.connections import connect
 from dsa_des.effects import Planned, plan
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order
 from dsa_des.message import Message
 from dsa_des.pinpoint import pinpoint
-from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Demand, Node
+from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
-from dsa_des.wire_faults import WireFaults
-from dsa_des.wiring import Wire
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 32768
@@ -128,7 +126,7 @@ class Simulation:
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
-        self._connect()
+        connect(scene, self.nodes)
         self._window_ticks = self._window_length(window)
 
     # -- building ------------------------------------------------------------------------------
@@ -258,66 +256,6 @@ class Simulation:
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
             self.recorder.record(block, message)
-
-    def _faults(self, wire: Wire) -> WireFaults | None:
-        if not wire.jitter_s and not wire.drop_probability:
-            return None
-        streams = Streams(self.scene.seed)
-        return WireFaults(
-            float(wire.jitter_s * self.ticks_per_s),
-            wire.drop_probability,
-            streams.stream(str(wire), "wire jitter"),
-            streams.stream(str(wire), "wire loss"),
-        )
-
-    def _connect(self) -> None:
-        for wire in self.scene.wires:
-            delay = round(wire.total_delay_s * self.ticks_per_s) + self._scan_delay(wire)
-            channel = Channel(wire.source, delay, self._faults(wire))
-            if isinstance(wire.holds, dict):
-                declared = self.nodes[wire.target].component.inputs[wire.input].message
-                try:
-                    channel.hold(declared.initial(wire.holds), 0)
-                except (TypeError, ValueError) as error:
-                    problem = self._problem("wires", f"{wire}: holds: {error}")
-                    raise SceneError([problem]) from error
-            target = self.nodes[wire.target]
-            target.channels.setdefault(wire.input, []).append(channel)
-            self.nodes[wire.source].subscribers.setdefault(wire.output, []).append(
-                (channel, target, wire.input)
-            )
-        for name, node in self.nodes.items():
-            node.demands = self._find_demands(name)
-            if node.on_demand and not node.demands:
-                message = "runs when blocks downstream scan, and none of them has a scan clock"
-                raise SceneError([self._problem(f"blocks.{name}", message)])
-
-    def _scan_delay(self, wire: Any) -> int:
-        if not wire.delay_scans:
-            return 0
-        clock = self.nodes[wire.target].clock or self.nodes[wire.source].clock
-        if clock is None:
-            message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
-            raise SceneError([self._problem("wires", message)])
-        # Rounded down: a message must not arrive a tick after the scan it was sent for.
-        return wire.delay_scans * int(clock.period)
-
-    def _find_demands(self, name: str) -> list[Demand]:
-        found: dict[tuple[str, int], Demand] = {}
-        seen = {(name, 0)}
-        todo = [(name, 0)]
-        while todo:
-            block, lead = todo.pop()
-            for channel, node, _ in (
-                item for items in self.nodes[block].subscribers.values() for item in items
-            ):
-                reached = (node.name, lead + channel.delay_ticks)
-                if node.clock is not None:
-                    found[reached] = Demand(node.name, node.clock, reached[1])
-                elif reached not in seen and len(seen) < 1000:
-                    seen.add(reached)
-                    todo.append(reached)
-        return [found[key] for key in sorted(found)]
 
     def _window_length(self, window: int | None) -> int:
         """Return the ticks of a window that holds about the wanted number of scans."""

@@ -1,0 +1,87 @@
+"""From the wires of a scene to channels between its running blocks."""
+
+from collections.abc import Mapping
+
+from dsa_des.channel import Channel
+from dsa_des.errors import Problem, SceneError
+from dsa_des.process import Demand, Node
+from dsa_des.randomness import Streams
+from dsa_des.scene import Scene
+from dsa_des.wire_faults import WireFaults
+from dsa_des.wiring import Wire
+
+
+def connect(scene: Scene, nodes: Mapping[str, Node]) -> None:
+    """Lay every wire, and tell each block whose scans its rows are for.
+
+    Raises
+    ------
+    SceneError
+        If a wire's delay or initial message makes no sense, or a block that runs on demand has
+        nobody to demand anything.
+    """
+    for wire in scene.wires:
+        delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
+        channel = Channel(wire.source, delay, _faults(scene, wire))
+        if isinstance(wire.holds, dict):
+            declared = nodes[wire.target].component.inputs[wire.input].message
+            try:
+                channel.hold(declared.initial(wire.holds), 0)
+            except (TypeError, ValueError) as error:
+                raise SceneError([_problem(scene, "wires", f"{wire}: holds: {error}")]) from error
+        target = nodes[wire.target]
+        target.channels.setdefault(wire.input, []).append(channel)
+        nodes[wire.source].subscribers.setdefault(wire.output, []).append(
+            (channel, target, wire.input)
+        )
+    for name, node in nodes.items():
+        node.demands = find_demands(nodes, name)
+        if node.on_demand and not node.demands:
+            message = "runs when blocks downstream scan, and none of them has a scan clock"
+            raise SceneError([_problem(scene, f"blocks.{name}", message)])
+
+
+def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
+    """Return the first clocked blocks on every way downstream, and the delay on the way."""
+    found: dict[tuple[str, int], Demand] = {}
+    seen = {(name, 0)}
+    todo = [(name, 0)]
+    while todo:
+        block, lead = todo.pop()
+        for channel, node, _ in (
+            item for items in nodes[block].subscribers.values() for item in items
+        ):
+            reached = (node.name, lead + channel.delay_ticks)
+            if node.clock is not None:
+                found[reached] = Demand(node.name, node.clock, reached[1])
+            elif reached not in seen and len(seen) < 1000:
+                seen.add(reached)
+                todo.append(reached)
+    return [found[key] for key in sorted(found)]
+
+
+def _problem(scene: Scene, key: str, message: str) -> Problem:
+    return Problem(str(scene.path), key, message)
+
+
+def _faults(scene: Scene, wire: Wire) -> WireFaults | None:
+    if not wire.jitter_s and not wire.drop_probability:
+        return None
+    streams = Streams(scene.seed)
+    return WireFaults(
+        float(wire.jitter_s * scene.ticks_per_s),
+        wire.drop_probability,
+        streams.stream(str(wire), "wire jitter"),
+        streams.stream(str(wire), "wire loss"),
+    )
+
+
+def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
+    if not wire.delay_scans:
+        return 0
+    clock = nodes[wire.target].clock or nodes[wire.source].clock
+    if clock is None:
+        message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
+        raise SceneError([_problem(scene, "wires", message)])
+    # Rounded down: a message must not arrive a tick after the scan it was sent for.
+    return wire.delay_scans * int(clock.period)

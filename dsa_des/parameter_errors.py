@@ -1,0 +1,92 @@
+"""What pydantic found wrong with a table, said in a scene's own words."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsa_des.component import Parameters
+from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.scene_file import Key, SceneFile
+
+
+def explain(
+    scene_file: SceneFile, key: Key, what: str, model: Any, error: ValidationError
+) -> list[Problem]:
+    """Return what is wrong with a table, one problem per key, with the nearest valid name.
+
+    Parameters
+    ----------
+    scene_file : SceneFile
+    key : tuple
+        Where the table stands in the scene.
+    what : str
+        What it describes, for example a block type.
+    model : type of Parameters
+    error : ValidationError
+    """
+    problems = []
+    for item in error.errors(include_url=False):
+        at = _existing_path(scene_file, key, item["loc"])
+        if item["type"] == "extra_forbidden":
+            allowed = _sibling_names(model, item["loc"])
+            hint = did_you_mean(str(item["loc"][-1]), allowed)
+            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
+        elif item["type"] == "missing":
+            given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
+            close = nearest(str(item["loc"][-1]), given)
+            hint = f" ({close!r} is given)" if close else ""
+            problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
+        else:
+            message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+            message = message.replace("Input should be", "must be", 1)
+            message = message.replace(
+                "a valid number, unable to parse string as a number", "a number"
+            )
+            problems.append(scene_file.problem(at, message, _shown(item["input"])))
+    return problems
+
+
+def _shown(value: Any) -> Any:
+    return str(value) if isinstance(value, str) else value
+
+
+def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
+    """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
+    value: Any = scene_file.data
+    for part in key:
+        value = value[part]
+    path: list[str | int] = list(key)
+    for position, part in enumerate(loc):
+        found = (isinstance(value, Mapping) and part in value) or (
+            isinstance(value, list) and isinstance(part, int) and part < len(value)
+        )
+        if found:
+            value = value[part]
+        elif position < len(loc) - 1 or not isinstance(value, Mapping):
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
+    """Return the names allowed where `loc` points, following nested models as far as they go."""
+    names = list(model.model_fields)
+    for part in loc[:-1]:
+        found = model.model_fields.get(part) if isinstance(part, str) else None
+        if found is not None:
+            nested = _nested_model(found.annotation)
+            if nested is None:
+                return []
+            model, names = nested, list(nested.model_fields)
+    return names
+
+
+def _nested_model(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, Parameters):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        nested = _nested_model(argument)
+        if nested is not None:
+            return nested
+    return None
