@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from components.messages import GatedTargets, RelativeTargets
 from components.reach import Decision, FarthestLook, Reach, farthest_look
+from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.component import Component
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output

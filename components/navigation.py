@@ -16,8 +16,9 @@ import numpy as np
 
 from components.geometry.angles import wrap_two_pi
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
-from components.messages import Detections, RelativeTargets, TrafficStates
+from components.messages import Detections
 from components.navigation_error import attitude_with_error, position_with_error
+from components.target_messages import RelativeTargets, TrafficStates
 from dsa_des.effects import Effect, Verdict
 from dsa_des.types import FloatArray, IntArray
 

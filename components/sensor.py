@@ -14,12 +14,13 @@ import numpy as np
 
 from components.declaration_rule import Declaration
 from components.geometry.angles import wrap_pi
-from components.messages import Detections, GatedTargets, RelativeTargets, SensorOffer
+from components.messages import Detections, SensorOffer
 from components.mounting import BodyAxes, Mounting
 from components.navigation import NavigationReport
 from components.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.resolution import round_to_grid
 from components.sensor_parameters import SensorParameters
+from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.component import Component
 from dsa_des.effects import Effect
 from dsa_des.ports import Input, Output

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from components.geometry.ellipsoid import line_of_sight
-from components.messages import TrafficStates
+from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints

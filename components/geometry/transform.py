@@ -14,9 +14,9 @@ from pydantic import Field
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
-from components.messages import RelativeTargets, TrafficStates
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
+from components.target_messages import RelativeTargets, TrafficStates
 from dsa_des.component import Component, Parameters
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from components.messages import Detections, RelativeTargets
+from components.messages import Detections
 from components.radar.beam_sweep import illumination_offset_s
 from components.radar.field_of_view import azimuth_width_rad
+from components.target_messages import RelativeTargets
 from dsa_des.effects import Effect, Verdict
 from dsa_des.types import IntArray
 

@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from components.false_detections import add_false_detections
-from components.messages import Detections, RelativeTargets
+from components.messages import Detections
 from components.radar.false_alarms import false_alarm_count, false_alarm_snr
 from components.radar.field_of_view import cells_of_radar
+from components.target_messages import RelativeTargets
 from dsa_des.effects import Effect, Verdict
 from dsa_des.types import IntArray
 

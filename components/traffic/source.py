@@ -10,8 +10,8 @@ from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
-from components.messages import TrafficStates
 from components.reach import farthest_look
+from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
 from components.traffic.state import TrajectoryState
 from components.traffic.terrain_check import check_above_terrain

@@ -7,12 +7,12 @@ import pytest
 from pydantic import ValidationError
 
 from components.aircraft import Aircraft, Roster
-from components.messages import RelativeTargets
 from components.radar.detection import detection_probability
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
 from components.sensor import Cells
+from components.target_messages import RelativeTargets
 from dsa_des.component import Context
 from dsa_des.errors import SceneError
 from dsa_des.randomness import Streams
