@@ -142,7 +142,7 @@ class Context:
     consumers : list of Consumer
         Blocks that our outputs feed, sorted by name; known when `Component.setup` is called.
     producers : list of Producer
-        Blocks that feed our inputs, sorted by name; likewise.
+        Blocks that feed our inputs, sorted by name; known when effects are planned.
     sections : mapping
         The scene's tables that belong to no block, by name (`dsa_des.sections`).
     effects : dict

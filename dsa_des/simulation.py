@@ -123,6 +123,7 @@ class Simulation:
         self._depth = depths(scene.graph)
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
+        self._offer_down_the_chain()
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
@@ -165,6 +166,18 @@ class Simulation:
             raise SceneError([self._problem("duration_s", message)])
         return max(known)
 
+    def _offer_down_the_chain(self) -> None:
+        """Tell every block what its producers offer, sources first: a block may pass it on.
+
+        It comes before effects are planned, so that a verdict may rest on it.
+        """
+        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
+            self.components[name].context.producers = [
+                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
+                for wire in self.scene.wires
+                if wire.target == name
+            ]
+
     def _plan_effects(
         self, everything: bool, wrap: Callable[[Planned, Any], Any] | None
     ) -> list[Planned]:
@@ -190,14 +203,6 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
-        # Offers go down the chain first, so that a block may pass on what it was offered;
-        # requests then go up it, while the blocks are set up.
-        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
-            self.components[name].context.producers = [
-                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
-                for wire in self.scene.wires
-                if wire.target == name
-            ]
         for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
             component = self.components[name]
             component.context.consumers = [

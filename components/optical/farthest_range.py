@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft import Roster
+from components.known_targets import known_targets
 
 # Covers the rounding of areas, pixels and signatures many times over.
 _MARGIN = 1.0 + 1e-9
@@ -29,7 +29,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         The roster's columns, ``"eo"`` or ``"ir"``, ``"contrast"`` or ``"contrast_ir"``; empty for
         a camera that shows other areas.
     """
-    rosters = [p.offer for p in camera.context.producers if isinstance(p.offer, Roster)]
+    rosters = known_targets(camera.context)
     adding = [
         effect.name
         for effect in type(camera).effects

@@ -75,16 +75,16 @@ class LinkBudgetRadar(Radar):
         held = wake.held("targets")
         if held is not None and held[0].roster is not self._roster:
             self._roster = held[0].roster
-            self._check_announced(self._roster)
+            self._check_offered(self._roster)
         return super().run(wake)
 
-    def _check_announced(self, roster: Roster) -> None:
+    def _check_offered(self, roster: Roster) -> None:
         """Refuse targets that the effects' verdicts have not seen."""
         known = known_targets(self.context)
         if known and not any(roster.names == other.names for other in known):
             raise ValueError(
-                "these targets were not announced before the run, and others were: a traffic "
-                "block must announce its targets (components.known_targets)"
+                "these targets were not offered before the run, and others were: a traffic block "
+                "must offer the roster that its messages carry"
             )
 
     def snr(self, cells: Cells) -> FloatArray:

@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft import Aircraft
-from components.known_targets import announce_targets
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
@@ -67,7 +66,6 @@ class RecordedTraffic(TrafficSource):
             parameters.aircraft,
             str(parameters.file),
         )
-        announce_targets(context, self.roster)
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""

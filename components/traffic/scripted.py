@@ -6,7 +6,6 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
-from components.known_targets import announce_targets
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
@@ -146,7 +145,6 @@ class ScriptedTraffic(TrafficSource):
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
-        announce_targets(context, self.roster)
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""

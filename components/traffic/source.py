@@ -17,6 +17,7 @@ from components.traffic.state import TrajectoryState
 from components.traffic.terrain_check import check_above_terrain
 from dsa_des.clock import ClockSpec
 from dsa_des.component import Component, Parameters, PositiveRational
+from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
 from dsa_des.ports import Output
 from dsa_des.types import FloatArray
@@ -167,8 +168,6 @@ def roster_of(
     ValueError
         If `others` names an aircraft that is not a target.
     """
-    from dsa_des.errors import did_you_mean
-
     for name in others:
         if name not in names:
             raise ValueError(f"aircraft.{name}: {what} has no such intruder"

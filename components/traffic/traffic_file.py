@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 from components.traffic.trajectory import SampledTrajectory
+from dsa_des.errors import nearest
 
 MOST_PROBLEMS = 20
 """Problems listed in one error; further ones are only counted."""
@@ -103,5 +103,5 @@ class Problems:
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return a suggestion for a misspelt name, or an empty string when nothing is close."""
-    close = get_close_matches(name.lower(), sorted(allowed), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    close = nearest(name, sorted(allowed))
+    return f"; did you mean {close!r}?" if close else ""

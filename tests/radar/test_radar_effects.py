@@ -247,25 +247,22 @@ def test_each_target_is_lit_at_its_own_instant(scene):
     assert lit == radar_rows(without)
 
 
-def test_unannounced_targets(scene, monkeypatch):
-    """Traffic that announces nothing may bring anything; a mix of both is refused, not guessed."""
+def test_targets_that_are_not_offered(scene, monkeypatch):
+    """Traffic that offers nothing may bring anything; a wrong offer is refused, not believed."""
     from components.aircraft import Aircraft, Roster
-    from components.known_targets import announce_targets
-    from components.traffic import scripted
+    from components.traffic.source import TrafficSource
     from dsa_des.errors import BlockFailure
 
     path = scene(swerling=0)
-    _, announced = simulate(path)
-    monkeypatch.setattr(scripted, "announce_targets", lambda context, roster: None)
+    _, offered = simulate(path)
+    monkeypatch.setattr(TrafficSource, "offer", lambda self, port: None)
     because = "the targets are not known before the run"
     plan = plan_of(path)
     assert plan["RCS fluctuation"].because == plan["aspect RCS"].because == because
-    assert same(announced, simulate(path)[1])
+    assert same(offered, simulate(path)[1])
     others = Roster.of([("somebody else", Aircraft())])
-    monkeypatch.setattr(
-        scripted, "announce_targets", lambda context, roster: announce_targets(context, others)
-    )
-    with pytest.raises(BlockFailure, match="not announced"):
+    monkeypatch.setattr(TrafficSource, "offer", lambda self, port: others)
+    with pytest.raises(BlockFailure, match="not offered"):
         simulate(path)
 
 
