@@ -4,35 +4,14 @@ This file declares commands and nothing else; it imports click only, so that ``-
 Exit codes: 0 done, 1 a block failed while it ran, 2 the scene or the call is wrong.
 """
 
-import functools
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import click
 
 from dsa_des import __version__
-from dsa_des.errors import BlockFailure, SceneError, UsageError
-
-
-def _plain_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn the errors a user can cause into one message without a traceback."""
-
-    @functools.wraps(command)
-    def guarded(*args: Any, **kwargs: Any) -> None:
-        try:
-            command(*args, **kwargs)
-        except (SceneError, UsageError) as error:
-            click.echo(f"error: {error}", err=True)
-            sys.exit(2)
-        except BlockFailure as error:
-            click.echo(f"error: {error}", err=True)
-            sys.exit(1)
-        except BrokenPipeError:  # the reader of our output went away
-            sys.stderr.close()
-            sys.exit(1)
-
-    return guarded
+from dsa_des.command_plugins import PluginGroup
+from dsa_des.plain_errors import plain_errors
 
 
 def _scene_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -66,7 +45,10 @@ _everything_option = click.option(
 )
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=PluginGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="dsa-des")
 def main() -> None:
     """Simulate a UAV's detect-and-sense chain: who saw the intruder, when, and how far away."""
@@ -78,7 +60,7 @@ def main() -> None:
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON only.")
 @_everything_option
-@_plain_errors
+@plain_errors
 def run(**options: Any) -> None:
     """Run SCENE and say which sensor saw which intruder, when, and how far away."""
     from dsa_des.commands.run import run_scene
@@ -88,7 +70,7 @@ def run(**options: Any) -> None:
 
 @main.command()
 @_scene_options
-@_plain_errors
+@plain_errors
 def check(**options: Any) -> None:
     """Check SCENE without running it; report everything that is wrong at once."""
     from dsa_des.commands.check import check_scene_file
@@ -101,7 +83,7 @@ def check(**options: Any) -> None:
 @click.option("--dot", is_flag=True, help="Print the graph in Graphviz's DOT language.")
 @click.option("--png", is_flag=True, help="Draw the graph as SCENE-graph.png.")
 @click.option("--out", metavar="FILE", help="Another name for the PNG file.")
-@_plain_errors
+@plain_errors
 def graph(**options: Any) -> None:
     """Show the blocks and wires of SCENE, in the order in which they run."""
     from dsa_des.commands.graph import show_graph
@@ -113,7 +95,7 @@ def graph(**options: Any) -> None:
 @_scene_options
 @click.option("--measure", is_flag=True, help="Run the scene and show each effect's share.")
 @_everything_option
-@_plain_errors
+@plain_errors
 def explain(**options: Any) -> None:
     """Say which effects SCENE calls for, which it does not, and because of what."""
     from dsa_des.commands.explain import explain_scene
@@ -123,7 +105,7 @@ def explain(**options: Any) -> None:
 
 @main.command()
 @click.argument("name", required=False)
-@_plain_errors
+@plain_errors
 def components(name: str | None) -> None:
     """List the block types, or describe one: its ports, parameters, units and bounds."""
     from dsa_des.commands.components import show_components

@@ -5,26 +5,16 @@ Our own blocks are registered in the same way as a stranger's.
 
 import importlib
 import sys
-from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 from dsa_des.component import Component
+from dsa_des.entry_points import registered
 from dsa_des.errors import did_you_mean
-
-COMPONENTS = "dsa_des.components"
 
 
 class UnknownType(Exception):
     """A block type cannot be found or is not a component; the message says what is allowed."""
-
-
-@lru_cache(maxsize=8)
-def registered(group: str = COMPONENTS) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name, sorted."""
-    found = {point.name: point for point in entry_points(group=group)}
-    return dict(sorted(found.items()))
 
 
 def find(type_name: str) -> type[Component]:

@@ -7,8 +7,8 @@ They are found by the entry-point group ``dsa_des.reports``; each is a class wit
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dsa_des.entry_points import registered
 from dsa_des.recording import Observer
-from dsa_des.registry import registered
 
 if TYPE_CHECKING:
     from dsa_des.simulation import Simulation

@@ -8,7 +8,7 @@ in `Context.sections`.
 from functools import lru_cache
 
 from dsa_des.component import Parameters
-from dsa_des.registry import registered
+from dsa_des.entry_points import registered
 
 SECTIONS = "dsa_des.sections"
 

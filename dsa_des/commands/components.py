@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.table import Table
 
 from dsa_des.component import Component
+from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError
-from dsa_des.registry import UnknownType, find, registered
+from dsa_des.registry import UnknownType, find
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",

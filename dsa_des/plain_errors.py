@@ -1,0 +1,30 @@
+"""One message and an exit code for every error that a user can cause."""
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from dsa_des.errors import BlockFailure, SceneError, UsageError
+
+
+def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn the errors a user can cause into one message without a traceback."""
+
+    @functools.wraps(command)
+    def guarded(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except (SceneError, UsageError) as error:
+            click.echo(f"error: {error}", err=True)
+            sys.exit(2)
+        except BlockFailure as error:
+            click.echo(f"error: {error}", err=True)
+            sys.exit(1)
+        except BrokenPipeError:  # the reader of our output went away
+            sys.stderr.close()
+            sys.exit(1)
+
+    return guarded
