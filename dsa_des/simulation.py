@@ -33,7 +33,7 @@ from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
-CELLS_PER_WINDOW = 32768
+CELLS_PER_WINDOW = 131072
 
 
 @dataclass
