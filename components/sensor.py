@@ -127,6 +127,7 @@ class Sensor(Component):
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
+    lockstep = True
     #: Whether detections carry a range.
     measures_range = False
     effects = SENSOR_EFFECTS

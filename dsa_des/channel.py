@@ -9,6 +9,7 @@ from collections import deque
 import numpy as np
 
 from dsa_des.message import Message
+from dsa_des.replica_time import ReplicaTime
 from dsa_des.types import IntArray
 from dsa_des.wire_faults import WireFaults
 
@@ -24,12 +25,21 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
+    replicas : ReplicaTime, optional
+        For replicas in lock step: no row arrives in another replica than its own.
     """
 
-    def __init__(self, source: str, delay_ticks: int = 0, faults: WireFaults | None = None) -> None:
+    def __init__(
+        self,
+        source: str,
+        delay_ticks: int = 0,
+        faults: WireFaults | None = None,
+        replicas: ReplicaTime | None = None,
+    ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
+        self._replicas = replicas
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
 
@@ -54,6 +64,11 @@ class Channel:
             order = np.argsort(arrivals, kind="stable")
             arrivals, message = arrivals[order], message.take(kept[order])
             if len(kept) == 0:
+                return arrivals
+        if self._replicas is not None and self.delay_ticks:
+            in_time = arrivals % self._replicas.span_ticks < self._replicas.end_tick
+            arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
+            if len(arrivals) == 0:
                 return arrivals
         self._waiting.append((arrivals, message))
         return arrivals
@@ -106,7 +121,11 @@ class Channel:
         if held is None:
             return None
         arrivals, message = held
-        return message, np.searchsorted(arrivals, ticks, side="right") - 1
+        rows = np.searchsorted(arrivals, ticks, side="right") - 1
+        if self._replicas is not None:
+            span = self._replicas.span_ticks
+            rows[arrivals[rows] // span != ticks // span] = -1
+        return message, rows
 
 
 def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:

@@ -38,6 +38,7 @@ class PickBest(Component):
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     Parameters = PickBestParameters
     windowed = True
+    lockstep = True
 
     def setup(self) -> None:
         """Rank the sensors."""
@@ -60,6 +61,10 @@ class PickBest(Component):
         ]
         self._gate_ticks = int(self.p.coincidence_s * self.context.ticks_per_s)
         self._recent: dict[str, Arrivals] = {}
+
+    def serves_replicas(self) -> bool:
+        """Say no to a gate that would reach from one replica into the one before."""
+        return super().serves_replicas() and self.p.coincidence_s <= self.context.duration_s
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""

@@ -69,9 +69,7 @@ class Culling:
             columns = self._columns(*epochs)
             same = self._last is not None and np.array_equal(columns, self._last[2])
             fleet = (
-                self._last[3]
-                if same and self._last is not None
-                else self._fleet.subset(columns)
+                self._last[3] if same and self._last is not None else self._fleet.subset(columns)
             )
             self._last = (*epochs, columns, fleet)
         return self._last[2], self._last[3]
