@@ -10,6 +10,7 @@ import numpy as np
 
 from dsa_des.message import Message
 from dsa_des.replica_time import ReplicaTime
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wire_faults import WireFaults
 
@@ -77,7 +78,7 @@ class Channel:
         """Return the ticks at which rows arrive before `end` that were not collected yet."""
         ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
         if self._faults is not None and ticks:
-            return np.unique(np.concatenate(ticks))  # late rows overtake and may coincide
+            return sorted_union(ticks)  # late rows overtake and may coincide
         return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     def collect(self, end: int) -> tuple[IntArray, Message] | None:

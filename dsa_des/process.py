@@ -20,6 +20,7 @@ from dsa_des.events import Bell, WakeUp
 from dsa_des.message import Message
 from dsa_des.processors import Processor
 from dsa_des.replica_time import ReplicaTime
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -167,7 +168,7 @@ class Node:
         ticks = [demand.between(start, end) for demand in self.demands]
         if len(ticks) == 1:
             return ticks[0]
-        return np.unique(np.concatenate(ticks)) if ticks else np.empty(0, dtype=np.int64)
+        return sorted_union(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -195,7 +196,7 @@ class Node:
             if len(own) == 0 and len(arrivals) == 1:
                 ticks = arrivals[0]
             else:
-                ticks = np.unique(np.concatenate([own, *arrivals]))
+                ticks = sorted_union([own, *arrivals])
             if len(own):
                 place = np.searchsorted(ticks, own)
                 numbered = np.full(len(ticks), -1, dtype=np.int64)

@@ -11,6 +11,7 @@ from components.messages import Detections, FusedDetections, SensorOffer
 from components.true_entries import true_entries
 from dsa_des.component import Component, NonNegativeRational, Parameters
 from dsa_des.ports import Input, Output
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -78,7 +79,7 @@ class PickBest(Component):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = np.unique(np.concatenate(keys))
+        union = sorted_union(keys)
         row, target = np.divmod(union, width)
         if self._gate_ticks:
             arrivals = self._with_recent(arrivals)

@@ -56,7 +56,7 @@ class TrackerStub(Component):
         if replica[0] != self._replica:  # another run: nothing is held yet
             self._targets = self._targets[:0]
         self._replica = int(replica[-1])
-        targets = np.union1d(self._targets, fused.target)
+        targets = _present(self._targets, fused.target, len(fused.roster))
         pool, start = self._pool(fused, counts)
         last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
         last[0, np.searchsorted(targets, self._targets)] = np.arange(start)
@@ -107,6 +107,14 @@ class TrackerStub(Component):
             roster=fused.roster,
             sensors=fused.sensors,
         )
+
+
+def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:
+    """Return the targets that are held or newly measured, ascending."""
+    there = np.zeros(targets, dtype=bool)
+    there[held] = True
+    there[new] = True
+    return np.flatnonzero(there)
 
 
 def _forget_other_replicas(last: IntArray, replica: IntArray, start: int, counts: IntArray) -> None:
