@@ -23,6 +23,7 @@ class Gate(Component):
     outputs = {"targets": Output(GatedTargets, "The same, with a decision for each sensor.")}
     windowed = True
     lockstep = True
+    rewindable = True
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that some sensor may look at."""

@@ -128,6 +128,7 @@ class Sensor(Component):
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
     lockstep = True
+    rewindable = True
     #: Whether detections carry a range.
     measures_range = False
     effects = SENSOR_EFFECTS

@@ -5,6 +5,7 @@ reader only ever sees those that have arrived by the instant it asks about.
 """
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,20 @@ class Channel:
     def hold(self, message: Message, tick: int) -> None:
         """Make `message` the last arrived one, as if it had come at `tick`."""
         self._last = (np.array([tick], dtype=np.int64), message)
+
+    def state(self) -> tuple[Any, Any]:
+        """Return what waits and what is held, for `set_state`."""
+        return tuple(self._waiting), self._last
+
+    def set_state(self, state: tuple[Any, Any]) -> None:
+        """Go back to a state that `state` gave."""
+        self._waiting, self._last = deque(state[0]), state[1]
+
+    def earliest_since(self, state: tuple[Any, Any]) -> int | None:
+        """Return the tick of the first arrival of what was pushed since a `state`, or None."""
+        before = {id(item) for item in state[0]}
+        ticks = [int(item[0][0]) for item in self._waiting if id(item) not in before]
+        return min(ticks) if ticks else None
 
     def push(self, message: Message, sent: int | None = None) -> IntArray:
         """Deposit a message and return the ticks at which its rows arrive, in order.

@@ -176,6 +176,10 @@ class Component:
     Parameters: ClassVar[Any] = Parameters
     #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
     windowed: ClassVar[bool] = False
+    #: Whether the engine may take the block back to an earlier state. Its attributes, and those of
+    #: its effects, must then hold all of that state; arrays, lists, dicts and sets among them may
+    #: be changed in place, anything within them must be replaced instead.
+    rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
     #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
     lockstep: ClassVar[bool] = False

@@ -71,6 +71,15 @@ class Recorder:
             if len(columns["tick"]):
                 self._pending[table].append((block, columns))
 
+    def mark(self) -> dict[str, int]:
+        """Return how much was noted since the last `advance`, for `rewind`."""
+        return {table: len(pieces) for table, pieces in self._pending.items()}
+
+    def rewind(self, mark: dict[str, int]) -> None:
+        """Forget what was noted since `mark`."""
+        for table, count in mark.items():
+            del self._pending[table][count:]
+
     def advance(self, tick: int) -> None:
         """Hand on every row before `tick`; no more of them will come."""
         for table, pieces in self._pending.items():

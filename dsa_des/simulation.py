@@ -30,11 +30,14 @@ from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
+from dsa_des.rewind import Checkpoint, cut_loops, may_rewind
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
+# After something came back, a window starts at this part of its full length.
+_RESTART = 32
 
 
 @dataclass
@@ -122,6 +125,9 @@ class Simulation:
         self._window = window
         self._cuts = sorted(cuts)
         self._depth = depths(scene.graph)
+        queued = any(block.options.processor for block in scene.blocks.values())
+        self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
+        self._cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
         self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
@@ -234,7 +240,9 @@ class Simulation:
     def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
         graph = self.scene.graph
         windowed = set() if window == 1 else self.scene.look_ahead_blocks()
-        order = window_order(graph, windowed)
+        if self._rewinds:
+            windowed = set(self.components)
+        order = window_order(graph, windowed, self._cut_edges)
         processors = self._build_processors()
         shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
         nodes = {}
@@ -318,9 +326,10 @@ class Simulation:
             self.recorder.open(messages, self.ticks_per_s, self.span_ticks)
         for node in self.nodes.values():
             node.start()
-        for window in self._windows(end):
-            self.window = window
-            self._run_window(*window)
+        for window in self._rewinding(end) if self._rewinds else self._windows(end):
+            if not self._rewinds:
+                self.window = window
+                self._run_window(*window)
             if self.recorder is not None:
                 self.recorder.advance(self.window[1])
             if progress is not None:
@@ -343,11 +352,53 @@ class Simulation:
             inner = [cut for cut in self._cuts if start < cut < stop]
             yield from pairwise([start, *inner, stop])
 
+    def _rewinding(self, end: int) -> Iterator[tuple[int, int]]:
+        """Run and yield windows in which nothing came back unseen (`dsa_des.rewind`)."""
+        feedback = [
+            channel
+            for node in self.nodes.values()
+            for wires in node.channels.values()
+            for channel in wires
+            if (channel.source, node.name) in self._cut_edges
+        ]
+        start, length = 0, self._window_ticks
+        while start < end:
+            stop = min(start + length, end, *(cut for cut in self._cuts if cut > start))
+            checkpoint = Checkpoint(self.nodes.values(), self.recorder, self.trace)
+            self.window = (start, stop)
+            self._run_window(start, stop)
+            early = checkpoint.earliest_since(feedback, stop)
+            if self._failure is not None and (early < stop or len(self.failed_at) > 1):
+                # What failed may never have happened: look less far.
+                self._failure = None
+                checkpoint.restore()
+                middle = int(self.failed_at[len(self.failed_at) // 2])
+                length = max(1, min(early, middle) - start)
+                continue
+            self._raise_failure()
+            if early < stop:
+                checkpoint.restore()
+                stop = early
+                self.window = (start, stop)
+                self._run_window(start, stop)
+                self._raise_failure()
+                length = max(1, self._window_ticks // _RESTART)
+            else:
+                length = min(2 * length, self._window_ticks)
+            yield start, stop
+            start = stop
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            failure, cause = self._failure
+            raise failure from cause
+
     def _run_window(self, start: int, end: int) -> None:
         for node in self.nodes.values():
             node.open_window(start, end)
         try:
-            self.env.run(until=end)
+            # A window that may be rewound leaves the clock at its start, where all of it runs.
+            self.env.run(until=None if self._rewinds else end)
         except Abort:
             if self._failure is None:
                 raise
@@ -360,11 +411,14 @@ class Simulation:
 
     def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
+        if self._failure is not None:
+            return  # a window that may be rewound goes on; the first failure counts
         self.failed_at = ticks
         time_s = int(ticks[0]) / self.ticks_per_s
         failure = _failure(node.name, type(node.component), time_s, error, scan)
         self._failure = (failure, error)
-        raise Abort
+        if not self._rewinds:
+            raise Abort
 
 
 def _failure(

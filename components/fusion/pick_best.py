@@ -40,6 +40,7 @@ class PickBest(Component):
     Parameters = PickBestParameters
     windowed = True
     lockstep = True
+    rewindable = True
 
     def setup(self) -> None:
         """Rank the sensors."""

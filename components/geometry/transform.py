@@ -42,6 +42,7 @@ class Transform(Component):
     Parameters = TransformParameters
     windowed = True
     lockstep = True
+    rewindable = True
     effects = (NavigationErrors(),)
     line_of_sight: ClassVar[Callable[..., tuple[Any, Any, Any]]]
 

@@ -35,6 +35,7 @@ class TrackerStub(Component):
     Parameters = StubParameters
     windowed = True
     lockstep = True
+    rewindable = True
 
     def setup(self) -> None:
         """Start with no tracks."""

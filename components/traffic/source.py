@@ -11,17 +11,19 @@ from pydantic import Field
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.reach import farthest_look
+from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
 from components.traffic.state import TrajectoryState
+from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain
 from dsa_des.clock import ClockSpec
 from dsa_des.component import Component, Parameters, PositiveRational
 from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
-from dsa_des.ports import Output
+from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Wake
+from dsa_des.wake import Arrivals, Wake
 
 
 class SourceParameters(Parameters):
@@ -56,13 +58,21 @@ class Fleet(Protocol):
 class TrafficSource(Component):
     """Publishes where the ownship and its targets are.
 
+    When manoeuvres are wired to it, its ownship flies them from the time they come.
+
     Subclasses set `own`, `fleet` and `roster` in `setup`, and say at which times their data hold
     samples.
     """
 
+    inputs = {
+        "manoeuvres": Input(
+            Manoeuvres, "queued", "Turns that the ownship is told to fly.", required=False
+        )
+    }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
     Parameters: ClassVar[Any] = SourceParameters
     windowed = True
+    rewindable = True
     clocked = "demand"
 
     own: Trajectory
@@ -87,9 +97,12 @@ class TrafficSource(Component):
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
         self._everybody = np.arange(len(self.roster))
         self._culling: Culling | None = None
+        self._steered = bool(self.context.producers)
+        if self._steered:
+            self.own = SteeredFlight(self.own)
         reach_m = farthest_look(c.request for c in self.context.consumers).range_m
-        on_demand = self.clock_of(self.p) is None
-        if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
+        known = self.clock_of(self.p) is None and not self._steered
+        if math.isfinite(reach_m) and known and not self.context.simulate_everything:
             self._culling = Culling(self.own, self.targets, self.fleet, reach_m)
 
     @property
@@ -106,6 +119,8 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
+        for new in wake.arrivals("manoeuvres"):
+            self._steer(new)
         time_s = wake.time_s
         own = self.own.at(time_s)
         columns, fleet = self._everybody, self.fleet
@@ -130,6 +145,15 @@ class TrafficSource(Component):
             roster=self.roster,
             columns=columns,
         )
+
+    def _steer(self, new: Arrivals) -> None:
+        """Turn the ownship at the times at which manoeuvres have come."""
+        told = zip(new.tick.tolist(), new.message.turn_rad, new.message.rate_rad_s, strict=True)
+        for tick, turn_rad, rate_rad_s in told:
+            assert isinstance(self.own, SteeredFlight)
+            self.own = self.own.turned(
+                tick / self.context.ticks_per_s, float(turn_rad), float(rate_rad_s)
+            )
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""
