@@ -33,15 +33,10 @@ class ReplicaClock(ScanClock):
         # Clocks that differ in their offsets only are one array expression.
         self._alike = len(rates) == 1 and first.spec.jitter_s == 0
         self._offsets = np.array([clock.offset for clock in clocks], dtype=np.int64)
-        self._last: tuple[tuple[int, int], Scans] | None = None
-
-    def between(self, start: int, end: int) -> Scans:
-        """Return the scan numbers and ticks on the common timeline, in order."""
-        if self._last is None or self._last[0] != (start, end):
-            self._last = (start, end), self._between(start, end)
-        return self._last[1]
+        self._last = (0, -1, None)
 
     def _between(self, start: int, end: int) -> Scans:
+        """Return the scan numbers and ticks on the common timeline, in order."""
         span, length = self._time.span_ticks, self._time.end_tick
         first = max(0, start // span)
         last = min(-(-end // span), self._time.replicas)

@@ -362,6 +362,7 @@ class Simulation:
             if (channel.source, node.name) in self._cut_edges
         ]
         start, length = 0, self._window_ticks
+        came = 0  # when something came back last
         while start < end:
             stop = min(start + length, end, *(cut for cut in self._cuts if cut > start))
             checkpoint = Checkpoint(self.nodes.values(), self.recorder, self.trace)
@@ -382,9 +383,13 @@ class Simulation:
                 self.window = (start, stop)
                 self._run_window(start, stop)
                 self._raise_failure()
-                length = max(1, self._window_ticks // _RESTART)
-            else:
+            coming = checkpoint.earliest_since(feedback, -1)
+            if coming < 0:
                 length = min(2 * length, self._window_ticks)
+            else:  # what comes back often comes regularly; at first, or after a hurry, start small
+                small = self._window_ticks // _RESTART
+                length = min(max(1, coming - came if came else small), self._window_ticks)
+                came = coming
             yield start, stop
             start = stop
 
