@@ -8,15 +8,18 @@ import numpy as np
 import numpy.typing as npt
 
 from components.traffic.geodesic_motion import geodesic_state
-from components.traffic.leg_builder import hold_state
+from components.traffic.leg_builder import FORMULAS, hold_state
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
+from components.traffic.piece_search import PieceSearch
 from components.traffic.trajectory import (
     SampledTrajectory,
     TrajectoryState,
     evaluate_segments,
     locate,
 )
+
+IntArray = npt.NDArray[np.int64]
 
 CELLS_AT_ONCE = 16_384
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
@@ -26,7 +29,7 @@ class ScriptedFleet:
     """Scripted aircraft evaluated together, bit for bit as each would be alone.
 
     All aircraft with a single straight leg are one array expression, all that stand still
-    another; the others are evaluated one by one.
+    another; those with several legs are looked up leg by leg.
 
     Parameters
     ----------
@@ -43,7 +46,10 @@ class ScriptedFleet:
             for kind, formula in (("geodesic", geodesic_state), ("hold", hold_state))
             if kind in kinds
         ]
-        self._single = [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")]
+        self._others = np.array(
+            [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")], dtype=np.int64
+        )
+        self._legs: _Legs | None = None
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.
@@ -62,11 +68,32 @@ class ScriptedFleet:
         state = _empty_state(len(times), len(self.trajectories))
         for group in self._groups:
             group.fill(state, times)
-        for i in self._single:
-            alone = self.trajectories[i].at(times)
-            for out, column in zip(state.arrays(), alone.arrays(), strict=True):
-                out[:, i] = column
+        if len(self._others):
+            shape = len(times), len(self._others)
+            aircraft = np.broadcast_to(self._others, shape).reshape(-1)
+            several = self.each(aircraft, np.repeat(times, len(self._others))).reshaped(shape)
+            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
+                out[:, self._others] = columns
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states, each at a time of its own.
+
+        Parameters
+        ----------
+        aircraft : (n,) of int
+            Which, by their place in the fleet.
+        time_s : (n,)
+            Seconds.
+
+        Returns
+        -------
+        TrajectoryState
+            Arrays of shape (n,).
+        """
+        if self._legs is None:
+            self._legs = _Legs(self.trajectories)
+        return _in_blocks(self._legs.state, aircraft, time_s)
 
 
 class _Group:
@@ -113,6 +140,54 @@ class _Group:
                 out[block, self._columns] = value
 
 
+class _Legs:
+    """All legs of many flights, found by flight and time."""
+
+    def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
+        segments = [segment for t in trajectories for segment in t.segments]
+        self._find = PieceSearch([np.array([s.start_s for s in t.segments]) for t in trajectories])
+        self._start = np.array([t.start_time_s for t in trajectories])
+        self._end = np.array([t.end_time_s for t in trajectories])
+        self._until = np.array([t.evaluated_until_s for t in trajectories])
+        self._pitch = np.array([segment.pitch_rad for segment in segments])
+        self._roll = np.array([segment.roll_rad for segment in segments])
+        # NaN where the attitude follows from the motion.
+        fixed = [[np.nan if a is None else a for a in t.fixed_attitude_rad] for t in trajectories]
+        self._fixed = np.array(fixed).reshape(-1, 3).T.copy()
+        self._kind = np.array([list(FORMULAS).index(s.kind) for s in segments], dtype=np.int64)
+        self._slot = np.empty(len(segments), dtype=np.int64)
+        self._tables: dict[int, FloatArray] = {}
+        for kind in np.unique(self._kind).tolist():
+            members = np.flatnonzero(self._kind == kind)
+            self._slot[members] = np.arange(len(members))
+            self._tables[kind] = np.stack([segments[i].parameters for i in members], axis=-1)
+
+    def state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        start, until = self._start[aircraft], self._until[aircraft]
+        elapsed = np.where(time_s > start, time_s, start)
+        elapsed = np.where(elapsed < until, elapsed, until) - start
+        leg = self._find(aircraft, elapsed)
+        elapsed -= self._find.starts_s[leg]
+        lat, lon, alt, yaw = (np.empty(len(aircraft)) for _ in range(4))
+        for kind, formula in enumerate(FORMULAS.values()):
+            if kind not in self._tables:
+                continue
+            chosen: slice | IntArray = slice(None)
+            if len(self._tables) > 1:
+                chosen = np.flatnonzero(self._kind[leg] == kind)
+            table = self._tables[kind].take(self._slot[leg[chosen]], axis=1)
+            values = formula(table, np.ascontiguousarray(elapsed[chosen]))
+            for out, value in zip((lat, lon, alt, yaw), values, strict=True):
+                out[chosen] = value
+        derived = (yaw, self._pitch[leg], self._roll[leg])
+        attitude = [
+            np.where(np.isnan(given[aircraft]), angle, given[aircraft])
+            for given, angle in zip(self._fixed, derived, strict=True)
+        ]
+        present = (time_s >= self._start[aircraft]) & (time_s <= self._end[aircraft])
+        return TrajectoryState(lat, lon, alt, attitude[0], attitude[1], attitude[2], present)
+
+
 class SampledFleet:
     """Sampled aircraft evaluated together, bit for bit as each would be alone.
 
@@ -142,6 +217,7 @@ class SampledFleet:
             if self.trajectories
             else np.zeros((25, 0))
         )
+        self._find: PieceSearch | None = None
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.
@@ -178,6 +254,55 @@ class SampledFleet:
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states, each at a time of its own.
+
+        Parameters
+        ----------
+        aircraft : (n,) of int
+            Which, by their place in the fleet.
+        time_s : (n,)
+            Seconds.
+
+        Returns
+        -------
+        TrajectoryState
+            Arrays of shape (n,).
+        """
+        if self._find is None:
+            self._find = PieceSearch([t.sample_times_s for t in self.trajectories])
+        return _in_blocks(self._state, aircraft, time_s)
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        assert self._find is not None
+        samples, first, last = self._find.starts_s, self._find.first, self._find.last
+        start, end = samples[first[aircraft]], samples[last[aircraft]]
+        inside = np.where(time_s > start, time_s, start)
+        inside = np.where(inside < end, inside, end)
+        segment = self._find(aircraft, inside)
+        present = (time_s >= start) & (time_s <= end)
+        return evaluate_segments(
+            self._table.take(segment, axis=1), inside - samples[segment], present
+        )
+
+
+def _in_blocks(
+    state: Callable[[IntArray, FloatArray], TrajectoryState],
+    aircraft: IntArray,
+    time_s: FloatArray,
+) -> TrajectoryState:
+    """Evaluate pairs of aircraft and time, a cache's worth at a time."""
+    blocks = [
+        state(aircraft[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE])
+        for first in range(0, len(aircraft), CELLS_AT_ONCE)
+    ]
+    if len(blocks) == 1:
+        return blocks[0]
+    if not blocks:
+        return _empty_state(1, 0).reshaped((0,))
+    columns = zip(*(block.arrays() for block in blocks), strict=True)
+    return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
 
 def _times(time_s: npt.ArrayLike) -> FloatArray:

@@ -88,12 +88,15 @@ class TrafficSource(Component):
         on_demand = self.clock_of(self.p) is None
         if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
             subset = type(self.fleet)
-            self._culling = Culling(self.own, self.targets, self.fleet, subset, reach_m)
+            end_s = float(self.context.duration_s)
+            self._culling = Culling(self.own, self.targets, self.fleet, subset, reach_m, end_s)
 
     @property
     def width(self) -> int:
-        """Number of targets that are moved at the start."""
-        return len(self.roster) if self._culling is None else len(self._culling.active(0, 0)[0])
+        """Most targets that are moved at one time."""
+        if self._culling is None:
+            return len(self.roster)
+        return self._culling.intervals.most_at_once()
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
