@@ -42,7 +42,7 @@ class Recorder:
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
-        self._names: dict[tuple[str, str], dict[str, int]] = {}
+        self._texts: dict[tuple[str, str], _TextCodes] = {}
         self.rows: dict[str, int] = {}
 
     def open(self, messages: Iterable[type[Message]], ticks_per_s: int) -> None:
@@ -113,27 +113,48 @@ class Recorder:
             values: AnyArray = ticks / self._ticks_per_s
             return values if order is None else values[order]
         if kind == "text":
-            names = self._names.setdefault((table, name), {})
-            parts = [_codes(name, block, columns, names) for block, columns in pieces]
-            codes = np.concatenate(parts)
-            return Text(codes if order is None else codes[order], tuple(names))
+            text = self._texts.setdefault((table, name), _TextCodes(name))
+            codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
+            return Text(codes if order is None else codes[order], text.names)
         parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
         return values if order is None else values[order]
 
 
-def _codes(name: str, block: str, columns: Columns, names: dict[str, int]) -> AnyArray:
-    count = len(columns["tick"])
-    if name == "block":
-        return np.full(count, names.setdefault(block, len(names)), dtype=np.int32)
-    text = columns.get(name)
-    if text is None:
-        return np.full(count, -1, dtype=np.int32)
-    if not isinstance(text, Text):
-        raise TypeError(f"column {name!r} must be Text")
-    known = [names.setdefault(item, len(names)) for item in text.names]
-    lookup = np.array([*known, -1], dtype=np.int32)  # code -1 (null) takes the last entry
-    return lookup[text.codes]
+class _TextCodes:
+    """The names that a text column has held so far, and what its pieces' own codes become."""
+
+    def __init__(self, column: str) -> None:
+        self._column = column
+        self._place: dict[str, int] = {}
+        #: By identity of a tuple of names, which is kept so that the identity stays its own.
+        self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
+        self.names: tuple[str, ...] = ()
+
+    def codes(self, block: str, columns: Columns) -> AnyArray:
+        """Return one piece's codes into our names; -1 is null."""
+        count = len(columns["tick"])
+        if self._column == "block":
+            return np.full(count, self._lookup((block,))[0], dtype=np.int32)
+        text = columns.get(self._column)
+        if text is None:
+            return np.full(count, -1, dtype=np.int32)
+        if not isinstance(text, Text):
+            raise TypeError(f"column {self._column!r} must be Text")
+        return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
+
+    def _lookup(self, names: tuple[str, ...]) -> AnyArray:
+        known = self._lookups.get(id(names))
+        if known is not None and known[0] is names:
+            return known[1]
+        places = [self._place.setdefault(name, len(self._place)) for name in names]
+        lookup = np.array([*places, -1], dtype=np.int32)
+        if len(self._lookups) > 1000:  # tuples made anew for every message
+            self._lookups.clear()
+        self._lookups[id(names)] = names, lookup
+        if len(self._place) > len(self.names):
+            self.names = tuple(self._place)
+        return lookup
 
 
 def _values(values: Any, kind: str, count: int) -> AnyArray:

@@ -136,7 +136,7 @@ class ScriptedTraffic(TrafficSource):
         own = parameters.ownship
         reference = (own.lat_deg, own.lon_deg, own.alt_m)
         self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **_flight(own)
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
         )
         names = [intruder.name for intruder in parameters.intruders]
         for twice in sorted({name for name in names if names.count(name) > 1}):
@@ -153,7 +153,8 @@ class ScriptedTraffic(TrafficSource):
         return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
 
 
-def _flight(flight: Flight) -> dict[str, Any]:
+def flight_arguments(flight: Flight) -> dict[str, Any]:
+    """Return what a scene says of a flight as arguments of `ScriptedTrajectory`."""
     return {
         "alt_m": flight.alt_m,
         "heading_deg": flight.heading_deg,
@@ -175,7 +176,7 @@ def _leg(leg: Any) -> Any:
 
 
 def _intruder(craft: Intruder, reference: tuple[float, float, float]) -> ScriptedTrajectory:
-    values = _flight(craft) | {
+    values = flight_arguments(craft) | {
         "start_time_s": craft.start_time_s,
         "end_time_s": craft.end_time_s,
     }
