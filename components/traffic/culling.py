@@ -1,6 +1,6 @@
 """Which targets need moving: those that somebody may look at during a window."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,8 @@ class Culling:
     Parameters
     ----------
     own, targets : objects with `at(time_s)`, `max_speed_mps` and `interval_present()`
-    fleet : object with `each(aircraft, time_s)`
+    fleet : object with `each(aircraft, time_s)` and `subset(columns)`
         All targets.
-    subset : callable
-        Makes a fleet of some targets.
     reach_m : float
         Farthest range at which any sensor looks.
     end_s : float
@@ -35,12 +33,11 @@ class Culling:
         own: Any,
         targets: Sequence[Any],
         fleet: Any,
-        subset: Callable[[Sequence[Any]], Any],
         reach_m: float,
         end_s: float,
         lasts_s: float = 0.0,
     ) -> None:
-        self._targets, self._subset, self._lasts_s = targets, subset, lasts_s
+        self._fleet, self._lasts_s = fleet, lasts_s
         self.reach_m = reach_m
         there = np.array([target.interval_present() for target in targets]).reshape(-1, 2)
         first, last = own.interval_present()
@@ -71,5 +68,5 @@ class Culling:
         """
         columns = self.intervals.during(first_s, last_s + self._lasts_s)
         if self._last is None or not np.array_equal(columns, self._last[0]):
-            self._last = columns, self._subset([self._targets[i] for i in columns.tolist()])
+            self._last = columns, self._fleet.subset(columns)
         return self._last
