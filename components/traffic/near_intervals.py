@@ -104,7 +104,10 @@ def near_intervals(
         target, piece = np.repeat(target[cut], 2), np.repeat(2 * piece[cut], 2)
         piece[1::2] += 1
         length = half
-    return _merged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    near, start, end = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    start, end = np.maximum(start, present_s[0][near]), np.minimum(end, present_s[1][near])
+    some = start <= end
+    return _merged(near[some], start[some], end[some])
 
 
 def _range_at(
