@@ -106,5 +106,3 @@ def silhouette(
     y = m[3] * n + m[4] * e + m[5] * d
     z = m[6] * n + m[7] * e + m[8] * d
     return x, hypot(y, z), abs(z)
-
-

@@ -96,7 +96,9 @@ def prepare(simulation: Simulation) -> list[Sensor]:
     return sensors
 
 
-def _areas(roster: Any, areas: str, contrast: str) -> list[tuple[float, float, float, float, float]]:
+def _areas(
+    roster: Any, areas: str, contrast: str
+) -> list[tuple[float, float, float, float, float]]:
     back = "back_m2" if areas == "ir" else "front_m2"
     names = (f"{areas}.front_m2", f"{areas}.{back}", f"{areas}.side_m2", f"{areas}.horizontal_m2")
     columns = [roster.column(column).tolist() for column in (*names, contrast)]

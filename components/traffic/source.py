@@ -90,11 +90,13 @@ class TrafficSource(Component):
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
         self._everybody = np.arange(len(self.roster))
         self._culling: Culling | None = None
-        reach_m = farthest_look(c.request for c in self.context.consumers).range_m
+        look = farthest_look(c.request for c in self.context.consumers)
         on_demand = self.clock_of(self.p) is None
-        if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
+        if math.isfinite(look.range_m) and on_demand and not self.context.simulate_everything:
             end_s = float(self.context.duration_s)
-            self._culling = Culling(self.own, self.targets, self.fleet, reach_m, end_s)
+            self._culling = Culling(
+                self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
+            )
 
     @property
     def width(self) -> int:
@@ -135,7 +137,32 @@ class TrafficSource(Component):
             present=states.present & own.present[:, np.newaxis],
             roster=self.roster,
             columns=columns,
+            flights=self.flights,
         )
+
+    def flights(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the states of the ownship and of some targets, each at a time of its own.
+
+        Parameters
+        ----------
+        columns : (targets,) of int
+        time_s : (rows, targets)
+            With an ``update_rate_hz``, the last publication up to then counts.
+
+        Returns
+        -------
+        own, others : TrajectoryState
+            Arrays (rows, targets).
+        """
+        if self.p.update_rate_hz is not None:
+            rate = float(self.p.update_rate_hz)
+            time_s = np.floor(time_s * rate) / rate
+        others = self.fleet.each(
+            np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        )
+        return self.own.at(time_s), others.reshaped(time_s.shape)
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""
