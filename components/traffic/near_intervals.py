@@ -88,11 +88,12 @@ def near_intervals(
     """
     closing = closing_speed_mps * _SPEED_MARGIN
     target = np.arange(len(closing))
-    piece = np.zeros(len(closing), dtype=np.int64)
+    piece: FloatArray = np.zeros(len(closing))
     found = [(target[:0], closing[:0], closing[:0])]
     length = float(end_s)
     while len(target):
-        start, half = piece * length, 0.5 * length
+        start: FloatArray = piece * length
+        half = 0.5 * length
         range_m = _range_at(own_at, targets_at, target, start + half)
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
@@ -101,11 +102,11 @@ def near_intervals(
         settled = maybe & ((range_m <= reach_m - drift) | fine)
         found.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
-        target, piece = np.repeat(target[cut], 2), np.repeat(2 * piece[cut], 2)
+        target, piece = np.repeat(target[cut], 2), np.repeat(2.0 * piece[cut], 2)
         piece[1::2] += 1
         length = half
-    near, start, end = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    start, end = np.maximum(start, present_s[0][near]), np.minimum(end, present_s[1][near])
+    near, begin, end = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    start, end = np.maximum(begin, present_s[0][near]), np.minimum(end, present_s[1][near])
     some = start <= end
     return _merged(near[some], start[some], end[some])
 
