@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.checks import FloatArray, broadcast_flat, finite, positive, unflatten
 from components.geometry.angles import wrap_pi
-from components.radar.inputs import FloatArray, broadcast_flat, finite, positive, unflatten
 from dsa_des.types import BoolArray
 
 _TURN = 2.0 * math.pi
