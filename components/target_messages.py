@@ -40,7 +40,7 @@ class TrafficStates(Message):
     columns : (targets,) of int
         Which of them the arrays hold, ascending; the others are out of everybody's reach.
     flights : Flights or None
-        For whoever must know them at other instants: a beam that sweeps.
+        For whoever must know them at other instants: a beam that sweeps. None where nobody does.
     """
 
     own_lat_deg: FloatArray
@@ -59,6 +59,8 @@ class TrafficStates(Message):
     roster: Roster = static()
     columns: IntArray = static()
     flights: Flights | None = static(default=None, kw_only=True)
+
+    joins_static = frozenset({"columns"})
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -108,6 +110,8 @@ class RelativeTargets(Message):
     columns: IntArray = static()
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: Revisit | None = static(default=None, kw_only=True)
+
+    joins_static = frozenset({"columns"})
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

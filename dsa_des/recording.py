@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from dsa_des.message import Columns, Message, Schema, Text
+from dsa_des.replica_time import own_scans
 from dsa_des.types import AnyArray, IntArray
 
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
@@ -45,12 +46,19 @@ class Recorder:
         self._texts: dict[tuple[str, str], _TextCodes] = {}
         self.rows: dict[str, int] = {}
 
-    def open(self, messages: Iterable[type[Message]], ticks_per_s: int) -> None:
-        """Learn what the run's messages record; called once, before the run."""
+    def open(
+        self, messages: Iterable[type[Message]], ticks_per_s: int, span_ticks: int = 0
+    ) -> None:
+        """Learn what the run's messages record; called once, before the run.
+
+        With replicas in lock step, `span_ticks` apart, every table begins with their number.
+        """
         self._ticks_per_s = ticks_per_s
+        self._span_ticks = span_ticks
+        leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
         for message in messages:
             for table, schema in message.recorded.items():
-                self._schemas.setdefault(table, dict(_LEADING)).update(schema)
+                self._schemas.setdefault(table, dict(leading)).update(schema)
         self._schemas = dict(sorted(self._schemas.items()))
         self._pending = {table: [] for table in self._schemas}
         self.rows = dict.fromkeys(self._schemas, 0)
@@ -109,8 +117,8 @@ class Recorder:
         order: IntArray | None,
         ticks: IntArray,
     ) -> AnyArray | Text:
-        if name == "time_s":
-            values: AnyArray = ticks / self._ticks_per_s
+        if name in ("time_s", "tick", "replica"):
+            values = self._time_column(name, ticks)
             return values if order is None else values[order]
         if kind == "text":
             text = self._texts.setdefault((table, name), _TextCodes(name))
@@ -118,7 +126,16 @@ class Recorder:
             return Text(codes if order is None else codes[order], text.names)
         parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        if name == "scan" and self._span_ticks:
+            values = own_scans(values)
         return values if order is None else values[order]
+
+    def _time_column(self, name: str, ticks: IntArray) -> AnyArray:
+        if name == "replica":
+            return ticks // self._span_ticks
+        if self._span_ticks:
+            ticks = ticks % self._span_ticks
+        return ticks if name == "tick" else ticks / self._ticks_per_s
 
 
 class _TextCodes:

@@ -42,6 +42,7 @@ class Transform(Component):
     outputs = {"targets": Output(RelativeTargets, "Targets as seen from the ownship.")}
     Parameters = TransformParameters
     windowed = True
+    lockstep = True
     effects = (NavigationErrors(),)
     line_of_sight: ClassVar[Callable[..., tuple[Any, Any, Any]]]
 

@@ -75,8 +75,8 @@ class Sweep:
         revisit = targets.revisit
         if revisit is None:
             raise ValueError(
-                "beam_sweep needs to know the targets at instants of its own; this traffic (or "
-                "transform) passes no flights on: set beam_sweep to false"
+                "beam_sweep needs to know the targets at instants of its own; the traffic, or a "
+                "block on the way, passes no flights on: set beam_sweep to false"
             )
         block, columns = self._block, targets.columns
         at_start = targets.take(rows)

@@ -12,6 +12,7 @@ TABLE_ERROR = 1e-6
 class ExactDetection(Effect):
     """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
 
+    lockstep = True
     name = "exact Pd"
     acts_on = "method of Pd"
     neutral = False

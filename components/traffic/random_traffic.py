@@ -77,7 +77,7 @@ class RandomTraffic(TrafficSource):
         )
         altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
         speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
-        self.targets = [
+        flights = [
             ScriptedTrajectory(
                 names[i],
                 lat_deg=float(lat[i]),
@@ -88,7 +88,8 @@ class RandomTraffic(TrafficSource):
             )
             for i in range(p.intruders)
         ]
-        self.fleet = ScriptedFleet(self.targets)
+        self.targets = flights
+        self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(name, p.aircraft) for name in names])
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:

@@ -133,6 +133,7 @@ class ScriptedTraffic(TrafficSource):
     """Ownship and intruders on flights written in the scene: legs, turns, climbs, waypoints."""
 
     Parameters = ScriptedParameters
+    lockstep = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

@@ -91,6 +91,7 @@ class TrafficSource(Component):
         self._everybody = np.arange(len(self.roster))
         self._culling: Culling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
+        self._flights_asked_for = look.lasts_s > 0.0
         on_demand = self.clock_of(self.p) is None
         if math.isfinite(look.range_m) and on_demand and not self.context.simulate_everything:
             end_s = float(self.context.duration_s)
@@ -118,7 +119,7 @@ class TrafficSource(Component):
         own = self.own.at(time_s)
         columns, fleet = self._everybody, self.fleet
         if self._culling is not None:
-            columns, fleet = self._culling.active(float(time_s[0]), float(time_s[-1]))
+            columns, fleet = self._culling.active(float(time_s.min()), float(time_s.max()))
         states = fleet.at(time_s)
         return TrafficStates(
             tick=wake.ticks,
@@ -137,7 +138,7 @@ class TrafficSource(Component):
             present=states.present & own.present[:, np.newaxis],
             roster=self.roster,
             columns=columns,
-            flights=self.flights,
+            flights=self.flights if self._flights_asked_for else None,
         )
 
     def flights(

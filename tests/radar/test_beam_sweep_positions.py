@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from components.radar.beam_sweep import first_illumination
+from components.traffic.source import TrafficSource
 from dsa_des.errors import BlockFailure
 from dsa_des.recording import MemorySink, Recorder
 from dsa_des.scene import load_scene
@@ -135,8 +136,6 @@ def test_a_passing_target_that_outruns_the_beam_for_a_while_is_still_found() -> 
 
 
 def test_targets_that_cannot_be_revisited_are_refused(tmp_path: Path, monkeypatch) -> None:
-    from components.traffic.source import TrafficSource
-
     monkeypatch.setattr(TrafficSource, "flights", None)
     with pytest.raises(BlockFailure, match="beam_sweep needs to know the targets at instants"):
         simulate(tmp_path)
