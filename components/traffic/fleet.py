@@ -97,20 +97,7 @@ class ScriptedFleet:
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Give single aircraft's states, each at a time of its own.
-
-        Parameters
-        ----------
-        aircraft : (n,) of int
-            Which, by their place in the fleet.
-        time_s : (n,)
-            Seconds.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of shape (n,).
-        """
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         if self._legs is None:
             self._legs = _Legs(self.trajectories)
             self._place_in_legs = np.arange(len(self.trajectories))
@@ -298,20 +285,7 @@ class SampledFleet:
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Give single aircraft's states, each at a time of its own.
-
-        Parameters
-        ----------
-        aircraft : (n,) of int
-            Which, by their place in the fleet.
-        time_s : (n,)
-            Seconds.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of shape (n,).
-        """
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         if self._find is None:
             self._find = PieceSearch([t.sample_times_s for t in self.trajectories])
         return _in_blocks(self._state, aircraft, time_s)
