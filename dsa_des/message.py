@@ -76,6 +76,14 @@ Columns = dict[str, AnyArray | Text]
 Schema = dict[str, str]
 
 
+def rows_of(columns: Columns, rows: slice) -> Columns:
+    """Return some rows of recorded columns."""
+    return {
+        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
+        for name, values in columns.items()
+    }
+
+
 @dataclass(eq=False)
 class Message:
     """A batch of rows; subclasses add fields.

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from dsa_des.message import Columns, Message, Schema, Text
+from dsa_des.message import Columns, Message, Schema, Text, rows_of
 from dsa_des.replica_time import own_scans
 from dsa_des.types import AnyArray, IntArray
 
@@ -83,8 +83,8 @@ class Recorder:
                     ready.append((block, columns))
                     continue
                 if count:
-                    ready.append((block, _rows(columns, slice(0, count))))
-                later.append((block, _rows(columns, slice(count, len(ticks)))))
+                    ready.append((block, rows_of(columns, slice(0, count))))
+                later.append((block, rows_of(columns, slice(count, len(ticks)))))
             self._pending[table] = later
             if ready:
                 self._hand_on(table, ready)
@@ -178,13 +178,6 @@ def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
         return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
     return np.asarray(values, dtype=np.dtype(kind))
-
-
-def _rows(columns: Columns, rows: slice) -> Columns:
-    return {
-        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
-        for name, values in columns.items()
-    }
 
 
 class MemorySink:

@@ -18,10 +18,8 @@ def sorted_union(arrays: Sequence[IntArray]) -> IntArray:
     arrays : sequence of ndarray of int64, shape (n,)
         At least one.
     """
-    if len(arrays) == 1:
-        values = arrays[0]
-    else:
-        values = np.sort(np.concatenate(arrays), kind="stable")
+    joined = np.concatenate(arrays)
+    values = joined if len(arrays) == 1 else np.sort(joined, kind="stable")
     if len(values) == 0:
         return values
     new = np.empty(len(values), dtype=bool)

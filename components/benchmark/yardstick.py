@@ -10,6 +10,7 @@ a tracker that holds the last measurement. Random draws come in one block per se
 Philox generator would make the yardstick look slower than it need be).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import atan2, exp, hypot, inf
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from components.benchmark.scalar_motion import (
+    Position,
     level_body_axes,
     line_of_sight,
     silhouette,
@@ -59,8 +61,41 @@ class Result:
     held: dict[int, tuple[int, float, float, float]]
 
 
-def prepare(simulation: Simulation) -> list[Sensor]:
-    """Read the sensors of a scene that is ready to run."""
+@dataclass
+class Prepared:
+    """Everything the loop starts from: flights, sensors, random draws, and who scans when."""
+
+    seconds_per_tick: float
+    own: Callable[[float], Position]
+    own_pitch_roll: tuple[float, float]
+    flights: list[Callable[[float], Position]]
+    pitch_roll: list[tuple[float, float]]
+    calendar: dict[int, list[tuple[Sensor, int]]]
+
+
+def prepare(simulation: Simulation) -> Prepared:
+    """Read a scene that is ready to run; only its data are used."""
+    traffic: Any = simulation.components["traffic"]
+    own, targets = traffic.own.segments[0], [target.segments[0] for target in traffic.targets]
+    calendar: dict[int, list[tuple[Sensor, int]]] = {}
+    for sensor in _sensors(simulation):
+        for tick, scan in sensor.scans:
+            calendar.setdefault(tick, []).append((sensor, scan))
+        if sensor.kind == "radar":
+            stream = simulation.components[sensor.name].stream("detection")
+            numbers = np.array([scan for _, scan in sensor.scans], dtype=np.int64)
+            sensor.draws = [stream.uniform(key, numbers).tolist() for key in traffic.roster.keys]
+    return Prepared(
+        1.0 / simulation.ticks_per_s,
+        straight_flight(own.parameters.tolist()),
+        (own.pitch_rad, own.roll_rad),
+        [straight_flight(target.parameters.tolist()) for target in targets],
+        [(target.pitch_rad, target.roll_rad) for target in targets],
+        dict(sorted(calendar.items())),
+    )
+
+
+def _sensors(simulation: Simulation) -> list[Sensor]:
     roster = simulation.components["traffic"].roster  # type: ignore[attr-defined]
     sensors = []
     for name in ("radar", "eo", "ir"):
@@ -105,30 +140,23 @@ def _areas(
     return list(zip(*columns, strict=True))
 
 
-def run(simulation: Simulation, sensors: list[Sensor]) -> Result:
-    """Run the scene as one loop."""
-    traffic: Any = simulation.components["traffic"]
-    seconds = 1.0 / simulation.ticks_per_s
-    own_flight = straight_flight(traffic.own.segments[0].parameters.tolist())
-    flights = [straight_flight(t.segments[0].parameters.tolist()) for t in traffic.targets]
-    angles = [(t.segments[0].pitch_rad, t.segments[0].roll_rad) for t in traffic.targets]
-    own_pitch, own_roll = traffic.own.segments[0].pitch_rad, traffic.own.segments[0].roll_rad
-    keys = traffic.roster.keys
-    calendar: dict[int, list[tuple[Sensor, int]]] = {}
-    for sensor in sensors:
-        for tick, scan in sensor.scans:
-            calendar.setdefault(tick, []).append((sensor, scan))
-        if sensor.kind == "radar":
-            stream = simulation.components[sensor.name].stream("detection")
-            numbers = np.array([scan for _, scan in sensor.scans], dtype=np.int64)
-            sensor.draws = [stream.uniform(key, numbers).tolist() for key in keys]
+def run(scene: Prepared, every: int = 1) -> Result:
+    """Run the scene as one loop.
+
+    Parameters
+    ----------
+    scene : Prepared
+    every : int
+        Take only every so many instants: a fair sample of a long scene.
+    """
+    seconds, flights, angles = scene.seconds_per_tick, scene.flights, scene.pitch_roll
     result = Result({}, 0, 0, {})
     detections, held = result.detections, result.held
-    for tick in sorted(calendar):
-        looking = calendar[tick]
+    for tick in list(scene.calendar)[::every]:
+        looking = scene.calendar[tick]
         time_s = tick * seconds
-        own = own_flight(time_s)
-        axes = level_body_axes(own[3], own_pitch, own_roll)
+        own = scene.own(time_s)
+        axes = level_body_axes(own[3], *scene.own_pitch_roll)
         for target, flight in enumerate(flights):
             position = flight(time_s)
             north, east, up = line_of_sight(own, position)
