@@ -57,10 +57,10 @@ class Detections(Message):
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
-        has ``illuminated_s``, when its beam passed. Where the ownship's navigation errs, there are
-        the line of sight in NED by what it believes of its attitude, ``ned_azimuth_rad`` and
-        ``ned_elevation_rad``, and where it believes to be, ``own_lat_deg``, ``own_lon_deg`` and
-        ``own_alt_m``.
+        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
+        ownship's navigation errs, there are the line of sight in NED by what it believes of its
+        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``, and where it believes to be,
+        ``own_lat_deg``, ``own_lon_deg`` and ``own_alt_m``.
     roster : Roster
     """
 

@@ -74,22 +74,26 @@ class FarthestLook:
     ----------
     range_m : float
         Infinite where somebody has no limit.
+    lasts_s : float
+        How long a look lasts: a sweeping beam meets targets where they are later in the scan.
     """
 
     range_m: float
+    lasts_s: float = 0.0
 
 
 def farthest_look(requests: Iterable[object]) -> FarthestLook:
     """Return the farthest of what consumers ask for; who does not say asks for everything."""
-    farthest = 0.0
+    farthest = longest = 0.0
     for request in requests:
         if isinstance(request, Reach):
             farthest = max(farthest, request.range_max_m if request.enabled else 0.0)
         elif isinstance(request, FarthestLook):
             farthest = max(farthest, request.range_m)
+            longest = max(longest, request.lasts_s)
         else:
             farthest = math.inf
-    return FarthestLook(farthest)
+    return FarthestLook(farthest, longest)
 
 
 @dataclass(eq=False)

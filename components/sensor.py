@@ -146,6 +146,8 @@ class Sensor(Component):
         self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
         self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
+        #: What a look at nothing gave; while there is still nothing, it is not repeated.
+        self._idle: Look | None = None
 
     def request(self, port: str) -> Any:
         """Ask whoever feeds us for the targets in our reach."""
@@ -173,8 +175,15 @@ class Sensor(Component):
     def _reporting(self) -> list[Any]:
         return self.built("report")
 
+    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets as this sensor sees them, and the row of each scan."""
+        return targets, rows
+
     def look(self, cells: Cells) -> Look:
-        """Decide for each cell whether it is detected; the physics of the sensor."""
+        """Decide for each cell whether it is detected; the physics of the sensor.
+
+        A second look in a row that has no cells is not asked for.
+        """
         raise TypeError(f"{type(self).__name__} has no look(cells)")
 
     def run(self, wake: Wake) -> Detections | None:
@@ -182,13 +191,16 @@ class Sensor(Component):
         held = wake.held("targets")
         if held is None:
             return None
-        targets, rows = held
+        targets, rows = self.seen(*held)
         rows, reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks)
-        look = self.look(cells)
-        for judge in self._judgements:
-            look = judge(cells, look)
+        look = self._idle
+        if look is None or len(cells):
+            look = self.look(cells)
+            for judge in self._judgements:
+                look = judge(cells, look)
+            self._idle = None if len(cells) else look
         found = np.flatnonzero(look.detected)
         per_scan = np.bincount(cells.row[found], minlength=len(wake))
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],

@@ -6,6 +6,7 @@ and the target's attitude relative to that line of sight.
 """
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,11 +17,11 @@ from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
-from components.target_messages import RelativeTargets, TrafficStates
+from components.target_messages import Flights, RelativeTargets, Revisit, TrafficStates
 from dsa_des.component import Component, Parameters
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
-from dsa_des.types import FloatArray
+from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.wake import Wake
 
 
@@ -65,40 +66,52 @@ class Transform(Component):
         states = wake["states"]
         if states is None:
             return None
-        azimuth, elevation, range_m = type(self).line_of_sight(
-            states.own_lat_deg[:, np.newaxis],
-            states.own_lon_deg[:, np.newaxis],
-            states.own_alt_m[:, np.newaxis],
-            states.lat_deg,
-            states.lon_deg,
-            states.alt_m,
-            validate=False,
-        )
-        p, q = sensor_angles(
-            azimuth,
-            elevation,
-            states.own_yaw_rad[:, np.newaxis],
-            states.own_pitch_rad[:, np.newaxis],
-            states.own_roll_rad[:, np.newaxis],
-            model=self.p.attitude,
-        )
+        own = {
+            name: getattr(states, f"own_{name}")[:, np.newaxis]
+            for name in ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+        }
         return RelativeTargets(
             tick=states.tick,
-            azimuth_rad=azimuth,
-            elevation_rad=elevation,
-            range_m=range_m,
-            body_azimuth_rad=p,
-            body_elevation_rad=q,
-            relative_heading_rad=wrap_pi(states.yaw_rad - azimuth),
-            target_pitch_rad=states.pitch_rad,
-            target_roll_rad=states.roll_rad,
             own_alt_m=states.own_alt_m,
-            alt_m=states.alt_m,
-            present=states.present,
             roster=states.roster,
             columns=states.columns,
             believed=self._believed(states),
+            revisit=self._revisit(states.flights),
+            **self._as_seen(SimpleNamespace(**own), states, states.present),
         )
+
+    def _as_seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
+        """Return the fields of `RelativeTargets` that are per row and target."""
+        azimuth, elevation, range_m = type(self).line_of_sight(
+            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
+            validate=False,
+        )  # fmt: skip
+        p, q = sensor_angles(
+            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad, model=self.p.attitude
+        )
+        return {
+            "azimuth_rad": azimuth,
+            "elevation_rad": elevation,
+            "range_m": range_m,
+            "body_azimuth_rad": p,
+            "body_elevation_rad": q,
+            "relative_heading_rad": wrap_pi(other.yaw_rad - azimuth),
+            "target_pitch_rad": other.pitch_rad,
+            "target_roll_rad": other.roll_rad,
+            "alt_m": other.alt_m,
+            "present": present,
+        }
+
+    def _revisit(self, flights: Flights | None) -> Revisit | None:
+        """Return what transforms the flights at other instants."""
+        if flights is None:
+            return None
+
+        def revisit(columns: IntArray, time_s: FloatArray) -> dict[str, AnyArray]:
+            own, other = flights(columns, time_s)
+            return self._as_seen(own, other, own.present & other.present)
+
+        return revisit
 
     def _believed(self, states: TrafficStates) -> dict[str, FloatArray] | None:
         """Return what the ownship believes of itself, if that is not the truth."""

@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from components.traffic.geodesic_motion import geodesic_state
 from components.traffic.leg_builder import hold_state
+from components.traffic.leg_table import LegTable
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
+from components.traffic.piece_search import PieceSearch
 from components.traffic.trajectory import (
     SampledTrajectory,
     TrajectoryState,
@@ -29,7 +31,7 @@ class ScriptedFleet:
     """Scripted aircraft evaluated together, bit for bit as each would be alone.
 
     All aircraft with a single straight leg are one array expression, all that stand still
-    another; the others are evaluated one by one.
+    another; those with several legs are looked up leg by leg.
 
     Parameters
     ----------
@@ -46,7 +48,11 @@ class ScriptedFleet:
             for kind, formula in (("geodesic", geodesic_state), ("hold", hold_state))
             if kind in kinds
         ]
-        self._single = [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")]
+        self._others = np.array(
+            [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")], dtype=np.int64
+        )
+        self._legs: LegTable | None = None
+        self._place_in_legs = np.arange(len(self.trajectories))
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some aircraft, without preparing them anew.
@@ -57,13 +63,13 @@ class ScriptedFleet:
             Indices into the aircraft, ascending.
         """
         fleet = copy(self)
-        chosen = columns.tolist()
-        fleet.trajectories = [self.trajectories[i] for i in chosen]
+        fleet.trajectories = [self.trajectories[i] for i in columns.tolist()]
         fleet.names = [trajectory.name for trajectory in fleet.trajectories]
         parts = [group.subset(columns) for group in self._groups]
         fleet._groups = [part for part in parts if part is not None]
-        single = set(self._single)
-        fleet._single = [place for place, i in enumerate(chosen) if i in single]
+        fleet._others = np.flatnonzero(np.isin(columns, self._others))
+        # The table of legs is found by our own places, so that there is one for all subsets.
+        fleet._place_in_legs = self._place_in_legs[columns]
         return fleet
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
@@ -83,11 +89,20 @@ class ScriptedFleet:
         state = _empty_state(len(times), len(self.trajectories))
         for group in self._groups:
             group.fill(state, times)
-        for i in self._single:
-            alone = self.trajectories[i].at(times)
-            for out, column in zip(state.arrays(), alone.arrays(), strict=True):
-                out[:, i] = column
+        if len(self._others):
+            shape = len(times), len(self._others)
+            aircraft = np.broadcast_to(self._others, shape).reshape(-1)
+            several = self.each(aircraft, np.repeat(times, len(self._others))).reshaped(shape)
+            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
+                out[:, self._others] = columns
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        if self._legs is None:
+            self._legs = LegTable(self.trajectories)
+            self._place_in_legs = np.arange(len(self.trajectories))
+        return _in_blocks(self._legs.state, self._place_in_legs[aircraft], time_s)
 
 
 class _Group:
@@ -180,6 +195,7 @@ class SampledFleet:
             if self.trajectories
             else np.zeros((25, 0))
         )
+        self._find: PieceSearch | None = None
 
     def subset(self, columns: IntArray) -> SampledFleet:
         """Return the fleet of some aircraft, given by their indices, ascending."""
@@ -220,6 +236,42 @@ class SampledFleet:
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        if self._find is None:
+            self._find = PieceSearch([t.sample_times_s for t in self.trajectories])
+        return _in_blocks(self._state, aircraft, time_s)
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        assert self._find is not None
+        samples, first, last = self._find.starts_s, self._find.first, self._find.last
+        start, end = samples[first[aircraft]], samples[last[aircraft]]
+        inside = np.where(time_s > start, time_s, start)
+        inside = np.where(inside < end, inside, end)
+        segment = self._find(aircraft, inside)
+        present = (time_s >= start) & (time_s <= end)
+        return evaluate_segments(
+            self._table.take(segment, axis=1), inside - samples[segment], present
+        )
+
+
+def _in_blocks(
+    state: Callable[[IntArray, FloatArray], TrajectoryState],
+    aircraft: IntArray,
+    time_s: FloatArray,
+) -> TrajectoryState:
+    """Evaluate pairs of aircraft and time, a cache's worth at a time."""
+    blocks = [
+        state(aircraft[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE])
+        for first in range(0, len(aircraft), CELLS_AT_ONCE)
+    ]
+    if len(blocks) == 1:
+        return blocks[0]
+    if not blocks:
+        return _empty_state(1, 0).reshaped((0,))
+    columns = zip(*(block.arrays() for block in blocks), strict=True)
+    return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
 
 def _times(time_s: npt.ArrayLike) -> FloatArray:

@@ -51,6 +51,9 @@ class Fleet(Protocol):
     def at(self, time_s: Any) -> TrajectoryState:
         """Return their states, shape (times, aircraft)."""
 
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of aircraft (n,), each at a time (n,) of its own."""
+
     def subset(self, columns: IntArray) -> "Fleet":
         """Return the flights of some of them, given by their indices, ascending."""
 
@@ -100,15 +103,21 @@ class TrafficSource(Component):
         self._steered = bool(self.context.producers)
         if self._steered:
             self.own = SteeredFlight(self.own)
-        reach_m = farthest_look(c.request for c in self.context.consumers).range_m
+        look = farthest_look(c.request for c in self.context.consumers)
+        self._flights_asked_for = look.lasts_s > 0.0
         known = self.clock_of(self.p) is None and not self._steered
-        if math.isfinite(reach_m) and known and not self.context.simulate_everything:
-            self._culling = Culling(self.own, self.targets, self.fleet, reach_m)
+        if math.isfinite(look.range_m) and known and not self.context.simulate_everything:
+            end_s = float(self.context.duration_s)
+            self._culling = Culling(
+                self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
+            )
 
     @property
     def width(self) -> int:
-        """Number of targets that are moved at the start."""
-        return len(self.roster) if self._culling is None else len(self._culling.active(0, 0)[0])
+        """Most targets that are moved at one time."""
+        if self._culling is None:
+            return len(self.roster)
+        return self._culling.intervals.most_at_once()
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
@@ -125,7 +134,7 @@ class TrafficSource(Component):
         own = self.own.at(time_s)
         columns, fleet = self._everybody, self.fleet
         if self._culling is not None:
-            columns, fleet = self._culling.active(float(time_s[0]), float(time_s[-1]))
+            columns, fleet = self._culling.active(float(time_s.min()), float(time_s.max()))
         states = fleet.at(time_s)
         return TrafficStates(
             tick=wake.ticks,
@@ -144,7 +153,32 @@ class TrafficSource(Component):
             present=states.present & own.present[:, np.newaxis],
             roster=self.roster,
             columns=columns,
+            flights=self.flights if self._flights_asked_for else None,
         )
+
+    def flights(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the states of the ownship and of some targets, each at a time of its own.
+
+        Parameters
+        ----------
+        columns : (targets,) of int
+        time_s : (rows, targets)
+            With an ``update_rate_hz``, the last publication up to then counts.
+
+        Returns
+        -------
+        own, others : TrajectoryState
+            Arrays (rows, targets).
+        """
+        if self.p.update_rate_hz is not None:
+            rate = float(self.p.update_rate_hz)
+            time_s = np.floor(time_s * rate) / rate
+        others = self.fleet.each(
+            np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        )
+        return self.own.at(time_s), others.reshaped(time_s.shape)
 
     def _steer(self, new: Arrivals) -> None:
         """Turn the ownship at the times at which manoeuvres have come."""
