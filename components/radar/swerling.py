@@ -9,11 +9,12 @@ from pydantic import Field, model_validator
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability
-from components.radar.detection_rung import ExactDetection
+from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.threshold_radar import LinkBudgetRadar
+from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor import Cells, Look
 from dsa_des.types import FloatArray
 
@@ -29,6 +30,10 @@ class SwerlingParameters(LinkBudgetParameters):
         description="Fluctuation inside Pd, or a sampled RCS (per scan for I and III, per pulse "
         "for II and IV) and a steady target's Pd at it; the same share of detections.",
     )
+    model: Literal["auto"] | None = Field(
+        default=None,
+        description="'auto' has `detection` picked by error and cost, and `explain` say why.",
+    )
     detection: Literal["exact", "table", "gram_charlier"] = Field(
         default="exact",
         description="How Pd is computed: exactly, by table (error < 1e-6), or by the thesis's "
@@ -40,6 +45,10 @@ class SwerlingParameters(LinkBudgetParameters):
 
     @model_validator(mode="after")
     def _covered(self) -> Self:
+        if self.model == "auto" and self.detection != "exact":
+            raise ValueError(
+                f"model is 'auto' and detection is {self.detection!r}: leave one of them out"
+            )
         steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
         if self.detection == "gram_charlier" and not steady:
             raise ValueError(
@@ -79,6 +88,28 @@ class SwerlingRadar(LinkBudgetRadar):
         (self._models,) = self.built("RCS") or [steady]
         if self.p.detection == "exact":
             (self._method,) = self.built("method of Pd") or ["table"]
+
+    def left_out(self) -> list[str]:
+        """Say which method of Pd was picked, and why, if the scene asks for that."""
+        said = super().left_out()
+        return said if self.p.model is None else [*said, *picked_method(self, self._method)]
+
+    def range_slack(self) -> float:
+        """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.
+
+        SNR goes with the fourth power of range, and Pd changes by max |dPd / d ln SNR| per unit
+        of ln SNR at most. Nothing is proven where more than that depends on the line of sight.
+        """
+        allowed = self.context.tolerance.get("detection_probability")
+        if allowed is None:
+            return math.inf
+        steepness = self.steepest_pd()
+        others = {"aspect RCS", *(effect.name for effect in WEATHER_EFFECTS)}
+        if steepness is None or others & set(self.context.effects):
+            return 0.0
+        # |4 ln(1 ± e)| is at most 4 e / (1 - e).
+        share = allowed / (4.0 * steepness)
+        return share / (1.0 + share)
 
     def false_alarm_zero_db(self) -> float:
         """Return the SNR that the radar's own model needs for `reference_pd`; steady if none."""
