@@ -170,7 +170,7 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
     -----
     The proof is at the head of the module. Over usual envelopes (10 to 30 km, within 70 degrees
     of latitude) the bounds are 1.0 to 1.7 times the worst direction found by search, and 1.0 to
-    3.3 times the worst range.
+    1.8 times the worst range; up to 5 times where altitudes span 12 km, more beside a pole.
     """
     if earth not in EARTH_MODELS:
         allowed = ", ".join(repr(name) for name in EARTH_MODELS)

@@ -1,6 +1,7 @@
 """A radar that detects with the probability its SNR gives (``radar.swerling``, thesis §4.1.2)."""
 
 import math
+from functools import lru_cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -176,18 +177,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """
         if terrain_of(self) is not None:
             return None
-        log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
-        steepest = 0.0
-        for model in range(5):
-            pd = detection_probability(
-                np.exp(log_snr),
-                pulses=self.p.pulses,
-                false_alarm_probability=self.p.false_alarm_probability,
-                model=f"swerling{model}",
-            )
-            steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
-        # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
-        return 1.01 * steepest
+        return _steepest_pd(self.p.pulses, self.p.false_alarm_probability)
 
     def _detection_models(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
@@ -201,3 +191,20 @@ class SwerlingRadar(LinkBudgetRadar):
                 self.p.reference_pd, f"swerling{model}"
             )
         return self._reference_db[model]
+
+
+@lru_cache(maxsize=16)
+def _steepest_pd(pulses: int, false_alarm_probability: float) -> float:
+    """Return the largest |dPd / d ln SNR| of any fluctuation model."""
+    log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
+    steepest = 0.0
+    for model in range(5):
+        pd = detection_probability(
+            np.exp(log_snr),
+            pulses=pulses,
+            false_alarm_probability=false_alarm_probability,
+            model=f"swerling{model}",
+        )
+        steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
+    # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
+    return 1.01 * steepest

@@ -37,6 +37,7 @@ class Listener(Recorder):
 def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, float]) -> Path:
     """Write a random scene with a 1° radar: any latitude, own manoeuvres, one to five targets."""
     draw = Random(seed)
+    turn = f'legs = [{{ kind = "turn", rate_deg_s = {draw.choice([-3.0, -0.5, 1.0, 2.5])} }}]'
     lat = draw.uniform(-75, 75) if draw.random() < 0.9 else draw.choice([-89.95, 88.0, 85.0, 90.0])
     alt = draw.uniform(200, 9000)
     lines = [
@@ -60,7 +61,7 @@ def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, flo
         f"ownship = {{ lat_deg = {lat}, lon_deg = {draw.uniform(-180, 180)}, alt_m = {alt}, "
         f"heading_deg = {draw.uniform(0, 360)}, speed_mps = {draw.uniform(20, 90)}, "
         f"climb_mps = {draw.choice([0.0, 0.0, draw.uniform(-5, 5)])}"
-        + draw.choice(["", f', legs = [{{ kind = "turn", rate_deg_s = {draw.uniform(-3, 3)} }}]'])
+        + draw.choice(["", f", {turn}"])
         + " }",
     ]
     for number in range(draw.randint(1, 5)):
