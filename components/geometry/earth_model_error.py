@@ -7,9 +7,10 @@ replaced by their extremes over the envelope; M and N grow with |φ|.
 
 **Offsets are small angles.** Both aircraft lie outside the convex body "altitude at most h_min".
 The projection onto a convex body lengthens no distance, and here it keeps latitude; the body's
-meridian has a radius of curvature of ρ = M + h_min at least, so its chord is 2 ρ sin(a/2) at least. With the turn of longitude, R² = D² + 4 r1 r2 sin²(b/2), D the distance with the target
-turned onto the observer's meridian. So x = ρ a and y = r_min b obey x² + y² <= (κ R)², where
-κ = asin(t)/t, t = R/(2 min(ρ, r_min)), takes the sines into angles.
+meridian has a radius of curvature of ρ = M + h_min at least, so its chord is 2 ρ sin(a/2) at least.
+With the turn of longitude, R² = D² + 4 r1 r2 sin²(b/2), D the distance with the target turned onto
+the observer's meridian. So x = ρ a and y = r_min b obey x² + y² <= (κ R)², where κ = asin(t)/t,
+t = R/(2 min(ρ, r_min)), takes the sines into angles.
 
 **Local radii.** The exact offset in the observer's axes is ::
 

@@ -1,8 +1,8 @@
 """How wrong can each model of the line of sight be? Upper bounds that are proven, not measured.
 
 The proof for the models of the Earth is at the head of `earth_model_error`. The attitude's error
-(`attitude_error_rad`) adds to theirs. In body axes a direction that is off by e is off in azimuth by
-asin(sin e / cos q) at most, q the elevation of either direction; if e reaches the zenith
+(`attitude_error_rad`) adds to theirs. In body axes a direction that is off by e is off in azimuth
+by asin(sin e / cos q) at most, q the elevation of either direction; if e reaches the zenith
 (e >= 90° - |q|) nothing can be said. A sensor reads azimuths inside its field of view only.
 """
 
