@@ -84,6 +84,16 @@ class Roster:
     def __len__(self) -> int:
         return len(self.names)
 
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, Roster)
+            and self.names == other.names
+            and self.aircraft == other.aircraft
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.names)
+
     @cached_property
     def keys(self) -> AnyArray:
         """64-bit keys of the targets' random draws, shape (targets,)."""

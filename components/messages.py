@@ -278,8 +278,10 @@ class Tracks(Message):
 
 def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
     """Return the names behind bit masks, joined by ``+``."""
-    masks, codes = np.unique(contributors, return_inverse=True)
+    used = np.bincount(contributors, minlength=1)
+    masks = np.flatnonzero(used)
+    codes = (np.cumsum(used > 0) - 1).take(contributors)
     names = tuple(
         "+".join(name for i, name in enumerate(sensors) if int(mask) >> i & 1) for mask in masks
     )
-    return Text(codes.reshape(-1), names)
+    return Text(codes, names)

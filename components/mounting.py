@@ -87,6 +87,7 @@ class MountedReach(Reach):
 class Mounting(Effect):
     """Boresight and roll of the sensor, and an error of them that nobody knows of."""
 
+    lockstep = True
     name = "mounting"
     acts_on = "axes"
     # Rotating by 0 and back rounds the last bits.

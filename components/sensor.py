@@ -18,7 +18,7 @@ from components.messages import Detections, SensorOffer
 from components.mounting import BodyAxes, Mounting
 from components.navigation import NavigationReport
 from components.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
-from components.resolution import round_to_grid
+from components.resolution import Grid
 from components.sensor_parameters import SensorParameters
 from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.component import Component
@@ -127,6 +127,7 @@ class Sensor(Component):
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
+    lockstep = True
     #: Whether detections carry a range.
     measures_range = False
     effects = SENSOR_EFFECTS
@@ -259,28 +260,42 @@ class Sensor(Component):
             Range is NaN when the sensor measures none.
         """
         azimuth = self._round_azimuth(p_rad)
-        elevation = round_to_grid(
-            q_rad,
-            self.elevation_step_rad,
-            limit_low=self.reach.elevation_rad[0],
-            limit_high=self.reach.elevation_rad[1],
-        )
+        elevation = self._elevation_grid.round(q_rad)
         if not self.measures_range:
             return azimuth, elevation, np.full(len(range_m), np.nan)
-        return azimuth, elevation, round_to_grid(range_m, self.range_step_m, limit_low=0.0)
+        return azimuth, elevation, self._range_grid.round(range_m)
+
+    @cached_property
+    def _elevation_grid(self) -> Grid:
+        low, high = self.reach.elevation_rad
+        return Grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+
+    @cached_property
+    def _range_grid(self) -> Grid:
+        return Grid(self.range_step_m, limit_low=0.0)
+
+    @cached_property
+    def _azimuth_sector(self) -> tuple[float, float]:
+        """The field of view with its upper edge at or above its lower one."""
+        low, high = self.reach.azimuth_rad
+        return low, high + 2.0 * math.pi if high < low else high
+
+    @cached_property
+    def _azimuth_grid(self) -> Grid:
+        low, high = self._azimuth_sector
+        if high - low >= 2.0 * math.pi:
+            return Grid(self.azimuth_step_rad)
+        return Grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
     def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
-        low, high = self.reach.azimuth_rad
-        step = self.azimuth_step_rad
-        if high < low:
-            high += 2.0 * math.pi
+        low, high = self._azimuth_sector
         if high - low >= 2.0 * math.pi:
-            return wrap_pi(round_to_grid(p_rad, step))
+            return wrap_pi(self._azimuth_grid.round(p_rad))
         if low >= -math.pi and high <= math.pi:
-            return round_to_grid(p_rad, step, limit_low=low, limit_high=high)
+            return self._azimuth_grid.round(p_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
         unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
-        return wrap_pi(round_to_grid(unwrapped, step, limit_low=low, limit_high=high))
+        return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
 def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:

@@ -50,6 +50,8 @@ class TrafficStates(Message):
     roster: Roster = static()
     columns: IntArray = static()
 
+    joins_static = frozenset({"columns"})
+
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the rows of all parts, over the targets of any of them."""
@@ -95,6 +97,8 @@ class RelativeTargets(Message):
     roster: Roster = static()
     columns: IntArray = static()
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
+
+    joins_static = frozenset({"columns"})
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

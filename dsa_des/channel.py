@@ -9,6 +9,8 @@ from collections import deque
 import numpy as np
 
 from dsa_des.message import Message
+from dsa_des.replica_time import ReplicaTime
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wire_faults import WireFaults
 
@@ -24,12 +26,21 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
+    replicas : ReplicaTime, optional
+        For replicas in lock step: no row arrives in another replica than its own.
     """
 
-    def __init__(self, source: str, delay_ticks: int = 0, faults: WireFaults | None = None) -> None:
+    def __init__(
+        self,
+        source: str,
+        delay_ticks: int = 0,
+        faults: WireFaults | None = None,
+        replicas: ReplicaTime | None = None,
+    ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
+        self._replicas = replicas
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
 
@@ -55,6 +66,11 @@ class Channel:
             arrivals, message = arrivals[order], message.take(kept[order])
             if len(kept) == 0:
                 return arrivals
+        if self._replicas is not None and self.delay_ticks:
+            in_time = arrivals % self._replicas.span_ticks < self._replicas.end_tick
+            arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
+            if len(arrivals) == 0:
+                return arrivals
         self._waiting.append((arrivals, message))
         return arrivals
 
@@ -62,7 +78,7 @@ class Channel:
         """Return the ticks at which rows arrive before `end` that were not collected yet."""
         ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
         if self._faults is not None and ticks:
-            return np.unique(np.concatenate(ticks))  # late rows overtake and may coincide
+            return sorted_union(ticks)  # late rows overtake and may coincide
         return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     def collect(self, end: int) -> tuple[IntArray, Message] | None:
@@ -106,7 +122,11 @@ class Channel:
         if held is None:
             return None
         arrivals, message = held
-        return message, np.searchsorted(arrivals, ticks, side="right") - 1
+        rows = np.searchsorted(arrivals, ticks, side="right") - 1
+        if self._replicas is not None:
+            span = self._replicas.span_ticks
+            rows[arrivals[rows] // span != ticks // span] = -1
+        return message, rows
 
 
 def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:

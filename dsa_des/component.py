@@ -179,6 +179,9 @@ class Component:
     Parameters: ClassVar[Any] = Parameters
     #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
     windowed: ClassVar[bool] = False
+    #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
+    #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
+    lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
@@ -250,6 +253,12 @@ class Component:
             for effect in type(self).effects
             if effect.acts_on == acts_on and effect.name in self.context.effects
         ]
+
+    def serves_replicas(self) -> bool:
+        """Return whether this block, with the effects built, may serve replicas in lock step."""
+        return type(self).lockstep and all(
+            effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
+        )
 
     def stream(self, purpose: str) -> Stream:
         """Return this block's keyed random numbers for one purpose."""

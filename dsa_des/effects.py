@@ -42,6 +42,9 @@ class Effect:
     acts_on: ClassVar[str]
     #: Whether it can be built when the scene does not call for it, without changing a bit.
     neutral: ClassVar[bool] = True
+    #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
+    #: of different replicas may come in one call.
+    lockstep: ClassVar[bool] = False
 
     def verdict(self, block: "Component") -> Verdict:
         """Say whether the scene calls for this effect in this block."""

@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from dsa_des.message import Columns, Message, Schema, Text
+from dsa_des.message import Columns, Message, Schema, Text, rows_of
+from dsa_des.replica_time import own_scans
 from dsa_des.types import AnyArray, IntArray
 
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
@@ -42,15 +43,22 @@ class Recorder:
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
-        self._names: dict[tuple[str, str], dict[str, int]] = {}
+        self._texts: dict[tuple[str, str], _TextCodes] = {}
         self.rows: dict[str, int] = {}
 
-    def open(self, messages: Iterable[type[Message]], ticks_per_s: int) -> None:
-        """Learn what the run's messages record; called once, before the run."""
+    def open(
+        self, messages: Iterable[type[Message]], ticks_per_s: int, span_ticks: int = 0
+    ) -> None:
+        """Learn what the run's messages record; called once, before the run.
+
+        With replicas in lock step, `span_ticks` apart, every table begins with their number.
+        """
         self._ticks_per_s = ticks_per_s
+        self._span_ticks = span_ticks
+        leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
         for message in messages:
             for table, schema in message.recorded.items():
-                self._schemas.setdefault(table, dict(_LEADING)).update(schema)
+                self._schemas.setdefault(table, dict(leading)).update(schema)
         self._schemas = dict(sorted(self._schemas.items()))
         self._pending = {table: [] for table in self._schemas}
         self.rows = dict.fromkeys(self._schemas, 0)
@@ -75,8 +83,8 @@ class Recorder:
                     ready.append((block, columns))
                     continue
                 if count:
-                    ready.append((block, _rows(columns, slice(0, count))))
-                later.append((block, _rows(columns, slice(count, len(ticks)))))
+                    ready.append((block, rows_of(columns, slice(0, count))))
+                later.append((block, rows_of(columns, slice(count, len(ticks)))))
             self._pending[table] = later
             if ready:
                 self._hand_on(table, ready)
@@ -109,44 +117,67 @@ class Recorder:
         order: IntArray | None,
         ticks: IntArray,
     ) -> AnyArray | Text:
-        if name == "time_s":
-            values: AnyArray = ticks / self._ticks_per_s
+        if name in ("time_s", "tick", "replica"):
+            values = self._time_column(name, ticks)
             return values if order is None else values[order]
         if kind == "text":
-            names = self._names.setdefault((table, name), {})
-            parts = [_codes(name, block, columns, names) for block, columns in pieces]
-            codes = np.concatenate(parts)
-            return Text(codes if order is None else codes[order], tuple(names))
+            text = self._texts.setdefault((table, name), _TextCodes(name))
+            codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
+            return Text(codes if order is None else codes[order], text.names)
         parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        if name == "scan" and self._span_ticks:
+            values = own_scans(values)
         return values if order is None else values[order]
 
+    def _time_column(self, name: str, ticks: IntArray) -> AnyArray:
+        if name == "replica":
+            return ticks // self._span_ticks
+        if self._span_ticks:
+            ticks = ticks % self._span_ticks
+        return ticks if name == "tick" else ticks / self._ticks_per_s
 
-def _codes(name: str, block: str, columns: Columns, names: dict[str, int]) -> AnyArray:
-    count = len(columns["tick"])
-    if name == "block":
-        return np.full(count, names.setdefault(block, len(names)), dtype=np.int32)
-    text = columns.get(name)
-    if text is None:
-        return np.full(count, -1, dtype=np.int32)
-    if not isinstance(text, Text):
-        raise TypeError(f"column {name!r} must be Text")
-    known = [names.setdefault(item, len(names)) for item in text.names]
-    lookup = np.array([*known, -1], dtype=np.int32)  # code -1 (null) takes the last entry
-    return lookup[text.codes]
+
+class _TextCodes:
+    """The names that a text column has held so far, and what its pieces' own codes become."""
+
+    def __init__(self, column: str) -> None:
+        self._column = column
+        self._place: dict[str, int] = {}
+        #: By identity of a tuple of names, which is kept so that the identity stays its own.
+        self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
+        self.names: tuple[str, ...] = ()
+
+    def codes(self, block: str, columns: Columns) -> AnyArray:
+        """Return one piece's codes into our names; -1 is null."""
+        count = len(columns["tick"])
+        if self._column == "block":
+            return np.full(count, self._lookup((block,))[0], dtype=np.int32)
+        text = columns.get(self._column)
+        if text is None:
+            return np.full(count, -1, dtype=np.int32)
+        if not isinstance(text, Text):
+            raise TypeError(f"column {self._column!r} must be Text")
+        return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
+
+    def _lookup(self, names: tuple[str, ...]) -> AnyArray:
+        known = self._lookups.get(id(names))
+        if known is not None and known[0] is names:
+            return known[1]
+        places = [self._place.setdefault(name, len(self._place)) for name in names]
+        lookup = np.array([*places, -1], dtype=np.int32)
+        if len(self._lookups) > 1000:  # tuples made anew for every message
+            self._lookups.clear()
+        self._lookups[id(names)] = names, lookup
+        if len(self._place) > len(self.names):
+            self.names = tuple(self._place)
+        return lookup
 
 
 def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
         return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
     return np.asarray(values, dtype=np.dtype(kind))
-
-
-def _rows(columns: Columns, rows: slice) -> Columns:
-    return {
-        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
-        for name, values in columns.items()
-    }
 
 
 class MemorySink:

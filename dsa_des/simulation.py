@@ -29,11 +29,12 @@ from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
+from dsa_des.replica_time import ReplicaTime
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
-CELLS_PER_WINDOW = 32768
+CELLS_PER_WINDOW = 131072
 
 
 @dataclass
@@ -121,24 +122,35 @@ class Simulation:
         self._window = window
         self._cuts = sorted(cuts)
         self._depth = depths(scene.graph)
+        self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
         self._offer_down_the_chain()
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
-        connect(scene, self.nodes)
+        connect(scene, self.nodes, self.replicas)
         self._window_ticks = self._window_length(window)
+
+    #: When replicas share this run (`dsa_des.lockstep`): how they lie on its timeline.
+    replicas: ReplicaTime | None = None
+
+    @property
+    def span_ticks(self) -> int:
+        """Ticks from one replica's start to the next; 0 for a single run."""
+        return 0 if self.replicas is None else self.replicas.span_ticks
 
     # -- building ------------------------------------------------------------------------------
 
+    def _make_streams(self) -> Streams:
+        return Streams(self.scene.seed)
+
     def _build_components(self, simulate_everything: bool) -> dict[str, Component]:
-        streams = Streams(self.scene.seed)
         components: dict[str, Component] = {}
         problems: list[Problem] = []
         for name, block in self.scene.blocks.items():
             context = Context(
-                streams,
+                self.streams,
                 self.ticks_per_s,
                 sections=self.scene.sections,
                 simulate_everything=simulate_everything,
@@ -236,14 +248,17 @@ class Simulation:
             )
             by_name = base + number / (len(self.components) + 1)
             node = Node(self, component, name in windowed, _priority(base, by_name, shuffle))
-            spec = component.clock_of(component.p)
-            if spec is not None:
-                draw = component.context.streams.scan_normals(name, "clock jitter")
-                node.clock = ScanClock(spec, self.ticks_per_s, draw)
+            node.clock = self._clock(name, component)
             node.processor = processors.get(self.scene.blocks[name].options.processor or "")
-            node.on_demand = component.clocked == "demand" and spec is None
+            node.on_demand = component.clocked == "demand" and node.clock is None
             nodes[name] = node
         return nodes
+
+    def _clock(self, name: str, component: Component) -> ScanClock | None:
+        spec = component.clock_of(component.p)
+        if spec is None:
+            return None
+        return ScanClock(spec, self.ticks_per_s, self.streams.scan_normals(name, "clock jitter"))
 
     def _build_processors(self) -> dict[str, Processor]:
         """Start the shared processors of the scene."""
@@ -302,7 +317,7 @@ class Simulation:
             messages: list[type[Message]] = [output.message for output in outputs]
             if self.scene.processors:
                 messages.append(Processing)
-            self.recorder.open(messages, self.ticks_per_s)
+            self.recorder.open(messages, self.ticks_per_s, self.span_ticks)
         for node in self.nodes.values():
             node.start()
         for window in self._windows(end):

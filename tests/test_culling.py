@@ -61,7 +61,7 @@ def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
 def test_whoever_comes_in_reach_is_active(seed: int) -> None:
     targets = flights(60, seed)
     fleet = ScriptedFleet(targets)
-    culling = Culling(OWN, targets, fleet, ScriptedFleet, 15_000.0)
+    culling = Culling(OWN, targets, fleet, 15_000.0)
     left_out = 0
     for start in np.arange(0, 300, 7.3):
         times = np.linspace(start, start + 13.0, 60)

@@ -11,6 +11,7 @@ from components.messages import Detections, FusedDetections, SensorOffer
 from components.true_entries import true_entries
 from dsa_des.component import Component, NonNegativeRational, Parameters
 from dsa_des.ports import Input, Output
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -38,6 +39,7 @@ class PickBest(Component):
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     Parameters = PickBestParameters
     windowed = True
+    lockstep = True
 
     def setup(self) -> None:
         """Rank the sensors."""
@@ -61,6 +63,10 @@ class PickBest(Component):
         self._gate_ticks = int(self.p.coincidence_s * self.context.ticks_per_s)
         self._recent: dict[str, Arrivals] = {}
 
+    def serves_replicas(self) -> bool:
+        """Say no to a gate that would reach from one replica into the one before."""
+        return super().serves_replicas() and self.p.coincidence_s <= self.context.duration_s
+
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""
         reported = {new.source: new for new in wake.arrivals("detections")}
@@ -73,7 +79,7 @@ class PickBest(Component):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = np.unique(np.concatenate(keys))
+        union = sorted_union(keys)
         row, target = np.divmod(union, width)
         if self._gate_ticks:
             arrivals = self._with_recent(arrivals)

@@ -58,6 +58,7 @@ class Transform(Component):
     outputs = {"targets": Output(RelativeTargets, "Targets as seen from the ownship.")}
     Parameters = TransformParameters
     windowed = True
+    lockstep = True
     effects = (NavigationErrors(),)
     #: The type's own model of the Earth.
     earth: ClassVar[str]

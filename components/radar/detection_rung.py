@@ -15,6 +15,7 @@ GRAM_CHARLIER_ERROR = {1: 0.025, 2: 0.010, 5: 0.003, 10: 0.001, 100: 5e-5}
 class ExactDetection(Effect):
     """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
 
+    lockstep = True
     name = "exact Pd"
     acts_on = "method of Pd"
     neutral = False

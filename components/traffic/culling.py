@@ -6,7 +6,7 @@ is beyond every sensor's range, no sensor can look at the target during the inte
 even be moved.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,10 +30,8 @@ class Culling:
     Parameters
     ----------
     own, targets : objects with `at(time_s)` and `max_speed_mps`
-    fleet : object with `at(time_s)`
+    fleet : object with `at(time_s)` and `subset(columns)`
         All targets.
-    subset : callable
-        Makes a fleet of some targets.
     reach_m : float
         Farthest range at which any sensor looks.
     """
@@ -43,11 +41,9 @@ class Culling:
         own: Any,
         targets: Sequence[Any],
         fleet: Any,
-        subset: Callable[[Sequence[Any]], Any],
         reach_m: float,
     ) -> None:
-        self._own, self._targets, self._fleet = own, targets, fleet
-        self._subset = subset
+        self._own, self._fleet = own, fleet
         self.reach_m = reach_m
         speeds = np.array([target.max_speed_mps for target in targets]) + own.max_speed_mps
         half = EPOCH_S / 2.0
@@ -73,9 +69,7 @@ class Culling:
             columns = self._columns(*epochs)
             same = self._last is not None and np.array_equal(columns, self._last[2])
             fleet = (
-                self._last[3]
-                if same and self._last is not None
-                else self._subset([self._targets[i] for i in columns.tolist()])
+                self._last[3] if same and self._last is not None else self._fleet.subset(columns)
             )
             self._last = (*epochs, columns, fleet)
         return self._last[2], self._last[3]

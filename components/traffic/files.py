@@ -52,6 +52,7 @@ class RecordedTraffic(TrafficSource):
     Time 0 is the file's earliest sample.
     """
 
+    lockstep = True
     Parameters = FileParameters
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:

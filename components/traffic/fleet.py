@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,8 @@ from components.traffic.trajectory import (
     evaluate_segments,
     locate,
 )
+
+IntArray = npt.NDArray[np.int64]
 
 CELLS_AT_ONCE = 16_384
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
@@ -44,6 +47,24 @@ class ScriptedFleet:
             if kind in kinds
         ]
         self._single = [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")]
+
+    def subset(self, columns: IntArray) -> ScriptedFleet:
+        """Return the fleet of some aircraft, without preparing them anew.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (n,)
+            Indices into the aircraft, ascending.
+        """
+        fleet = copy(self)
+        chosen = columns.tolist()
+        fleet.trajectories = [self.trajectories[i] for i in chosen]
+        fleet.names = [trajectory.name for trajectory in fleet.trajectories]
+        parts = [group.subset(columns) for group in self._groups]
+        fleet._groups = [part for part in parts if part is not None]
+        single = set(self._single)
+        fleet._single = [place for place, i in enumerate(chosen) if i in single]
+        return fleet
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.
@@ -80,8 +101,9 @@ class _Group:
     ) -> None:
         chosen = [trajectories[i] for i in members]
         self._formula = formula
+        self._members = np.array(members)
         everyone = len(members) == len(trajectories)
-        self._columns: slice | list[int] = slice(None) if everyone else members
+        self._columns: slice | IntArray = slice(None) if everyone else self._members
         self._table = np.stack([t.segments[0].parameters for t in chosen], axis=-1)[:, np.newaxis]
         self._start = np.array([t.start_time_s for t in chosen])
         self._end = np.array([t.end_time_s for t in chosen])
@@ -94,6 +116,22 @@ class _Group:
             ]
         ).T
         self._yaw_is_fixed = np.array([t.fixed_attitude_rad[0] is not None for t in chosen])
+
+    def subset(self, columns: IntArray) -> _Group | None:
+        """Return the group of those of its members that are among some aircraft."""
+        place = np.searchsorted(columns, self._members)
+        place[place == len(columns)] = 0
+        kept = np.flatnonzero(columns[place] == self._members) if len(columns) else place[:0]
+        if len(kept) == 0:
+            return None
+        group = copy(self)
+        group._members = place[kept]
+        group._columns = slice(None) if len(kept) == len(columns) else group._members
+        group._table = np.ascontiguousarray(self._table[..., kept])
+        group._start, group._end = self._start[kept], self._end[kept]
+        group._until, group._yaw_is_fixed = self._until[kept], self._yaw_is_fixed[kept]
+        group._attitude = np.ascontiguousarray(self._attitude[:, kept])
+        return group
 
     def fill(self, state: TrajectoryState, times: FloatArray) -> None:
         """Write the group's columns of the state."""
@@ -142,6 +180,10 @@ class SampledFleet:
             if self.trajectories
             else np.zeros((25, 0))
         )
+
+    def subset(self, columns: IntArray) -> SampledFleet:
+        """Return the fleet of some aircraft, given by their indices, ascending."""
+        return SampledFleet([self.trajectories[i] for i in columns.tolist()])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.

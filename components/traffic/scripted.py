@@ -130,13 +130,14 @@ class ScriptedTraffic(TrafficSource):
     """Ownship and intruders on flights written in the scene: legs, turns, climbs, waypoints."""
 
     Parameters = ScriptedParameters
+    lockstep = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         own = parameters.ownship
         reference = (own.lat_deg, own.lon_deg, own.alt_m)
         self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **_flight(own)
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
         )
         names = [intruder.name for intruder in parameters.intruders]
         for twice in sorted({name for name in names if names.count(name) > 1}):
@@ -153,7 +154,8 @@ class ScriptedTraffic(TrafficSource):
         return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
 
 
-def _flight(flight: Flight) -> dict[str, Any]:
+def flight_arguments(flight: Flight) -> dict[str, Any]:
+    """Return what a scene says of a flight as arguments of `ScriptedTrajectory`."""
     return {
         "alt_m": flight.alt_m,
         "heading_deg": flight.heading_deg,
@@ -175,7 +177,7 @@ def _leg(leg: Any) -> Any:
 
 
 def _intruder(craft: Intruder, reference: tuple[float, float, float]) -> ScriptedTrajectory:
-    values = _flight(craft) | {
+    values = flight_arguments(craft) | {
         "start_time_s": craft.start_time_s,
         "end_time_s": craft.end_time_s,
     }

@@ -22,7 +22,7 @@ from dsa_des.component import Component, Parameters, PositiveRational
 from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
 from dsa_des.ports import Output
-from dsa_des.types import FloatArray
+from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Wake
 
 
@@ -50,6 +50,9 @@ class Fleet(Protocol):
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return their states, shape (times, aircraft)."""
+
+    def subset(self, columns: IntArray) -> "Fleet":
+        """Return the flights of some of them, given by their indices, ascending."""
 
 
 class TrafficSource(Component):
@@ -93,8 +96,7 @@ class TrafficSource(Component):
         reach_m = farthest_look(c.request for c in self.context.consumers).range_m
         on_demand = self.clock_of(self.p) is None
         if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
-            subset = type(self.fleet)
-            self._culling = Culling(self.own, self.targets, self.fleet, subset, reach_m)
+            self._culling = Culling(self.own, self.targets, self.fleet, reach_m)
 
     @property
     def width(self) -> int:
