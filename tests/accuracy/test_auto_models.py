@@ -11,6 +11,8 @@ from click.testing import CliRunner
 from components.geometry.rung_planning import Rung
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
+from dsa_des.lockstep import LockStep
+from dsa_des.recording import MemorySink, Recorder
 from dsa_des.scene import load_scene
 from dsa_des.simulation import Simulation
 
@@ -181,3 +183,26 @@ def test_the_command_explains(configs: Path) -> None:
     result = CliRunner().invoke(main, [*arguments, "--set", "accuracy.angle_deg=1"])
     assert result.exit_code == 0
     assert "geometry: flat earth" in result.stdout
+
+
+def test_replicas_in_lock_step_pick_the_same_models_as_separate_runs(tmp_path: Path) -> None:
+    """Their radars differ, so each replica has its own, planned with the same tolerance."""
+    allowed = {"angle_deg": 1.0, "range_m": 200.0, "detection_probability": 0.02}
+    path = write_scene(tmp_path, 11, "", allowed)
+    scenes = [
+        load_scene(path, seed=seed, sets=[f"blocks.radar.reference_pd={0.8 + 0.01 * seed}"])
+        for seed in (1, 2)
+    ]
+    together = MemorySink()
+    simulation = LockStep(scenes, recorder=Recorder([together]))
+    simulation.run()
+    assert simulation.components["transform"].rung.earth == "flat_earth"
+    rows = together.tables()["detections"].to_pylist()
+    for number, scene in enumerate(scenes):
+        alone = MemorySink()
+        Simulation(scene, recorder=Recorder([alone])).run()
+        expected = alone.tables()["detections"].to_pylist()
+        assert expected
+        assert [row for row in rows if row["replica"] == number] == [
+            {"replica": number, **row} for row in expected
+        ]
