@@ -6,7 +6,7 @@ engine's business.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -151,7 +151,19 @@ class Sensor(Component):
 
     def request(self, port: str) -> Any:
         """Ask whoever feeds us for the targets in our reach."""
-        return self._reach_from_body
+        slack, because = self.range_slack(), self.exact_because()
+        return replace(self._reach_from_body, range_slack=slack, exact_because=because)
+
+    def range_slack(self) -> float:
+        """Return the largest relative error of range that leaves results within ``[accuracy]``.
+
+        Infinite where nothing that ``[accuracy]`` bounds depends on the range.
+        """
+        return math.inf
+
+    def exact_because(self) -> str:
+        """Say why only an exact line of sight will do, or nothing."""
+        return ""
 
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""

@@ -150,6 +150,8 @@ class Context:
         when `Component.setup` is called.
     simulate_everything : bool
         Whether a block must not leave out work that cannot change a result.
+    tolerance : mapping
+        What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
     """
 
     streams: Streams
@@ -160,6 +162,7 @@ class Context:
     sections: Mapping[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
     simulate_everything: bool = False
+    tolerance: Mapping[str, float] = field(default_factory=dict)
 
 
 class Component:
@@ -244,7 +247,7 @@ class Component:
         return {}
 
     def left_out(self) -> list[str]:
-        """Say, after `setup`, what work this block spares itself and why no result can notice."""
+        """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []
 
     def built(self, acts_on: str) -> list[Any]:

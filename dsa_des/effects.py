@@ -108,6 +108,16 @@ def plan(
     return planned
 
 
+def unspent(planned: Sequence[Planned], tolerance: Mapping[str, float]) -> dict[str, float]:
+    """Return what is left of a tolerance after the bounds of all that it let go."""
+    left = dict(tolerance)
+    for item in planned:
+        if item.verdict.simulated and not item.built:
+            for quantity, bound in item.verdict.bound.items():
+                left[quantity] -= bound
+    return left
+
+
 def _within(
     verdicts: Sequence[tuple[Effect, Verdict]], tolerance: Mapping[str, float]
 ) -> dict[str, str]:

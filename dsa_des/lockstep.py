@@ -10,7 +10,7 @@ from typing import Any
 
 from dsa_des.clock import ScanClock
 from dsa_des.component import ClockedParameters, Component, Context, Parameters
-from dsa_des.effects import plan
+from dsa_des.effects import plan, unspent
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_clock import ReplicaClock
@@ -105,6 +105,7 @@ class LockStep(Simulation):
             )  # fmt: skip
             component = block.cls(name, scene.blocks[name].parameters, context)
             planned = plan(component, scene.tolerance)
+            context.tolerance = unspent(planned, scene.tolerance)
             context.effects = {i.effect.name: i.effect.build(component) for i in planned if i.built}
             component.setup()
             self._check_same_word(face, component)

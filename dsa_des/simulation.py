@@ -20,7 +20,7 @@ import simpy
 from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.connections import connect
-from dsa_des.effects import Planned, plan
+from dsa_des.effects import Planned, plan, unspent
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order
 from dsa_des.message import Message
@@ -211,6 +211,8 @@ class Simulation:
                 problems.append(self._problem(f"blocks.{name}", error))
                 continue
             planned += found
+            if not everything:
+                component.context.tolerance = unspent(found, self.scene.tolerance)
             component.context.effects = {
                 item.effect.name: effect if wrap is None else wrap(item, effect)
                 for item, effect in built.items()

@@ -15,6 +15,7 @@ from pydantic import Field
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
+from components.geometry.rung_planning import Rung, pick_rung
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
 from components.target_messages import Flights, RelativeTargets, Revisit, TrafficStates
@@ -24,19 +25,35 @@ from dsa_des.ports import Input, Output
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.wake import Wake
 
+LINES_OF_SIGHT: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
+    "flat_earth": flat_earth.line_of_sight,
+    "local_radii": local_radii.line_of_sight,
+    "geodesic": geodesic.line_of_sight,
+    "ellipsoid": ellipsoid.line_of_sight,
+}
+
 
 class TransformParameters(Parameters):
     """Parameters of a coordinate transform."""
 
-    attitude: Literal["exact", "small_angle"] = Field(
+    model: Literal["auto", "flat_earth", "local_radii", "geodesic", "ellipsoid"] | None = Field(
+        default=None,
+        description="Model of the Earth, by default that of the block's type; 'auto' picks the "
+        "cheapest whose proven error [accuracy] allows.",
+    )
+    attitude: Literal["exact", "small_angle", "auto"] = Field(
         default="exact",
         description="How body angles follow from the ownship's attitude: rotation of the line of "
-        "sight, or angle by angle as in thesis eq. 4-5.",
+        "sight, or angle by angle as in thesis eq. 4-5; 'auto' as for the model.",
     )
 
 
 class Transform(Component):
-    """Turns geodetic positions into lines of sight; subclasses choose the model of the Earth."""
+    """Turns geodetic positions into lines of sight; subclasses choose the model of the Earth.
+
+    Where ``[accuracy]`` allows an error of angle and range, cheaper models take the place of the
+    exact ones, so long as the proven bounds of their errors together stay within it (`rung`).
+    """
 
     inputs = {"states": Input(TrafficStates, "trigger", "Where all aircraft are.")}
     outputs = {"targets": Output(RelativeTargets, "Targets as seen from the ownship.")}
@@ -45,17 +62,35 @@ class Transform(Component):
     lockstep = True
     rewindable = True
     effects = (NavigationErrors(),)
-    line_of_sight: ClassVar[Callable[..., tuple[Any, Any, Any]]]
+    #: The type's own model of the Earth.
+    earth: ClassVar[str]
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.rung: Rung | None = None
 
     def setup(self) -> None:
-        """Take what the ownship believes of itself."""
+        """Take what the ownship believes of itself, and the models to compute with."""
         self._beliefs: list[Callable[[TrafficStates], dict[str, FloatArray]]] = self.built(
             "ownship"
         )
+        self.rung = pick_rung(self)
+        self._line_of_sight = LINES_OF_SIGHT[self.rung.earth]
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that somebody downstream may look at."""
         return farthest_look(consumer.request for consumer in self.context.consumers)
+
+    def left_out(self) -> list[str]:
+        """Say which models were picked, and why."""
+        return [] if self.rung is None else list(self.rung.sentences)
+
+    def report(self) -> dict[str, Any]:
+        """Return the models in use, where ``[accuracy]`` had a say in it."""
+        if self.rung is None or self.rung.bound is None:
+            return {}
+        models = {"earth": self.rung.earth, "attitude": self.rung.attitude}
+        return {"models": {self.name: models}}
 
     def offer(self, port: str) -> Any:
         """Pass on what we were offered."""
@@ -82,12 +117,13 @@ class Transform(Component):
 
     def _as_seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         """Return the fields of `RelativeTargets` that are per row and target."""
-        azimuth, elevation, range_m = type(self).line_of_sight(
+        assert self.rung is not None
+        azimuth, elevation, range_m = self._line_of_sight(
             own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
             validate=False,
         )  # fmt: skip
         p, q = sensor_angles(
-            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad, model=self.p.attitude
+            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad, model=self.rung.attitude
         )
         return {
             "azimuth_rad": azimuth,
@@ -123,22 +159,22 @@ class Transform(Component):
 class FlatEarth(Transform):
     """Line of sight over a flat Earth with 111,195 m per degree (thesis eq. 1-5, corrected)."""
 
-    line_of_sight = staticmethod(flat_earth.line_of_sight)
+    earth = "flat_earth"
 
 
 class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
-    line_of_sight = staticmethod(local_radii.line_of_sight)
+    earth = "local_radii"
 
 
 class Geodesic(Transform):
     """Bearing and distance along the geodesic (GeographicLib), elevation from the heights."""
 
-    line_of_sight = staticmethod(geodesic.line_of_sight)
+    earth = "geodesic"
 
 
 class Ellipsoid(Transform):
     """Exact line of sight on the WGS-84 ellipsoid."""
 
-    line_of_sight = staticmethod(ellipsoid.line_of_sight)
+    earth = "ellipsoid"

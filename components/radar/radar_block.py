@@ -1,12 +1,13 @@
 """What every radar block has in common: it measures range, and effects act on its echoes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from components.radar.beam_effects import BeamSweep, Sweep
-from components.reach import FarthestLook, farthest_look
+from components.reach import farthest_look
 from components.sensor import Cells, Sensor
 from components.target_messages import RelativeTargets
 from dsa_des.types import FloatArray, IntArray
@@ -36,7 +37,7 @@ class Radar(Sensor):
         reach = super().request(port)
         if self._sweep is None:
             return reach
-        return FarthestLook(farthest_look([reach]).range_m, self._sweep.period_s)
+        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
 
     def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
         """Return the targets at the instants at which the beam lights them."""

@@ -10,10 +10,12 @@ from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
+from components.known_targets import KnownTraffic
 from components.reach import farthest_look
 from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
+from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.state import TrajectoryState
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain
@@ -89,9 +91,13 @@ class TrafficSource(Component):
         rate = parameters.update_rate_hz
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
-    def offer(self, port: str) -> Roster:
-        """Say what the targets are."""
-        return self.roster
+    def offer(self, port: str) -> KnownTraffic:
+        """Say what the targets are, and where they can be."""
+        return KnownTraffic(self.roster, None if self.context.producers else self._envelope)
+
+    def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
+        duration_s = float(self.context.duration_s) + lasts_s
+        return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
 
     def setup(self) -> None:
         """Learn how far anybody looks; what stays beyond it is not moved."""
