@@ -107,7 +107,7 @@ class Cells:
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
-        return stream.uniform(self.roster.keys[self.target], self.scan, draw)
+        return stream.uniform(self.roster.keys_of(self.target), self.scan, draw)
 
 
 #: Effects that every sensor has, after its own.

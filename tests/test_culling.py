@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
@@ -214,3 +215,12 @@ def test_culling_changes_nothing_but_the_counts(
         again, _ = run(window=window)
         for name in ("detections", "fused", "tracks"):
             assert planned[name].equals(again[name]), (name, window)
+
+
+def test_keys_of_draws_are_made_for_those_who_are_drawn_for() -> None:
+    roster = Roster.of([(f"t{i}", Aircraft()) for i in range(50)])
+    some = np.array([7, 3, 7, 49])
+    keys = roster.keys_of(some)
+    assert "keys" not in vars(roster)
+    np.testing.assert_array_equal(roster.keys_of(np.array([3, 4])), roster.keys[[3, 4]])
+    np.testing.assert_array_equal(keys, roster.keys[some])

@@ -135,7 +135,7 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.fluctuation == "probability" or self._models is steady:
             return super().snr(cells)
         rcs = self._mean_rcs_m2(cells)
-        keys = cells.roster.keys[cells.target]
+        keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
             target, scan = keys[chosen], cells.scan[chosen]
 
