@@ -92,9 +92,7 @@ def _separation(source: Any, target: Any, grid: FloatArray) -> Separation:
     )
 
 
-def first_inside(
-    separation: Separation, horizontal_m: float, vertical_m: float
-) -> float:
+def first_inside(separation: Separation, horizontal_m: float, vertical_m: float) -> float:
     """Return when a target first is within both distances (exclusive), s; NaN if it never is."""
     inside: BoolArray = (separation.horizontal_m < horizontal_m) & (
         separation.vertical_m < vertical_m

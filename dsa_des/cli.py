@@ -120,6 +120,9 @@ _workers_option = click.option(
 
 @main.command()
 @click.argument("words", nargs=-1, metavar="STUDY.toml | show FOLDER")
+@click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Change one value of the study file."
+)
 @_workers_option
 @click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
 @click.option("--executor", type=click.Choice(["local", "dask"]), default="local")

@@ -91,9 +91,7 @@ def run_replicas(
 def _run(scene: Scene, replica: Replica, wanted: Wanted) -> Recorded | Failed:
     try:
         sink = ColumnSink()
-        simulation = Simulation(
-            scene_of(scene, replica), recorder=Recorder([sink], wanted=wanted)
-        )
+        simulation = Simulation(scene_of(scene, replica), recorder=Recorder([sink], wanted=wanted))
         outcome = simulation.run()
     except (SceneError, BlockFailure) as error:
         return Failed(str(error))
@@ -161,7 +159,9 @@ def key_path(key: str) -> tuple[str | int, ...]:
 
 
 def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
-    return Problem(str(scene.path), key, message, str(value) if isinstance(value, Fraction) else value)
+    return Problem(
+        str(scene.path), key, message, str(value) if isinstance(value, Fraction) else value
+    )
 
 
 def _changed_block(block: Block, path: tuple[str | int, ...], value: Any) -> Block:

@@ -10,7 +10,7 @@ from dsa_des.component import Parameters
 from dsa_des.message import Columns, Text
 from dsa_des.scene import Scene
 from dsa_des.studies.metric import recorded_by
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 
 FUSED = "fused"
 
@@ -100,15 +100,13 @@ def nearest_first(columns: dict[str, Any]) -> IntArray:
                        columns["replica"]))  # fmt: skip
 
 
-def with_trials(name: str, successes: FloatArray, trials: FloatArray) -> dict[str, FloatArray]:
+def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
     """Return a share and its trials; NaN where there was no trial."""
     from dsa_des.studies.metric import TRIALS
 
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)
     return {name: share, name + TRIALS: trials.astype(float)}
-
-
 
 
 def name_ranks(column: Any) -> IntArray:

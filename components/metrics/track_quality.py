@@ -32,7 +32,7 @@ class _Lines:
 
 
 def _sums(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
-    return np.bincount(replica, weights=values, minlength=count)
+    return np.bincount(replica, weights=values, minlength=count).astype(float)
 
 
 def _means(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
@@ -42,7 +42,7 @@ def _means(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
 
 
 def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) -> FloatArray:
-    """Return each replica's empirical quantile (the smallest value that `share` lie at or below)."""
+    """Return each replica's quantile: the smallest value that `share` lie at or below."""
     order = np.lexsort((values, replica))
     many = np.bincount(replica, minlength=count)
     start = np.cumsum(many) - many
@@ -178,9 +178,7 @@ class TrackUpdates(Metric):
         broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)
         span = _sums(lines.of_gap, lines.gap_s, count)
         with np.errstate(invalid="ignore", divide="ignore"):
-            continuity = np.where(
-                span > 0, 1.0 - _sums(lines.of_gap, broken, count) / span, np.nan
-            )
+            continuity = np.where(span > 0, 1.0 - _sums(lines.of_gap, broken, count) / span, np.nan)
         breaks = _sums(lines.of_gap, (broken > 0.0).astype(float), count)
         has = np.bincount(lines.replica, minlength=count) > 0
         return {

@@ -1,19 +1,19 @@
 """``dsa-des study``: run a study, continue it, or show what it came to."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from dsa_des.errors import UsageError
+from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.run_folder import new_folder_name
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.folder import STUDY_TOML, StudyFolder, description
 from dsa_des.studies.output import Tables, show
-from dsa_des.studies.runner import Clock, Stopped, run_study
+from dsa_des.studies.runner import Clock, Stopped, results_of, run_study
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
 
@@ -22,6 +22,7 @@ _HOME = Path("studies")
 
 def study_command(
     words: tuple[str, ...],
+    sets: tuple[str, ...],
     workers: int | None,
     resume: bool,
     executor: str,
@@ -36,7 +37,7 @@ def study_command(
     elif len(words) == 2 and words[0] == "show":
         show_study(Path(words[1]))
     elif len(words) == 1 and words[0] != "show":
-        study = read_study(words[0])
+        study = read_study(words[0], sets=sets)
         folder = run_into(study, _target(study, out, resume), workers, resume, executor, scheduler)
         finish(study, folder, quiet=quiet)
     else:
@@ -80,19 +81,24 @@ def run_into(
     return folder
 
 
-def finish(study: Study, folder: StudyFolder, *, quiet: bool = False, draw: bool = True) -> Tables:
-    """Write the tables of a finished study, draw its figures and print them."""
+def finish(
+    study: Study, folder: StudyFolder, *, quiet: bool = False, only: Sequence[str] = ()
+) -> Tables:
+    """Write the tables of a finished study, draw its figures and print them.
+
+    `only` names the results to print; by default those that the study draws.
+    """
     tables = Tables(study, folder)
     try:
         tables.write()
-        figures = tables.draw() if draw else []
+        figures = tables.draw()
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror}") from error
     if not quiet:
         from rich.console import Console
 
         console = Console() if sys.stdout.isatty() else Console(width=160)
-        show(console, tables)
+        show(console, tables, only)
         for path in figures:
             click.echo(f"wrote {path}")
         click.echo(f'\npandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
@@ -103,16 +109,33 @@ def _count(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
-def show_study(path: Path) -> None:
-    """Print the tables of a study's folder and draw its figures again."""
-    folder = StudyFolder(path)
-    about = folder.about()
-    study = read_study(about["study"])
-    from dsa_des.studies.folder import description
+def read_study_of(folder: StudyFolder) -> Study:
+    """Return the study that a folder was made of.
 
+    Raises
+    ------
+    UsageError
+        If the folder is no study, or its scene has changed since.
+    """
+    about = folder.about()
+    study = read_study(folder.path / STUDY_TOML)
     if description(study)["study_sha256"] != about["study_sha256"]:
-        raise UsageError(f"{about['study']} has changed since {path} was made of it")
-    finish(study, folder)
+        raise UsageError(
+            f"{folder.path}: the scene {about['scene']} or dsa_des has changed since the study was "
+            "run; run it again"
+        )
+    return study
+
+
+def show_study(path: Path, only: Sequence[str] = ()) -> None:
+    """Print all tables of a study's folder, or those of some results; draw its figures again."""
+    folder = StudyFolder(path)
+    study = read_study_of(folder)
+    every = [result.name for result in results_of(study)]
+    for name in only:
+        if name not in every:
+            raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")
+    finish(study, folder, only=only or every)
 
 
 @contextmanager
