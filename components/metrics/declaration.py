@@ -8,12 +8,11 @@ from pydantic import Field, model_validator
 
 from components.metrics.rows import (
     SensorParameters,
-    chosen,
-    first_of,
+    first_rows,
     is_named,
-    nearest_first,
     of_target,
     sensors_of,
+    taken,
 )
 from dsa_des.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
@@ -97,31 +96,39 @@ def declarations(
 ) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:
     """Return sensor (or "any") → time (s) and true range (m) of the first declaration, and the
     time (s) of the first detection, per replica."""
+    key = ("declarations", parameters.m, parameters.n, parameters.target, tuple(sensors))
+    return group.once(key, lambda: _declarations(group, parameters, sensors))
+
+
+def _declarations(
+    group: Group, parameters: DeclarationParameters, sensors: list[str]
+) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:
     columns: Any = group.tables["detections"]
     known = of_target(columns, parameters.target)
     count = len(group)
     found: dict[str, tuple[FloatArray, FloatArray, FloatArray]] = {}
     for name in sensors:
-        rows = chosen(columns, known & is_named(columns["block"], name))
-        order = nearest_first(rows)
-        rows = {k: (v.codes if k in ("block", "target") else v)[order] for k, v in rows.items()}
-        declared = rows["declared"].astype(bool)
-        if parameters.m is not None and parameters.n is not None:
+        rows = np.flatnonzero(known & is_named(columns["block"], name))
+        if parameters.m is None or parameters.n is None:
+            declared = columns["declared"][rows].astype(bool)
+        else:
             declared = _m_of_n(
-                rows["replica"], rows["target"], rows["scan"], parameters.m, parameters.n
+                columns["replica"][rows],
+                columns["target"].codes[rows],
+                columns["scan"][rows],
+                parameters.m,
+                parameters.n,
             )
-        time_s, range_m = first_of(
-            rows["replica"][declared],
-            count,
-            rows["time_s"][declared],
-            rows["true_range_m"][declared],
+        first = first_rows(columns, rows[declared], count)
+        found[name] = (
+            taken(columns, "time_s", first),
+            taken(columns, "true_range_m", first),
+            taken(columns, "time_s", first_rows(columns, rows, count)),
         )
-        (first_s,) = first_of(rows["replica"], count, rows["time_s"])
-        found[name] = (time_s, range_m, first_s)
     each = list(found.values())
-    times = np.array([part[0] for part in each]).reshape(len(each), count)
-    ranges = np.array([part[1] for part in each]).reshape(len(each), count)
-    firsts = np.array([part[2] for part in each]).reshape(len(each), count)
+    times, ranges, firsts = (
+        np.array([part[k] for part in each]).reshape(len(each), count) for k in range(3)
+    )
     which = np.argmin(np.where(np.isnan(times), np.inf, times), axis=0)[np.newaxis]
     found[ANY] = (
         np.take_along_axis(times, which, axis=0)[0],

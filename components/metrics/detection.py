@@ -9,12 +9,11 @@ import numpy as np
 from components.metrics.rows import (
     FUSED,
     SensorParameters,
-    chosen,
-    first_of,
+    first_rows,
     is_named,
-    nearest_first,
     of_target,
     sensors_of,
+    taken,
     with_trials,
 )
 from dsa_des.scene import Scene
@@ -69,11 +68,8 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
     rows = of_target(columns, target)
     if name != FUSED:
         rows &= is_named(columns["block"], name)
-    found = chosen(columns, rows)
-    order = nearest_first(found)
-    return first_of(
-        found["replica"][order], len(group), found["time_s"][order], found["true_range_m"][order]
-    )
+    first = first_rows(columns, np.flatnonzero(rows), len(group))
+    return [taken(columns, "time_s", first), taken(columns, "true_range_m", first)]
 
 
 class DetectionShare(Metric):

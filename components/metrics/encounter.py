@@ -47,10 +47,13 @@ class _Encounter(Metric):
 
         Flights are computed once for all replicas that share them.
         """
-        known: dict[str, tuple[float, ...]] = {}
+        known: dict[tuple[Any, ...], tuple[float, ...]] = {}
         values = np.empty((width, len(group)))
-        for number, scene in enumerate(group.scenes):
-            key = repr(traffic_block(scene).parameters)
+        mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
+        moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
+        scenes = group.scenes if moved else [group.scene] * len(group)
+        for number, scene in enumerate(scenes):
+            key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
             if key not in known:
                 found = separations(scene, self.p.step_s)
                 wanted = [s for s in found if self.p.target in (None, s.name)]

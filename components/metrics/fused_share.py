@@ -62,12 +62,13 @@ class FusedShare(Metric):
         detections: Any = group.tables["detections"]
         fused: Any = group.tables[FUSED]
         rows = of_target(fused, self.p.target) & is_named(fused["block"], self.fusion)
-        fused = chosen(fused, rows)
+        fused = chosen(fused, rows, "target", "sensors", "time_s")
         found: dict[str, FloatArray] = {}
         for a, b in self.pairs:
             seen = is_named(detections["block"], a) & of_target(detections, self.p.target)
-            own = chosen(detections, seen)
-            pair = chosen(fused, _holds(fused["sensors"], a) & _holds(fused["sensors"], b))
+            own = chosen(detections, seen, "target", "time_s")
+            both = _holds(fused["sensors"], a) & _holds(fused["sensors"], b)
+            pair = chosen(fused, both, "target", "time_s")
             used = _latest(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))

@@ -65,39 +65,51 @@ def of_target(columns: Columns, target: str | None) -> BoolArray:
     return np.asarray(column.codes >= 0)
 
 
-def chosen(columns: Columns, rows: BoolArray) -> dict[str, Any]:
-    """Return the chosen rows of every column."""
-    return {
-        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
-        for name, values in columns.items()
-    }
-
-
-def first_of(replica: IntArray, count: int, *values: FloatArray) -> list[FloatArray]:
-    """Return each replica's first row of some values, NaN where it has none.
-
-    Parameters
-    ----------
-    replica : (rows,)
-        Ascending; rows of a replica are in order of time.
-    count : int
-        Number of replicas.
-    values : (rows,)
-    """
-    numbers, place = np.unique(replica, return_index=True)
-    found = []
-    for column in values:
-        full = np.full(count, np.nan)
-        full[numbers] = column[place]
-        found.append(full)
+def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
+    """Return the chosen rows of ``replica`` and the named columns."""
+    place = np.flatnonzero(rows)
+    found: dict[str, Any] = {}
+    for name in ("replica", *names):
+        values: Any = columns[name]
+        text = isinstance(values, Text)
+        found[name] = Text(values.codes[place], values.names) if text else values[place]
     return found
 
 
-def nearest_first(columns: dict[str, Any]) -> IntArray:
-    """Return the order of rows by replica, instant and true range (unknown ranges last)."""
-    ranges = columns["true_range_m"]
-    return np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), columns["tick"],
-                       columns["replica"]))  # fmt: skip
+def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
+    """Return the row of each replica's first report, -1 where it has none.
+
+    Of several rows of one instant the one with the smallest true range counts.
+
+    Parameters
+    ----------
+    columns : mapping
+        With ``replica``, ``tick`` and ``true_range_m``, in recorded order.
+    rows : (n,)
+        The rows to look at, ascending.
+    count : int
+        Number of replicas.
+    """
+    table: Any = columns
+    replica = table["replica"][rows]
+    starts = np.flatnonzero(np.diff(replica, prepend=-1))
+    first_tick = np.full(count, -1, dtype=np.int64)
+    first_tick[replica[starts]] = table["tick"][rows[starts]]
+    rows = rows[table["tick"][rows] == first_tick[replica]]
+    ranges = table["true_range_m"][rows]
+    order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
+    numbers, place = np.unique(table["replica"][rows][order], return_index=True)
+    found = np.full(count, -1, dtype=np.int64)
+    found[numbers] = rows[order][place]
+    return found
+
+
+def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
+    """Return a column at some rows, NaN where the row is -1."""
+    values: Any = columns[name]
+    found = np.full(len(rows), np.nan)
+    found[rows >= 0] = values[rows[rows >= 0]]
+    return found
 
 
 def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:

@@ -17,8 +17,8 @@ from dsa_des.types import BoolArray, FloatArray, IntArray
 class _Lines:
     """Rows of one table, sorted by replica, target and time; *gaps* lie between two of a line."""
 
-    def __init__(self, columns: Any, rows: BoolArray) -> None:
-        self.rows = chosen(columns, rows)
+    def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
+        self.rows = chosen(columns, rows, "target", "time_s", *names)
         target = name_ranks(self.rows["target"])
         self.order = np.lexsort((self.rows["time_s"], target, self.rows["replica"]))
         self.replica: IntArray = self.rows["replica"][self.order]
@@ -83,7 +83,7 @@ class AgeOfInformation(Metric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return mean and percentile of every replica."""
         columns = group.tables[FUSED]
-        lines = _Lines(columns, of_target(columns, self.p.target))
+        lines = _Lines(columns, of_target(columns, self.p.target), "sensors")
         delays = self._delays(lines.rows["sensors"])[lines.order]
         # What arrives now may be older than what is held: the newest origin counts.
         origin = _running_max(lines.time_s - delays, lines)
@@ -210,7 +210,7 @@ class PositionError(Metric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return both errors of every replica."""
         columns: Any = group.tables[FUSED]
-        rows = chosen(columns, of_target(columns, self.p.target))
+        rows = chosen(columns, of_target(columns, self.p.target), *self.tables[FUSED][1:])
         seen = _direction(rows["azimuth_rad"], rows["elevation_rad"])
         true = _direction(rows["true_azimuth_rad"], rows["true_elevation_rad"])
         chord = np.sqrt(sum((s - t) ** 2 for s, t in zip(seen, true, strict=True)))
