@@ -17,7 +17,7 @@ from dsa_des.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.output import Tables, short
+from dsa_des.studies.output import Tables, short, times
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
@@ -80,7 +80,7 @@ def _compare_swap(
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
     by_place = dict(tables.rows.each_place())
-    metrics = _shown(tables, results)
+    metrics = tables.telling(results)
     for at, rows in by_place.items():
         base = (*at[:place], chosen[0][1][0], *at[place + 1 :])
         if at[place] == chosen[0][1][0] or base not in by_place:
@@ -142,7 +142,7 @@ def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
     for name in only:
         if name not in names:
             raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, names)}")
-    return list(only) or [line.result.name for line in tables.shown_lines()]
+    return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
 class _Units:
@@ -216,7 +216,7 @@ def _compare(
         if at not in theirs:
             continue
         sides = _Units(one, rows), _Units(other, theirs[at])
-        for metric in dict.fromkeys(metrics):
+        for metric in metrics:
             first, second = sides[0].values(metric), sides[1].values(metric)
             keys = [key for key in first if key in second]
             pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
@@ -224,7 +224,7 @@ def _compare(
             table.add_row(
                 *map(short, at), metric, short(d.paired.value),
                 f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),
-                f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", f"{d.narrower:.1f} times",
+                f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", times(d.narrower),
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
             _farthest_apart(metric, sides, names, (one.study, other.study))

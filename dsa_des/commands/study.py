@@ -11,11 +11,11 @@ import click
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.run_folder import new_folder_name
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import STUDY_TOML, StudyFolder, description
+from dsa_des.studies.folder import StudyFolder, description
 from dsa_des.studies.output import Tables, show
 from dsa_des.studies.runner import Clock, Stopped, results_of, run_study
 from dsa_des.studies.study import Study
-from dsa_des.studies.study_file import read_study
+from dsa_des.studies.study_file import read_study, study_again
 
 _HOME = Path("studies")
 
@@ -91,7 +91,7 @@ def finish(
     tables = Tables(study, folder)
     try:
         tables.write()
-        figures = tables.draw()
+        figures = tables.draw(only)
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror}") from error
     if not quiet:
@@ -118,7 +118,7 @@ def read_study_of(folder: StudyFolder) -> Study:
         If the folder is no study, or its scene has changed since.
     """
     about = folder.about()
-    study = read_study(folder.path / STUDY_TOML)
+    study = study_again(Path(about["study"]), about["tables"])
     if description(study)["study_sha256"] != about["study_sha256"]:
         raise UsageError(
             f"{folder.path}: the scene {about['scene']} or dsa_des has changed since the study was "
