@@ -17,7 +17,8 @@ from dsa_des.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.output import Tables, short, times
+from dsa_des.studies.output import Tables
+from dsa_des.studies.printing import short, times
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene

@@ -12,7 +12,8 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.run_folder import new_folder_name
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import StudyFolder, description
-from dsa_des.studies.output import Tables, show
+from dsa_des.studies.output import Tables
+from dsa_des.studies.printing import show
 from dsa_des.studies.runner import Clock, Stopped, results_of, run_study
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study, study_again

@@ -79,7 +79,9 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
     if isinstance(spec, list):
         values = spec
     elif not isinstance(spec, dict):
-        raise ValueError("must be a list of values, or a table such as {from = 1, to = 5, step = 1}")
+        raise ValueError(
+            "must be a list of values, or a table such as {from = 1, to = 5, step = 1}"
+        )
     else:
         for name in spec:
             if name not in _SPEC_KEYS:

@@ -193,5 +193,3 @@ def description(study: Study) -> dict[str, Any]:
         "version": __version__,
         "tables": study.tables,
     }
-
-

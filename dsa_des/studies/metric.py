@@ -224,5 +224,3 @@ def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
         for table, columns in metric.tables.items():
             wanted.setdefault(table, {"tick"}).update(columns)
     return {table: tuple(sorted(columns)) for table, columns in sorted(wanted.items())}
-
-

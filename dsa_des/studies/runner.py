@@ -123,5 +123,3 @@ class Clock:
         if progress.failed:
             words.append(f"{progress.failed} failed")
         return ", ".join(words)
-
-

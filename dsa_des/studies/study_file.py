@@ -1,6 +1,6 @@
-"""From a study file to a study that can be run, with every problem reported before anything runs."""
+"""From a study file to a study that can be run, every problem reported before anything runs."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -8,17 +8,17 @@ from pydantic import ValidationError
 
 from dsa_des.component import SourcedText
 from dsa_des.entry_points import registered
-from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
+from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.overrides import apply_set
 from dsa_des.parameter_errors import explain
-from dsa_des.replicas import scene_of
 from dsa_des.scene import Scene
 from dsa_des.scene_file import Key, SceneFile, read_scene_file
-from dsa_des.simulation import Simulation
 from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
-from dsa_des.studies.metric import METRICS, TRIALS, Metric, Result, find_metric
+from dsa_des.studies.metric import METRICS, find_metric
 from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
+from dsa_des.studies.study_checks import check_cells
+from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
@@ -134,10 +134,10 @@ class _Reader:
             figures=self.figures(axes),
             runs_per_chunk=self.whole("runs_per_chunk", max(1, min(256, -(-runs // 32))), low=1),
             base=base,
-            tables=_resolved(self.data, swaps),
+            tables=resolved(self.data, swaps),
         )
         self.stop_if_wrong()
-        self.check_cells(study)
+        check_cells(study, self.file)
         return study
 
     def stop_if_wrong(self) -> None:
@@ -168,7 +168,7 @@ class _Reader:
         return value
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        flat = _flat_values(self.table("set"))
+        flat = flat_values(self.table("set"))
         return tuple(flat.items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
@@ -205,7 +205,7 @@ class _Reader:
 
     def draws(self, base: SceneFile) -> tuple[Draw, ...]:
         found = []
-        for key, spec in _flat_draws(self.table("draws")).items():
+        for key, spec in flat_draws(self.table("draws")).items():
             try:
                 found.append(parse_draw(key, spec))
             except ValueError as error:
@@ -277,16 +277,6 @@ class _Reader:
             found.append(MetricSpec(name, keys))
         return tuple(found)
 
-    def build_metrics(self, study: Study, scene: Scene, where: str = "") -> list[Metric]:
-        """Return the study's metrics for a scene; what the scene lacks is a problem."""
-        built: list[Metric] = []
-        for number, spec in enumerate(study.metrics):
-            try:
-                built.append(spec.build(scene))
-            except ValueError as error:
-                self.add(("metrics", number), f"{error}{where}", spec.name)
-        return built
-
     def stop_when(self, replicas: int) -> StopWhen | None:
         table = self.data.get("stop_when")
         if table is None:
@@ -332,121 +322,3 @@ class _Reader:
                 self.add(key, "needs a metric: the name of a result")
             found.append(figure)
         return tuple(found)
-
-    # -- everything together ---------------------------------------------------------------
-
-    def check_cells(self, study: Study) -> None:
-        """Check every value of every axis, the draws, and one run up to its first event."""
-        scenes: list[Scene] = []
-        seen: set[str] = set()
-        for cell in _one_per_value(study):
-            try:
-                scenes.append(study.scene(cell))
-            except SceneError as error:
-                for problem in error.problems:
-                    if str(problem) not in seen:
-                        seen.add(str(problem))
-                        self.problems.append(problem)
-        self.stop_if_wrong()
-        first = scenes[0]
-        try:
-            Simulation(scene_of(first, study.replica(0)))
-        except SceneError as error:
-            self.problems += error.problems
-        except BlockFailure as error:
-            self.add((), str(error))
-        results: dict[str, Result] = {}
-        for scene in _different(scenes):
-            where = "" if scene is first else f" (with {_types(scene, first)})"
-            for metric in self.build_metrics(study, scene, where):
-                if scene is first:
-                    for result in metric.results():
-                        if result.name in results:
-                            message = f"two metrics give the result {result.name}"
-                            self.add(("metrics",), message)
-                        results[result.name] = result
-            if self.problems:
-                break
-        self.stop_if_wrong()
-        names = [name for name in results if not name.endswith(TRIALS)]
-        if study.stop_when and study.stop_when.metric not in names:
-            message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
-            self.add(("stop_when", "metric"), message, study.stop_when.metric)
-        for number, figure in enumerate(study.figures):
-            if figure["kind"] != "run" and figure["metric"] not in names:
-                message = "no metric of the study gives it"
-                message += did_you_mean(str(figure["metric"]), names)
-                self.add(("figures", number, "metric"), message, str(figure["metric"]))
-        self.stop_if_wrong()
-
-
-def _resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) -> dict[str, Any]:
-    """Return a study's tables with absolute paths, and further swap axes."""
-    tables: dict[str, Any] = _absolute(data)
-    for block, types in swaps:
-        tables.setdefault("axes", {})[f"swap.{block}"] = types
-    return tables
-
-
-def _absolute(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _absolute(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_absolute(item) for item in value]
-    if isinstance(value, SourcedText) and hasattr(value, "folder"):
-        path = value.folder / Path(value).expanduser()
-        if any(sign in value for sign in "*?[") or path.is_file():
-            return str(path.resolve())
-    return value
-
-
-def _one_per_value(study: Study) -> list[int]:
-    """Return cells that together hold every value of every axis; the first cell comes first."""
-    wanted = [(0,) * len(study.axes)]
-    for place, axis in enumerate(study.axes):
-        for index in range(1, len(axis.labels)):
-            wanted.append(tuple(index if k == place else 0 for k in range(len(study.axes))))
-    numbers = {cell: number for number, cell in enumerate(study.cells)}
-    return [numbers[cell] for cell in wanted]
-
-
-def _different(scenes: list[Scene]) -> list[Scene]:
-    """Return one scene for every set of block types."""
-    found: dict[tuple[Any, ...], Scene] = {}
-    for scene in scenes:
-        found.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
-    return list(found.values())
-
-
-def _types(scene: Scene, other: Scene) -> str:
-    return ", ".join(
-        f"{name} = {block.type_name}"
-        for name, block in scene.blocks.items()
-        if block.cls is not other.blocks[name].cls
-    )
-
-
-def _flat_values(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return dotted key → value; tables on the way are keys of the scene."""
-    found: dict[str, Any] = {}
-    for name, value in tables.items():
-        key = f"{prefix}.{name}" if prefix else str(name)
-        if isinstance(value, dict):
-            found |= _flat_values(value, key)
-        else:
-            found[key] = value
-    return found
-
-
-def _flat_draws(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    from dsa_des.studies.draws import KINDS
-
-    found: dict[str, Any] = {}
-    for name, value in tables.items():
-        key = f"{prefix}.{name}" if prefix else str(name)
-        if isinstance(value, dict) and value and not set(value) & set(KINDS):
-            nested = any(isinstance(item, dict) for item in value.values())
-            found |= _flat_draws(value, key) if nested else {key: value}
-        else:
-            found[key] = value
-    return found

@@ -58,8 +58,8 @@ def fused(time_s: float, sensors: str, target: str = "one") -> dict[str, Any]:
 RUNS: list[dict[str, Any]] = [
     {
         "detections": table(
-            [look(0.0, 0, 1.0, None), look(0.2, 1, 900), look(0.4, 2, 880), look(0.4, 2, 500, "two"),
-             look(1.2, 6, 800), look(1.4, 7, 780), look(1.5, 3, 770, block="ir")]
+            [look(0.0, 0, 1.0, None), look(0.2, 1, 900), look(0.4, 2, 880),
+             look(0.4, 2, 500, "two"), look(1.2, 6, 800), look(1.4, 7, 780), look(1.5, 3, 770, block="ir")]
         ),
         "fused": table([fused(0.2, "radar"), fused(0.4, "radar"), fused(1.4, "radar+ir")]),
     },
@@ -80,7 +80,8 @@ def test_first_detection(small: Path) -> None:
 
 @pytest.mark.parametrize(
     ("m", "n", "time_s"),
-    [(1, 1, 0.2), (2, 2, 0.4), (2, 5, 0.4), (3, 5, np.nan), (3, 6, 1.2), (4, 7, 1.4), (4, 6, np.nan)],
+    [(1, 1, 0.2), (2, 2, 0.4), (2, 5, 0.4), (3, 5, np.nan), (3, 6, 1.2), (4, 7, 1.4),
+     (4, 6, np.nan)],
 )  # fmt: skip
 def test_declaration_after_m_of_n(small: Path, m: int, n: int, time_s: float) -> None:
     found = measured("declaration", RUNS, m=m, n=n, target="one", sensors=["radar"])
@@ -156,7 +157,7 @@ def test_encounter_head_on(small: Path) -> None:
 
 
 def test_distances_of_f3442_are_exclusive() -> None:
-    assert WELL_CLEAR_M == pytest.approx((609.6, 76.2)) and NMAC_M == pytest.approx((152.4, 30.48))
+    assert pytest.approx((609.6, 76.2)) == WELL_CLEAR_M and pytest.approx((152.4, 30.48)) == NMAC_M
     flight = Separation("x", np.arange(3.0), np.full(3, 700.0), np.array([609.6, 609.5, 0.0]),
                         np.array([0.0, 76.2, 76.1]))  # fmt: skip
     assert first_inside(flight, *WELL_CLEAR_M) == 2.0

@@ -88,7 +88,11 @@ def test_a_killed_worker_changes_nothing(small: Path) -> None:
 
 def test_runs_that_kill_their_worker_are_recorded_as_failed(small: Path) -> None:
     text = Path("study.toml").read_text().replace("replicas = 24", "replicas = 6")
-    text = text.replace("runs_per_chunk = 8", "runs_per_chunk = 6").replace("[1, 5]", "[5]").replace("seed = 3", "seed = 1")
+    text = (
+        text.replace("runs_per_chunk = 8", "runs_per_chunk = 6")
+        .replace("[1, 5]", "[5]")
+        .replace("seed = 3", "seed = 1")
+    )
     extra = '"blocks.ir.flaw" = { choice = ["die", "none"] }\n"blocks.traffic'
     Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
     study = read_study("study.toml")
