@@ -59,7 +59,8 @@ RUNS: list[dict[str, Any]] = [
     {
         "detections": table(
             [look(0.0, 0, 1.0, None), look(0.2, 1, 900), look(0.4, 2, 880),
-             look(0.4, 2, 500, "two"), look(1.2, 6, 800), look(1.4, 7, 780), look(1.5, 3, 770, block="ir")]
+             look(0.4, 2, 500, "two"),
+             look(1.2, 6, 800), look(1.4, 7, 780), look(1.5, 3, 770, block="ir")]
         ),
         "fused": table([fused(0.2, "radar"), fused(0.4, "radar"), fused(1.4, "radar+ir")]),
     },
