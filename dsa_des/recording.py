@@ -5,7 +5,7 @@ before they reach a sink, so a run in look-ahead windows and one that goes scan 
 the same rows in the same order.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -36,10 +36,15 @@ class Recorder:
     Parameters
     ----------
     sinks : iterable of Sink
+    wanted : mapping, optional
+        Table name → columns to record; everything by default. What is not wanted costs nothing.
     """
 
-    def __init__(self, sinks: Iterable[Sink]) -> None:
+    def __init__(
+        self, sinks: Iterable[Sink], *, wanted: Mapping[str, Collection[str]] | None = None
+    ) -> None:
         self.sinks = list(sinks)
+        self._wanted = wanted
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
@@ -59,6 +64,16 @@ class Recorder:
         for message in messages:
             for table, schema in message.recorded.items():
                 self._schemas.setdefault(table, dict(leading)).update(schema)
+        if self._wanted is not None:
+            self._schemas = {
+                table: {
+                    name: kind
+                    for name, kind in schema.items()
+                    if name == "replica" or name in self._wanted[table]
+                }
+                for table, schema in self._schemas.items()
+                if table in self._wanted
+            }
         self._schemas = dict(sorted(self._schemas.items()))
         self._pending = {table: [] for table in self._schemas}
         self.rows = dict.fromkeys(self._schemas, 0)
@@ -67,8 +82,10 @@ class Recorder:
 
     def record(self, block: str, message: Message) -> None:
         """Note a message that `block` has sent."""
+        if self._wanted is not None and self._pending.keys().isdisjoint(message.recorded):
+            return
         for table, columns in message.tables().items():
-            if len(columns["tick"]):
+            if table in self._pending and len(columns["tick"]):
                 self._pending[table].append((block, columns))
 
     def mark(self) -> dict[str, int]:
@@ -187,6 +204,46 @@ def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
         return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
     return np.asarray(values, dtype=np.dtype(kind))
+
+
+class ColumnSink:
+    """Keeps all rows in memory, as they come; `tables` joins them."""
+
+    def __init__(self) -> None:
+        self._schemas: Mapping[str, Schema] = {}
+        self._parts: dict[str, list[Columns]] = {}
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+        self._schemas = schemas
+        self._parts = {table: [] for table in schemas}
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Keep rows of one table."""
+        self._parts[table].append(columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def tables(self) -> dict[str, Columns]:
+        """Return table name → column name → values."""
+        return {table: self._joined(table, parts) for table, parts in self._parts.items()}
+
+    def _joined(self, table: str, parts: list[Columns]) -> Columns:
+        if len(parts) == 1:
+            return parts[0]
+        joined: Columns = {}
+        for name, kind in self._schemas[table].items():
+            pieces: list[Any] = [part[name] for part in parts]
+            if kind == "text":  # later pieces know at least the names of earlier ones
+                codes = [piece.codes for piece in pieces]
+                names = pieces[-1].names if pieces else ()
+                empty = np.empty(0, dtype=np.int32)
+                joined[name] = Text(np.concatenate(codes) if codes else empty, names)
+            else:
+                empty = np.empty(0, dtype=np.dtype(kind))
+                joined[name] = np.concatenate(pieces) if pieces else empty
+        return joined
 
 
 class MemorySink:
