@@ -6,14 +6,17 @@ The scene is validated once; a replica validates again only what it changes.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from dsa_des.block_options import BlockOptions, with_latencies
 from dsa_des.clock import parse_rational
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.message import Columns
+from dsa_des.lockstep import LockStep, NotInLockStep
+from dsa_des.message import Columns, rows_of
 from dsa_des.parameter_errors import explain
 from dsa_des.recording import ColumnSink, Recorder
 from dsa_des.scene import Block, Scene
@@ -71,7 +74,7 @@ class Failed:
 def run_replicas(
     scene: Scene, replicas: Sequence[Replica], *, wanted: Wanted = None
 ) -> list[Recorded | Failed]:
-    """Run replicas of a scene; a failing one does not stop the others.
+    """Run replicas of a scene, in lock step where they can; a failing one stops no other.
 
     Parameters
     ----------
@@ -85,13 +88,55 @@ def run_replicas(
     list of Recorded or Failed
         In the order of `replicas`; each is identical to a run of its own.
     """
-    return [_run(scene, replica, wanted) for replica in replicas]
+    found: list[Recorded | Failed | None] = []
+    scenes: list[Scene] = []
+    for replica in replicas:
+        try:
+            scenes.append(scene_of(scene, replica))
+            found.append(None)
+        except SceneError as error:
+            found.append(Failed(str(error)))
+    together: Sequence[Recorded | Failed] | None = _together(scenes, wanted)
+    ran = iter(together or [_run(one, wanted) for one in scenes])
+    return [next(ran) if one is None else one for one in found]
 
 
-def _run(scene: Scene, replica: Replica, wanted: Wanted) -> Recorded | Failed:
+def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
+    """Run scenes in lock step; None where they cannot, or where one of them fails."""
+    if len(scenes) < 2:
+        return None
+    sink = ColumnSink()
+    try:
+        simulation = LockStep(scenes, recorder=Recorder([sink], wanted=wanted))
+        outcome = simulation.run()
+    except (NotInLockStep, SceneError, BlockFailure):
+        return None
+    parts = _by_replica(sink.tables(), len(scenes))
+    return [
+        Recorded(tables, simulation.ticks_per_s, outcome.duration_s, partial(_report, one))
+        for tables, one in zip(parts, scenes, strict=True)
+    ]
+
+
+def _by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Columns]]:
+    """Part the rows of a common recording, which are in order of the replica."""
+    parts: list[dict[str, Columns]] = [{} for _ in range(count)]
+    for table, columns in tables.items():
+        starts = np.searchsorted(columns["replica"], np.arange(count + 1)).tolist()  # type: ignore[arg-type]
+        own = {name: values for name, values in columns.items() if name != "replica"}
+        for number, part in enumerate(parts):
+            part[table] = rows_of(own, slice(starts[number], starts[number + 1]))
+    return parts
+
+
+def _report(scene: Scene) -> dict[str, Any]:
+    return Simulation(scene).run().report
+
+
+def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
     try:
         sink = ColumnSink()
-        simulation = Simulation(scene_of(scene, replica), recorder=Recorder([sink], wanted=wanted))
+        simulation = Simulation(scene, recorder=Recorder([sink], wanted=wanted))
         outcome = simulation.run()
     except (SceneError, BlockFailure) as error:
         return Failed(str(error))
