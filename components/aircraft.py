@@ -63,6 +63,13 @@ class Aircraft(Parameters):
     )
 
 
+def _alike(one: Aircraft, other: Aircraft) -> bool:
+    """Return whether two aircraft are the same to every sensor, wherever they fly."""
+    return one is other or all(
+        getattr(one, name) == getattr(other, name) for name in Aircraft.model_fields
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Roster:
     """The targets of a run: their names, their draw keys and what sensors need of them.
@@ -88,7 +95,7 @@ class Roster:
         return self is other or (
             isinstance(other, Roster)
             and self.names == other.names
-            and self.aircraft == other.aircraft
+            and all(map(_alike, self.aircraft, other.aircraft))
         )
 
     def __hash__(self) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 from dsa_des.clock import ScanClock
 from dsa_des.component import ClockedParameters, Component, Context, Parameters
 from dsa_des.effects import plan, unspent
+from dsa_des.errors import BlockFailure
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_clock import ReplicaClock
@@ -47,6 +48,8 @@ class LockStep(Simulation):
     SceneError
         If a block cannot be set up.
     """
+
+    pinpoints = False
 
     def __init__(
         self,
@@ -165,7 +168,12 @@ class LockStep(Simulation):
 
     def run(self, progress: Callable[[float], None] | None = None) -> Any:
         """Run all replicas; see `Simulation.run`."""
-        outcome = super().run(progress)
+        try:
+            outcome = super().run(progress)
+        except BlockFailure as failure:
+            if isinstance(failure.__cause__, NotInLockStep):
+                raise failure.__cause__ from None
+            raise
         for component in self.components.values():
             if isinstance(component, SplitBlock):
                 component.close()

@@ -138,6 +138,8 @@ class Simulation:
         connect(scene, self.nodes, self.replicas)
         self._window_ticks = self._window_length(window)
 
+    #: Whether a failure inside a window is traced to its instant by running the scene again.
+    pinpoints = True
     #: When replicas share this run (`dsa_des.lockstep`): how they lie on its timeline.
     replicas: ReplicaTime | None = None
 
@@ -410,7 +412,7 @@ class Simulation:
             if self._failure is None:
                 raise
             failure, cause = self._failure
-            if len(self.failed_at) > 1 and not self._cuts:
+            if self.pinpoints and len(self.failed_at) > 1 and not self._cuts:
                 exact = pinpoint(self.scene, self._window, self.failed_at)
                 if exact is not None:
                     raise exact from exact.__cause__

@@ -55,6 +55,7 @@ CASES = (
         "sparse", "10,000 intruders, 97 % never in reach, 180 s", 100.0, every=30,
         quick=("duration_s=60",),
     ),
+    Case("manoeuvres", "100 intruders, the ownship turns away every 60 s, 1800 s", 5.0, every=6),
     Case(
         "monte_carlo", "1000 replicas of 120 s, 1 intruder, 5, 20 and 2 Hz", 10.0, every=1,
         replicas=1000, quick_replicas=100,
@@ -79,9 +80,10 @@ def chosen(names: Sequence[str]) -> list[Case]:
     return [known[name] for name in names] if names else list(CASES)
 
 
-def scene_of(case: Case, *, quick: bool) -> Scene:
-    """Load a case's scene."""
-    return load_scene(SCENES / f"{case.name}.toml", sets=case.quick if quick else ())
+def scene_of(case: Case, *, quick: bool, duration_s: str | None = None) -> Scene:
+    """Load a case's scene, perhaps shortened."""
+    sets = case.quick if quick else ()
+    return load_scene(SCENES / f"{case.name}.toml", sets=sets, duration_s=duration_s)
 
 
 def replicas_of(scene: Scene, count: int) -> list[Scene]:

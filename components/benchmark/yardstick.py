@@ -27,6 +27,9 @@ from components.benchmark.scalar_motion import (
 from components.radar.threshold import detection_threshold
 from dsa_des.simulation import Simulation
 
+#: Latitude, longitude, altitude and yaw, and pitch and roll.
+OwnState = tuple[Position, tuple[float, float]]
+
 
 @dataclass
 class Sensor:
@@ -66,8 +69,7 @@ class Prepared:
     """Everything the loop starts from: flights, sensors, random draws, and who scans when."""
 
     seconds_per_tick: float
-    own: Callable[[float], Position]
-    own_pitch_roll: tuple[float, float]
+    own: Callable[[float], OwnState]
     flights: list[Callable[[float], Position]]
     pitch_roll: list[tuple[float, float]]
     calendar: dict[int, list[tuple[Sensor, int]]]
@@ -76,7 +78,7 @@ class Prepared:
 def prepare(simulation: Simulation) -> Prepared:
     """Read a scene that is ready to run; only its data are used."""
     traffic: Any = simulation.components["traffic"]
-    own, targets = traffic.own.segments[0], [target.segments[0] for target in traffic.targets]
+    targets = [target.segments[0] for target in traffic.targets]
     calendar: dict[int, list[tuple[Sensor, int]]] = {}
     for sensor in _sensors(simulation):
         for tick, scan in sensor.scans:
@@ -87,12 +89,25 @@ def prepare(simulation: Simulation) -> Prepared:
             sensor.draws = [stream.uniform(key, numbers).tolist() for key in traffic.roster.keys]
     return Prepared(
         1.0 / simulation.ticks_per_s,
-        straight_flight(own.parameters.tolist()),
-        (own.pitch_rad, own.roll_rad),
+        _own_flight(traffic.own, sorted(calendar), simulation.ticks_per_s),
         [straight_flight(target.parameters.tolist()) for target in targets],
         [(target.pitch_rad, target.roll_rad) for target in targets],
         dict(sorted(calendar.items())),
     )
+
+
+def _own_flight(own: Any, ticks: list[int], ticks_per_s: int) -> Callable[[float], OwnState]:
+    """Return the ownship's flight; one that was steered is looked up, as it was flown."""
+    if len(getattr(own, "segments", ())) == 1:
+        flight, segment = straight_flight(own.segments[0].parameters.tolist()), own.segments[0]
+        return lambda time_s: (flight(time_s), (segment.pitch_rad, segment.roll_rad))
+    seconds = [tick * (1.0 / ticks_per_s) for tick in ticks]
+    state = own.at(np.array(ticks) / ticks_per_s)
+    columns = (state.lat_deg, state.lon_deg, state.alt_m, state.yaw_rad)
+    places = zip(*(column.tolist() for column in columns), strict=True)
+    tilts = zip(state.pitch_rad.tolist(), state.roll_rad.tolist(), strict=True)
+    flown = dict(zip(seconds, zip(places, tilts, strict=True), strict=True))
+    return lambda time_s: flown[time_s]
 
 
 def _sensors(simulation: Simulation) -> list[Sensor]:
@@ -155,8 +170,8 @@ def run(scene: Prepared, every: int = 1) -> Result:
     for tick in list(scene.calendar)[::every]:
         looking = scene.calendar[tick]
         time_s = tick * seconds
-        own = scene.own(time_s)
-        axes = level_body_axes(own[3], *scene.own_pitch_roll)
+        own, tilt = scene.own(time_s)
+        axes = level_body_axes(own[3], *tilt)
         for target, flight in enumerate(flights):
             position = flight(time_s)
             north, east, up = line_of_sight(own, position)

@@ -1,0 +1,39 @@
+"""The yardstick is the same physics: it finds the engine's detections, fused targets and angles."""
+
+import pytest
+
+from components.benchmark import yardstick
+from components.benchmark.cases import CASES, replicas_of, scene_of
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.simulation import Simulation
+
+SHORT = {
+    "thesis": "300", "clocks": "60", "hundred": "60", "ten_thousand": "2", "sparse": "2",
+    "monte_carlo": "60", "manoeuvres": "90",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_yardstick_finds_the_same(case):
+    scene = scene_of(case, quick=False, duration_s=SHORT[case.name])
+    if case.replicas:
+        scene = replicas_of(scene, 2)[1]
+    sink = MemorySink()
+    simulation = Simulation(scene, recorder=Recorder([sink]))
+    simulation.run()
+    tables = sink.tables()
+    plain = yardstick.run(yardstick.prepare(simulation))
+    rows = tables["detections"].to_pydict()
+    place = {name: i for i, name in enumerate(simulation.components["traffic"].roster.names)}
+    found = {
+        (block, scan, place[target]): (azimuth, elevation)
+        for block, scan, target, azimuth, elevation in zip(
+            *(rows[k] for k in ("block", "scan", "target", "azimuth_rad", "elevation_rad")),
+            strict=True,
+        )
+    }
+    assert found
+    assert found.keys() == plain.detections.keys()
+    for key, (azimuth, elevation) in found.items():
+        assert plain.detections[key][:2] == pytest.approx((azimuth, elevation), abs=1e-9)
+    assert plain.fused == tables["fused"].num_rows

@@ -1,0 +1,58 @@
+"""A flight that is told to turn: where it goes, and that what was flown stays flown."""
+
+import math
+
+import numpy as np
+import pytest
+
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.steered_flight import SteeredFlight
+
+STRAIGHT = ScriptedTrajectory(
+    "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=90.0, speed_mps=60.0
+)
+
+
+def test_before_the_manoeuvre_nothing_changes():
+    times = np.linspace(0.0, 30.0, 61)
+    turned = SteeredFlight(STRAIGHT).turned(30.5, 0.3, 0.05)
+    for got, expected in zip(turned.at(times).arrays(), STRAIGHT.at(times).arrays(), strict=True):
+        assert np.array_equal(got, expected)
+
+
+@pytest.mark.parametrize("turn_deg", [-40.0, 25.0, 170.0])
+def test_it_turns_by_the_angle_at_the_rate_without_a_jump(turn_deg):
+    rate = math.radians(3.0)
+    turned = SteeredFlight(STRAIGHT).turned(20.0, math.radians(turn_deg), rate)
+    done_s = 20.0 + abs(turn_deg) / 3.0
+    yaw = turned.at(np.array([20.0, done_s + 1.0])).yaw_rad
+    change = math.remainder(float(yaw[1] - yaw[0]), 2.0 * math.pi)
+    assert math.degrees(change) == pytest.approx(turn_deg, abs=0.01)
+    times = np.arange(19.0, done_s + 5.0, 0.05)
+    state = turned.at(times)
+    north, east, down = line_of_sight_ned(
+        state.lat_deg[:-1], state.lon_deg[:-1], state.alt_m[:-1],
+        state.lat_deg[1:], state.lon_deg[1:], state.alt_m[1:],
+    )  # fmt: skip
+    steps = np.sqrt(north**2 + east**2 + down**2) / 0.05
+    assert steps == pytest.approx(60.0, rel=2e-4)
+
+
+def test_manoeuvres_follow_each_other_and_the_old_flight_stays():
+    once = SteeredFlight(STRAIGHT).turned(10.0, 0.5, 0.05)
+    twice = once.turned(40.0, -0.5, 0.05)
+    assert len(once.parts) == 1
+    times = np.array([5.0, 25.0, 39.9])
+    for got, expected in zip(twice.at(times).arrays(), once.at(times).arrays(), strict=True):
+        assert np.array_equal(got, expected)
+    assert twice.at(np.array([80.0])).yaw_rad[0] == pytest.approx(math.pi / 2, abs=2e-3)
+
+
+def test_a_climbing_flight_levels_off():
+    climbing = ScriptedTrajectory(
+        "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=0.0, speed_mps=60.0,
+        climb_mps=5.0,
+    )  # fmt: skip
+    state = SteeredFlight(climbing).turned(10.0, 0.2, 0.05).at(np.array([10.0, 50.0]))
+    assert state.alt_m == pytest.approx([1050.0, 1050.0], abs=0.01)
