@@ -57,8 +57,7 @@ class RungRun:
 
     def time_once(self) -> None:
         """Note the processor time of a repeat: the best of a few passes."""
-        passes = 1 if self.block_cpu_s > _LONGEST_S / _FEWEST else _PASSES
-        self.repeats_s.append(min(self._pass_s() for _ in range(passes)))
+        self.repeats_s.append(min(self._pass_s() for _ in range(_PASSES)))
 
     def _pass_s(self) -> float:
         """Run a fresh block over all wakes and return the processor time."""
@@ -119,15 +118,17 @@ def run_rung(scene: Scene, block: str) -> RungRun:
 def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
     """Time all rungs in turn, again and again, so that a noisy machine hurts all of them alike.
 
-    Every round starts with another rung. One untimed pass goes before: libraries are imported and
-    tables that are built once are built then.
+    Every round starts with another rung. Their runs went before: libraries were imported and tables
+    that are built once were built then. A rung so slow that its run took long is not run again: that
+    run counts.
     """
-    for run in runs:
-        run.time_once()
-        run.repeats_s.clear()
+    slow = [run for run in runs if run.block_cpu_s > _LONGEST_S]
+    for run in slow:
+        run.repeats_s.append(run.block_cpu_s)
+    fast = [run for run in runs if run.block_cpu_s <= _LONGEST_S]
     for round_ in range(repeats):
-        for place in range(len(runs)):
-            run = runs[(place + round_) % len(runs)]
+        for place in range(len(fast)):
+            run = fast[(place + round_) % len(fast)]
             if len(run.repeats_s) < run.repeats(repeats):
                 run.time_once()
 
