@@ -114,7 +114,7 @@ def explain(**options: Any) -> None:
 @click.option("--block", metavar="NAME", help="Climb only this block's ladders.")
 @click.option("--against", metavar="RUNG", help="Another reference than the ladder's own.")
 @click.option("--repeats", type=click.IntRange(min=1), default=10, show_default=True,
-              help="How often each rung is timed; every time counts the best of three.")
+              help="How often each rung is timed; each counts the best of ten passes.")
 @click.option("--budget", "budgets", multiple=True, metavar="ERROR",
               help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m².")
 @click.option("--all", "whole_chain", is_flag=True,

@@ -1,7 +1,8 @@
 """The results of a cost study as a table on the terminal, a Parquet file and a figure."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -129,21 +130,23 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     ]
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
-    figure = _figure(4.3 * columns, 3.5 * rows + 0.5)
-    figure.suptitle(f"{title}: what each model costs and what it gets wrong")
-    for number, rungs in enumerate(panels):
-        _draw_panel(figure.add_subplot(rows, columns, number + 1), rungs)
-    figure.tight_layout()
-    figure.savefig(path, metadata={"Software": None})
+    with png_figure(path, 4.3 * columns, 3.5 * rows + 0.5) as figure:
+        figure.suptitle(f"{title}: what each model costs and what it gets wrong")
+        for number, rungs in enumerate(panels):
+            _draw_panel(figure.add_subplot(rows, columns, number + 1), rungs)
+        figure.tight_layout()
 
 
-def _figure(width_in: float, height_in: float) -> Any:
+@contextmanager
+def png_figure(path: Path, width_in: float, height_in: float) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG when the block is done."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width_in, height_in), dpi=110)
     FigureCanvasAgg(figure)
-    return figure
+    yield figure
+    figure.savefig(path, metadata={"Software": None})
 
 
 def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
@@ -151,34 +154,43 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
         axes.set_axis_off()
         return
     first, quantity = rungs[0], rungs[0].ladder.quantities[0]
-    errors = {cost.rung: cost.error.p95 for cost in rungs}
-    known = [error for error in errors.values() if error > 0.0]
-    # A log axis has no zero: errors of 0 and unknown ones stand on the floor, open.
+    others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
+    known = [error for error in others if error > 0.0]
+    # Errors of rounding, of 0 and unknown ones stand on the floor, open, with their number: on a
+    # true scale they would press all others together, and a log axis has no zero.
     floor = 0.1 * min(known) if known else 1e-3
-    front = []
+    points = []
     for place, cost in enumerate(sorted(rungs, key=lambda c: c.cpu_us_per_target_scan)):
-        error = errors[cost.rung]
-        at = error if error > 0.0 else floor
+        error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
+        on_floor = not error > floor
+        if on_floor:
+            label += ": error unknown" if math.isnan(error) else f": {error:.0e} {quantity.unit}"
+        at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
         colour = "#D55E00" if cost.pareto else "#777777"
         axes.errorbar(
-            cost.cpu_us_per_target_scan, at, xerr=cost.cpu_spread_us, fmt="o", color=colour,
-            markerfacecolor=colour if error > 0.0 else "white", capsize=2, zorder=3,
+            *at, xerr=cost.cpu_spread_us, fmt="o", color=colour, capsize=2, zorder=3,
+            markerfacecolor="white" if on_floor else colour,
         )  # fmt: skip
-        label = cost.rung + (" (scene)" if cost.in_scene else "")
-        if not error > 0.0:
-            label += ", no error known" if error != error else ", error 0"
         axes.annotate(
-            label, (cost.cpu_us_per_target_scan, at), xytext=(6, 7 if place % 2 else -11),
-            textcoords="offset points", fontsize=7.5, color=colour,
+            label, at, xytext=(5, 6 if place % 2 else -11), textcoords="offset points",
+            fontsize=7.5, color=colour,
         )  # fmt: skip
-        if cost.pareto:
-            front.append((cost.cpu_us_per_target_scan, at))
-    axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2) if front else None
+        points.append((at, cost.pareto))
+    front = [at for at, pareto in points if pareto]
+    axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.margins(x=0.35, y=0.18)
+    axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))
+    axes.set_ylim(*_wide([y for (_, y), _ in points]))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_title(f"{first.block}: {first.ladder.name}, against {first.reference}", fontsize=9)
     axes.set_xlabel("CPU time of the block, µs per target-scan", fontsize=8)
     axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
-    axes.tick_params(labelsize=7)
+    axes.tick_params(which="both", labelsize=7)
+    axes.minorticks_off()
+
+
+def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
+    """Return limits of a log axis: some room on both sides, whole decades inside."""
+    low, high = math.log10(min(values)), math.log10(max(values))
+    return 10.0 ** (math.floor(low) - 0.2), 10.0 ** max(high + right, math.floor(low) + 1.2)
