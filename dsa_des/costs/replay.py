@@ -18,7 +18,7 @@ from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
 from dsa_des.wake import Wake
 
-# Slow rungs are timed fewer times: all repeats of one rung together take about this long at most.
+# Slow rungs are timed fewer times: all passes of one rung together take about this long at most.
 _LONGEST_S = 2.0
 _FEWEST = 3
 
@@ -50,18 +50,14 @@ class RungRun:
     tables: dict[str, Any]
     run_cpu_s: float
     block_cpu_s: float
-    repeats_s: list[float] = field(default_factory=list)
+    passes_s: list[float] = field(default_factory=list)
     _pristine: Component | None = None
 
     def fresh(self) -> Component:
         """Return the block set up anew, as before its first wake."""
         return Simulation(self.scene).components[self.block]
 
-    def time_once(self) -> None:
-        """Note the processor time of a repeat: the best of a few passes."""
-        self.repeats_s.append(min(self._pass_s() for _ in range(_PASSES)))
-
-    def _pass_s(self) -> float:
+    def pass_s(self) -> float:
         """Run a fresh block over all wakes and return the processor time."""
         if self._pristine is None:
             self._pristine = self.fresh()
@@ -81,10 +77,20 @@ class RungRun:
             if collecting:
                 gc.enable()
 
-    def repeats(self, wanted: int) -> int:
-        """Return how often this rung is timed when `wanted` is asked for."""
-        affordable = int(_LONGEST_S / (_PASSES * max(self.block_cpu_s, 1e-9)))
+    def passes(self, wanted: int) -> int:
+        """Return how many passes are run when `wanted` are asked for: fewer of a slow block."""
+        affordable = int(_LONGEST_S / max(self.block_cpu_s, 1e-9))
         return min(wanted, max(_FEWEST, affordable))
+
+    @property
+    def repeats_s(self) -> list[float]:
+        """Processor time of each repeat: the best of its passes; of a slow block, each pass."""
+        if len(self.passes_s) < 2 * _PASSES:
+            return self.passes_s
+        return [
+            min(self.passes_s[start : start + _PASSES])
+            for start in range(0, len(self.passes_s) - _PASSES + 1, _PASSES)
+        ]
 
     def target_scans(self) -> int:
         """Return how many (instant, target) pairs the block was asked about."""
@@ -129,15 +135,15 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
     that are built once were built then. A rung so slow that its run took long is not run again: that
     run counts.
     """
-    slow = [run for run in runs if run.block_cpu_s > _LONGEST_S]
-    for run in slow:
-        run.repeats_s.append(run.block_cpu_s)
+    for run in runs:
+        if run.block_cpu_s > _LONGEST_S:
+            run.passes_s.append(run.block_cpu_s)
     fast = [run for run in runs if run.block_cpu_s <= _LONGEST_S]
-    for round_ in range(repeats):
+    for round_ in range(repeats * _PASSES):
         for place in range(len(fast)):
             run = fast[(place + round_) % len(fast)]
-            if len(run.repeats_s) < run.repeats(repeats):
-                run.time_once()
+            if len(run.passes_s) < run.passes(repeats * _PASSES):
+                run.passes_s.append(run.pass_s())
 
 
 def median_and_spread(repeats_s: Sequence[float]) -> tuple[float, float]:

@@ -17,6 +17,10 @@ from dsa_des.simulation import Simulation
 Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
 
 
+# Two costs nearer to each other than this factor come in another order in another run.
+_APART = 1.05
+
+
 @dataclass
 class RungCost:
     """What one rung costs and what it gets wrong.
@@ -30,6 +34,9 @@ class RungCost:
         Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
     cpu_us_per_target_scan, cpu_spread_us : float
         Median over the repeats, and half the distance between the quartiles.
+        Costs closer than 5 % are not told apart: they get one value, and `tied_with` names the
+        other rungs.
+    tied_with : list of str
     repeats : int
     errors : dict of Spread
         By quantity, against the reference; of the reference itself, its own error where that could
@@ -50,6 +57,7 @@ class RungCost:
     unavailable: str = ""
     cpu_us_per_target_scan: float = math.nan
     cpu_spread_us: float = math.nan
+    tied_with: list[str] = field(default_factory=list)
     repeats: int = 0
     errors: dict[str, Spread] = field(default_factory=dict)
     error_note: str = ""
@@ -76,6 +84,7 @@ class RungCost:
             "unavailable": self.unavailable or None,
             "cpu_us_per_target_scan": _number(self.cpu_us_per_target_scan),
             "cpu_spread_us": _number(self.cpu_spread_us),
+            "tied_with": self.tied_with,
             "repeats": self.repeats,
             "error_quantity": first.name,
             "error_unit": first.unit,
@@ -120,7 +129,7 @@ def climb(
     ladder: Ladder,
     *,
     against: str | None = None,
-    repeats: int = 20,
+    repeats: int = 10,
     budgets: Mapping[str, float] | None = None,
     compare: Compare | None = None,
 ) -> list[RungCost]:
@@ -212,10 +221,27 @@ def _same_block(run: RungRun, variants: Variants, block: str) -> bool:
     return mine.cls is scenes.cls and mine.parameters == scenes.parameters
 
 
+def _tie(costs: list[RungCost]) -> None:
+    """Give costs that cannot be told apart one value."""
+    ordered = sorted(costs, key=lambda cost: cost.cpu_us_per_target_scan)
+    groups: list[list[RungCost]] = []
+    for cost in ordered:
+        if groups and cost.cpu_us_per_target_scan < _APART * groups[-1][0].cpu_us_per_target_scan:
+            groups[-1].append(cost)
+        else:
+            groups.append([cost])
+    for group in groups:
+        common = sum(cost.cpu_us_per_target_scan for cost in group) / len(group)
+        for cost in group:
+            cost.cpu_us_per_target_scan = common
+            cost.tied_with = [other.rung for other in group if other is not cost]
+
+
 def _mark(
     costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]
+    _tie(known)
     # A reference whose own error nobody knows is on the front: nothing is known to beat it.
     points = [
         (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)
