@@ -36,7 +36,7 @@ def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
 
 
 def over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
-    """Return (rows, targets, ...) values over all targets of the run, NaN where one is not there."""
+    """Return (rows, targets, ...) values over all targets of the run, NaN where absent."""
     shape = (len(values), len(targets.roster), *values.shape[2:])
     wide: FloatArray = np.full(shape, np.nan)
     wide[:, targets.columns] = values
@@ -85,5 +85,3 @@ def over_cells(
         wide[cells.row, cells.target] = of_cell
         found[name] = wide
     return found
-
-

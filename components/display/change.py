@@ -30,7 +30,8 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
     """
     before, after = _detections(reference), _detections(other)
     common = before.keys() & after.keys()
-    moved, of = (None, None), None
+    moved: tuple[float, float] | tuple[None, None] = (None, None)
+    of = None
     firsts, others = _firsts(before), _firsts(after)
     for name in sorted(firsts.keys() & others.keys()):
         change = (others[name][1] - firsts[name][1], others[name][0] - firsts[name][0])

@@ -125,21 +125,21 @@ def detection_error(
     """
     mp = multiprecision()
     with mp.workdps(DIGITS):
-        return float(abs(mp.mpf(float(pd)) - 1 + _miss(mp, snr, pulses,
-                                                       false_alarm_probability, swerling)))  # fmt: skip
+        miss = _miss(mp, snr, pulses, false_alarm_probability, swerling)
+        return float(abs(mp.mpf(float(pd)) - 1 + miss))
 
 
 def _miss(mp: Any, snr: float, n: int, pfa: float, swerling: int) -> Any:
     threshold = _threshold(mp, n, pfa)
     quanta = n * mp.mpf(float(snr))
-    shape = {1: 1, 2: n, 3: 2, 4: 2 * n}.get(swerling)
-    if shape is None:
-        weight, ratio = mp.exp(-quanta), None
-    else:
-        weight, ratio = (1 + quanta / shape) ** (-shape), quanta / shape / (1 + quanta / shape)
+    # Negative binomial; a shape of 0 stands for the steady target's Poisson.
+    shape = (0, 1, n, 2, 2 * n)[swerling]
+    ratio = quanta / (shape + quanta)
+    weight = (1 - ratio) ** shape if shape else mp.exp(-quanta)
     # P(n + k, V) is the rest of e^-V V^j / j! from j = n + k on: summed from the far end, where the
     # terms are too small to matter, no digit is lost.
-    term, terms = mp.exp(-threshold) * threshold**n / mp.factorial(n), []
+    term = mp.exp(-threshold) * threshold**n / mp.factorial(n)
+    terms: list[Any] = []
     smallest = mp.mpf(10) ** (-DIGITS - 5)
     while not terms or n + len(terms) < threshold or term > smallest * terms[0]:
         terms.append(term)
@@ -151,7 +151,7 @@ def _miss(mp: Any, snr: float, n: int, pfa: float, swerling: int) -> Any:
     miss = mp.mpf(0)
     for k, rest in enumerate(reversed(rests), start=1):
         miss += weight * rest
-        weight *= quanta / k if ratio is None else ratio * (shape + k - 1) / k
+        weight *= (ratio * (shape + k - 1) if shape else quanta) / k
     return miss
 
 

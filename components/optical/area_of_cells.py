@@ -1,5 +1,7 @@
 """The area that each cell's target shows, by the camera's choice of silhouette."""
 
+from typing import Any
+
 from components.optical.infrared_area import infrared_area
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
@@ -39,7 +41,7 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         return area_by_table(cells, {"table": tables}, "aspect_table")
     if silhouette == "mesh":
         return area_by_table(cells, {"mesh": _meshes(cells, areas)}, "convex_hull")
-    compute = infrared_area if band == "ir" else visible_area
+    compute: Any = infrared_area if band == "ir" else visible_area
     area: FloatArray = compute(
         cells.relative_heading_rad,
         cells.target_pitch_rad,

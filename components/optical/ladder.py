@@ -66,7 +66,8 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         )
         bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
         wide = [array.astype(np.longdouble) for array in (*angles, *bodies)]
-        exact = union_area(*wide[:7], wide[7] if len(wide) > 7 else None)
+        areas: Any = (*wide, None)[:8]
+        exact = union_area(*areas)
         error = np.abs(camera.shown_area(cells).astype(np.longdouble) - exact)
         return {_AREA.name: error.astype(np.float64)}
 

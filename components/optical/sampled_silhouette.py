@@ -44,7 +44,7 @@ def sampled_table(
         return np.full_like(azimuth, value)
 
     # An observer who stands at this azimuth and elevation of a level target looks along the
-    # opposite direction: he sees it at minus his elevation, and nose-on is a relative heading of pi.
+    # opposite direction: at minus his elevation, and nose-on is a relative heading of pi.
     area = union_area(
         np.pi - np.radians(azimuth), level, level, -np.radians(elevation),
         filled(front_m2), filled(side_m2), filled(horizontal_m2),

@@ -1,4 +1,4 @@
-"""``dsa-des cost``: what each model of each block costs, what it gets wrong, and what it changes."""
+"""``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
 import importlib
 import json
@@ -18,8 +18,7 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.ladder import Ladder, Unavailable
 from dsa_des.registry import UnknownType, find
 from dsa_des.reports import load_reports
-from dsa_des.run_folder import check_target, new_folder_name, write_json, writing
-from dsa_des.run_folder import RUN_JSON
+from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]
@@ -92,13 +91,13 @@ def _say(text: str, silent: bool) -> None:
         click.echo(text, err=True)
 
 
-def _climbs(
-    variants: Variants, block: str | None, against: str | None
-) -> tuple[Climbs, list[str]]:
+def _climbs(variants: Variants, block: str | None, against: str | None) -> tuple[Climbs, list[str]]:
     """Return the ladders to climb, and notes on those that change nothing in this scene."""
     blocks = variants.scene.blocks
     if block is not None and block not in blocks:
-        raise UsageError(f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}")
+        raise UsageError(
+            f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}"
+        )
     names = list(blocks) if block is None else [block]
     declared = [(name, ladder) for name in names for ladder in blocks[name].cls.ladders]
     if not declared:

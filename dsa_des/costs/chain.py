@@ -43,10 +43,11 @@ def run_chain(variants: Variants, costs: Sequence[RungCost], compare: Compare) -
     interleaved, without recording; its cost is the shortest of them.
     """
     groups = [
-        list(group)
-        for _, group in itertools.groupby(costs, key=lambda c: (c.block, c.ladder.name))
+        list(group) for _, group in itertools.groupby(costs, key=lambda c: (c.block, c.ladder.name))
     ]
-    chosen = [[c for c in group if not c.unavailable and (c.pareto or c.in_scene)] for group in groups]
+    chosen = [
+        [c for c in group if not c.unavailable and (c.pareto or c.in_scene)] for group in groups
+    ]
     chosen = [group for group in chosen if group]
     whole = _count(chosen)
     while _count(chosen) > MOST:

@@ -65,7 +65,7 @@ def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str,
 
 
 def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, Spread], str]:
-    """Return a rung's error against a far more precise evaluation of a sample, or why there is none.
+    """Return a rung's error against a far more precise evaluation, or why there is none.
 
     Returns
     -------
@@ -82,9 +82,7 @@ def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, 
         return {}, f"not measured: {error}"
     except Unavailable as error:
         return {}, str(error)
-    spreads = {
-        name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]
-    }
+    spreads = {name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]}
     count = max(spread.count for spread in spreads.values())
     return spreads, f"measured at {count} target-scans"
 
@@ -92,10 +90,8 @@ def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, 
 def _known(ladder: Ladder, values: Values) -> IntArray:
     """Return (row, target) of a sample, evenly spread over what the first quantity knows."""
     first = values[1][ladder.quantities[0].name]
-    known = ~np.isnan(first)
-    if known.ndim > 2:
-        known = known.all(axis=tuple(range(2, known.ndim)))
-    pairs = np.argwhere(known)
+    unknown = np.isnan(first)
+    pairs = np.unique(np.argwhere(~unknown)[:, :2], axis=0)
     if len(pairs) > SAMPLE:
         pairs = pairs[np.linspace(0, len(pairs) - 1, SAMPLE).astype(np.int64)]
     return pairs

@@ -132,8 +132,8 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
     """Time all rungs in turn, again and again, so that a noisy machine hurts all of them alike.
 
     Every round starts with another rung. Their runs went before: libraries were imported and tables
-    that are built once were built then. A rung so slow that its run took long is not run again: that
-    run counts.
+    that are built once were built then. A rung so slow that its run took long is not run again:
+    that run counts.
     """
     for run in runs:
         if run.block_cpu_s > _LONGEST_S:

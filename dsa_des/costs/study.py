@@ -18,7 +18,7 @@ Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
 
 
 # Two costs nearer to each other than this factor come in another order in another run.
-_APART = 1.05
+_APART = 1.1
 
 
 @dataclass
@@ -34,7 +34,7 @@ class RungCost:
         Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
     cpu_us_per_target_scan, cpu_spread_us : float
         Median over the repeats, and half the distance between the quartiles.
-        Costs closer than 5 % are not told apart: they get one value, and `tied_with` names the
+        Costs closer than 10 % are not told apart: they get one value, and `tied_with` names the
         other rungs.
     tied_with : list of str
     repeats : int

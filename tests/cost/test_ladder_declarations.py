@@ -1,4 +1,4 @@
-"""Every ladder that our blocks declare can be climbed: its rungs exist, and its types share ports."""
+"""Every ladder that our blocks declare can be climbed: its rungs exist and share ports."""
 
 import pytest
 from click.testing import CliRunner
