@@ -48,7 +48,7 @@ def cost_of_accuracy(
     variants = Variants(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in variants.dropped:
         click.echo(f"note: the swap dropped {key}", err=True)
-    climbs, notes = _climbs(variants, block, against)
+    climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
     target = Path(out) if out else new_folder_name(Path("runs"), f"{variants.scene.path.stem}-cost")
     check_target(target)
@@ -91,7 +91,9 @@ def _say(text: str, silent: bool) -> None:
         click.echo(text, err=True)
 
 
-def _climbs(variants: Variants, block: str | None, against: str | None) -> tuple[Climbs, list[str]]:
+def ladders_to_climb(
+    variants: Variants, block: str | None, against: str | None
+) -> tuple[Climbs, list[str]]:
     """Return the ladders to climb, and notes on those that change nothing in this scene."""
     blocks = variants.scene.blocks
     if block is not None and block not in blocks:
