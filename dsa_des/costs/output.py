@@ -128,6 +128,8 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
         [cost for cost in group if not cost.unavailable]
         for _, group in groupby(costs, key=lambda c: (c.block, c.ladder.name))
     ]
+    # A block that saw no target says nothing of its rungs.
+    panels = [rungs for rungs in panels if any(cost.error.count for cost in rungs)]
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
     with png_figure(path, 4.3 * columns, 3.5 * rows + 0.5) as figure:
@@ -150,17 +152,14 @@ def png_figure(path: Path, width_in: float, height_in: float) -> Iterator[Any]:
 
 
 def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
-    if not rungs:
-        axes.set_axis_off()
-        return
     first, quantity = rungs[0], rungs[0].ladder.quantities[0]
     others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
     known = [error for error in others if error > 0.0]
     # Errors of rounding, of 0 and unknown ones stand on the floor, open, with their number: on a
     # true scale they would press all others together, and a log axis has no zero.
     floor = 0.1 * min(known) if known else 1e-3
-    points = []
-    for place, cost in enumerate(sorted(rungs, key=lambda c: c.cpu_us_per_target_scan)):
+    points, labels = [], []
+    for cost in sorted(rungs, key=lambda c: c.cpu_us_per_target_scan):
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
         if on_floor:
@@ -171,10 +170,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
             *at, xerr=cost.cpu_spread_us, fmt="o", color=colour, capsize=2, zorder=3,
             markerfacecolor="white" if on_floor else colour,
         )  # fmt: skip
-        axes.annotate(
-            label, at, xytext=(5, 6 if place % 2 else -11), textcoords="offset points",
-            fontsize=7.5, color=colour,
-        )  # fmt: skip
+        labels.append((label, at, colour))
         points.append((at, cost.pareto))
     front = [at for at, pareto in points if pareto]
     axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2)
@@ -188,6 +184,27 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
     axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
     axes.tick_params(which="both", labelsize=7)
     axes.minorticks_off()
+    _put_labels(axes, labels)
+
+
+def _put_labels(axes: Any, labels: Sequence[tuple[str, tuple[float, float], str]]) -> None:
+    """Write each label beside its point, moved down or up until it covers no other one."""
+    high, wide = 11.0, 5.2  # of a line and of a letter, in pixels
+    put: list[tuple[float, float, float]] = []
+    for label, at, colour in sorted(labels, key=lambda item: -item[1][1]):
+        x, y = axes.transData.transform(at)
+
+        def free(drop: float, x: float = x, y: float = y, width: float = wide * len(label)) -> bool:
+            return all(
+                abs(y - drop - other_y) >= high or x + width < other_x or other_end < x
+                for other_x, other_end, other_y in put
+            )
+
+        drop = next((d for d in (4.0, 15.0, -8.0, 26.0, -19.0, 37.0) if free(d)), 4.0)
+        put.append((x, x + wide * len(label), y - drop))
+        axes.annotate(
+            label, at, xytext=(9, -drop), textcoords="offset pixels", fontsize=7, color=colour
+        )
 
 
 def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
