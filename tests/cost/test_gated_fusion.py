@@ -54,17 +54,18 @@ def test_gates_of_place():
     assert match(report([0.0], [1000]), [0], report([0.0]), [0]) == [0]  # no range: gate open
 
 
-def tables(window=None, shuffle=None, **options):
+def tables(window=None, shuffle=None, duration_s=90, **options):
     sink = MemorySink()
-    scene = load_scene(SCENE, swaps=SWAP, duration_s=90, **options)
+    scene = load_scene(SCENE, swaps=SWAP, duration_s=duration_s, **options)
     Simulation(scene, recorder=Recorder([sink]), window=window, shuffle_ties=shuffle).run()
     return sink.tables()
 
 
 @pytest.mark.parametrize("window", [1, 7, 500])
 def test_rows_do_not_depend_on_the_window(window):
-    whole, cut = tables(), tables(window=window, shuffle=3)
-    assert whole["fused"].num_rows > 500
+    whole = tables(duration_s=65)
+    cut = tables(duration_s=65, window=window, shuffle=3)
+    assert whole["fused"].num_rows > 100
     assert cut["fused"].equals(whole["fused"])
     assert cut["tracks"].equals(whole["tracks"])
 
