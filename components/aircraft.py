@@ -84,10 +84,35 @@ class Roster:
     def __len__(self) -> int:
         return len(self.names)
 
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, Roster)
+            and self.names == other.names
+            and self.aircraft == other.aircraft
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.names)
+
     @cached_property
     def keys(self) -> AnyArray:
         """64-bit keys of the targets' random draws, shape (targets,)."""
         return target_keys(self.names)
+
+    def keys_of(self, targets: IntArray) -> AnyArray:
+        """Return the keys of some targets (n,); those that nobody asks for are never made."""
+        if "keys" in self.__dict__:
+            return self.keys[targets]
+        keys, known = self._keys_so_far
+        new = np.unique(targets[~known[targets]])
+        if len(new):
+            keys[new] = target_keys(tuple(self.names[i] for i in new.tolist()))
+            known[new] = True
+        return keys[targets]
+
+    @cached_property
+    def _keys_so_far(self) -> tuple[AnyArray, AnyArray]:
+        return np.zeros(len(self.names), dtype=np.uint64), np.zeros(len(self.names), dtype=bool)
 
     @cached_property
     def rcs_m2(self) -> FloatArray:

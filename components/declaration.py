@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.radar.inputs import as_numbers, broadcast_flat, refuse, unflatten
+from components.checks import as_numbers, broadcast_flat, refuse, unflatten
 
 BoolArray = NDArray[np.bool_]
 

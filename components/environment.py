@@ -39,7 +39,13 @@ class Weather(Parameters):
 
 
 class Accuracy(Parameters):
-    """Errors that a scene allows; effects and rungs proven to stay within them are left out."""
+    """Errors that a scene allows; effects and rungs proven to stay within them are left out.
+
+    Angles are directions, azimuths and elevations in body axes, as far as a sensor looks at them.
+    The line of sight is judged by ``angle_deg`` and ``range_m``, and by what its error in range
+    does to a Pd where ``detection_probability`` is given. A sensor without a Pd (threshold, range
+    boundary, camera) detects by no more than ``range_m`` nearer or farther.
+    """
 
     detection_probability: float | None = Field(
         default=None, gt=0, lt=1, description="Error of any probability of detection."

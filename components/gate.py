@@ -22,6 +22,8 @@ class Gate(Component):
     inputs = {"targets": Input(RelativeTargets, "trigger", "Targets as seen from the ownship.")}
     outputs = {"targets": Output(GatedTargets, "The same, with a decision for each sensor.")}
     windowed = True
+    lockstep = True
+    rewindable = True
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that some sensor may look at."""

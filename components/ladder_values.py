@@ -72,7 +72,7 @@ def over_cells(
     held = wake.held("targets")
     if held is None:
         return {}
-    targets, rows = held
+    targets, rows = sensor.seen(*held)
     cells, reason = sensor.cells(targets, rows, wake)
     everybody = len(targets.roster)
     found: dict[str, Any] = {}

@@ -57,10 +57,10 @@ class Detections(Message):
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
-        has ``illuminated_s``, when its beam passed. Where the ownship's navigation errs, there are
-        the line of sight in NED by what it believes of its attitude, ``ned_azimuth_rad`` and
-        ``ned_elevation_rad``, and where it believes to be, ``own_lat_deg``, ``own_lon_deg`` and
-        ``own_alt_m``.
+        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
+        ownship's navigation errs, there are the line of sight in NED by what it believes of its
+        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``, and where it believes to be,
+        ``own_lat_deg``, ``own_lon_deg`` and ``own_alt_m``.
     roster : Roster
     """
 
@@ -278,8 +278,10 @@ class Tracks(Message):
 
 def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
     """Return the names behind bit masks, joined by ``+``."""
-    masks, codes = np.unique(contributors, return_inverse=True)
+    used = np.bincount(contributors, minlength=1)
+    masks = np.flatnonzero(used)
+    codes = (np.cumsum(used > 0) - 1).take(contributors)
     names = tuple(
         "+".join(name for i, name in enumerate(sensors) if int(mask) >> i & 1) for mask in masks
     )
-    return Text(codes.reshape(-1), names)
+    return Text(codes, names)

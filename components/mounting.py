@@ -48,7 +48,7 @@ class MountedAxes(BodyAxes):
     def reach(self, reach: Reach) -> Reach:
         """Return a reach whose field of view lies in the sensor's axes."""
         return MountedReach(
-            reach.azimuth_rad, reach.elevation_rad, reach.range_max_m, reach.enabled, self
+            reach.azimuth_rad, reach.elevation_rad, reach.range_max_m, reach.enabled, axes=self
         )
 
     def __call__(self, p_rad: FloatArray, q_rad: FloatArray) -> Angles:
@@ -68,6 +68,15 @@ class MountedReach(Reach):
 
     axes: BodyAxes = BodyAxes()
 
+    @property
+    def steepest_rad(self) -> float:
+        """Largest elevation in either axes: the two verticals lean by the boresight's tilt."""
+        tilt = 0.0
+        if isinstance(self.axes, MountedAxes):
+            _, elevation, roll = self.axes.true_rad
+            tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
+        return min(0.5 * math.pi, super().steepest_rad + tilt)
+
     def decide(
         self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
     ) -> ReasonArray:
@@ -78,6 +87,7 @@ class MountedReach(Reach):
 class Mounting(Effect):
     """Boresight and roll of the sensor, and an error of them that nobody knows of."""
 
+    lockstep = True
     name = "mounting"
     acts_on = "axes"
     # Rotating by 0 and back rounds the last bits.

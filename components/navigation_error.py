@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.checks import FloatArray, broadcast_flat, finite, unflatten
 from components.geometry.inputs import HIGHEST_ALTITUDE_M, LOWEST_ALTITUDE_M, require_between
-from components.radar.inputs import FloatArray, broadcast_flat, finite, unflatten
 
 _EQUATORIAL_RADIUS_M = 6_378_137.0
 _FLATTENING = 1.0 / 298.257223563

@@ -16,6 +16,9 @@ ReasonArray = npt.NDArray[np.uint8]
 #: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
 EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
 SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+#: Targets up to so many reaches away count when models of the line of sight are judged: one that
+#: is off may take them to be in reach.
+REACH_MARGIN = 1.05
 #: Targets that were not even moved, because no sensor could have looked at them.
 CULLED = "culled"
 
@@ -31,12 +34,23 @@ class Reach:
     range_max_m : float
         Infinite where the sensor has no limit of its own.
     enabled : bool
+    range_slack : float
+        Largest relative error of the range that leaves what the sensor says within ``[accuracy]``.
+    exact_because : str
+        Why only an exact line of sight will do; empty where another one may.
     """
 
     azimuth_rad: tuple[float, float]
     elevation_rad: tuple[float, float]
     range_max_m: float = math.inf
     enabled: bool = True
+    range_slack: float = math.inf
+    exact_because: str = ""
+
+    @property
+    def steepest_rad(self) -> float:
+        """Largest size of an elevation in body axes that is looked at."""
+        return max(abs(angle) for angle in self.elevation_rad)
 
     def decide(
         self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
@@ -74,22 +88,46 @@ class FarthestLook:
     ----------
     range_m : float
         Infinite where somebody has no limit.
+    views : tuple of (range, elevation)
+        For each sensor its range in m and the largest size of an elevation in body axes at which
+        it looks.
+    range_slack, exact_because
+        How exactly the line of sight is needed, see `Reach`.
+    lasts_s : float
+        How long a look lasts: a sweeping beam meets targets where they are later in the scan.
     """
 
     range_m: float
+    views: tuple[tuple[float, float], ...] = ((math.inf, 0.5 * math.pi),)
+    range_slack: float = math.inf
+    exact_because: str = ""
+    lasts_s: float = 0.0
 
 
 def farthest_look(requests: Iterable[object]) -> FarthestLook:
     """Return the farthest of what consumers ask for; who does not say asks for everything."""
-    farthest = 0.0
+    looks = [FarthestLook(0.0, ())]
     for request in requests:
-        if isinstance(request, Reach):
-            farthest = max(farthest, request.range_max_m if request.enabled else 0.0)
-        elif isinstance(request, FarthestLook):
-            farthest = max(farthest, request.range_m)
-        else:
-            farthest = math.inf
-    return FarthestLook(farthest)
+        if isinstance(request, FarthestLook):
+            looks.append(request)
+        elif not isinstance(request, Reach):
+            looks.append(FarthestLook(math.inf))
+        elif request.enabled:
+            looks.append(
+                FarthestLook(
+                    request.range_max_m,
+                    ((request.range_max_m, request.steepest_rad),),
+                    request.range_slack,
+                    request.exact_because,
+                )
+            )
+    return FarthestLook(
+        max(look.range_m for look in looks),
+        tuple(sorted({view for look in looks for view in look.views})),
+        min(look.range_slack for look in looks),
+        next((look.exact_because for look in looks if look.exact_because), ""),
+        max(look.lasts_s for look in looks),
+    )
 
 
 @dataclass(eq=False)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dsa_des.types import FloatArray
+
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
 # times one degree in radians and 110 degrees in radians differ in the last bit.
 _LIMIT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
@@ -88,6 +90,53 @@ def round_to_grid(
     return (result + 0.0)[()]
 
 
+class Grid:
+    """The grid of one quantity that a sensor reports, made once and used at every scan.
+
+    Parameters
+    ----------
+    step : float
+        Spacing; 0 means no rounding (the limits still hold).
+    limit_low, limit_high : float, optional
+        Smallest and largest value that may be reported.
+
+    Raises
+    ------
+    ValueError
+        As `round_to_grid`.
+    """
+
+    def __init__(
+        self, step: float, *, limit_low: float | None = None, limit_high: float | None = None
+    ) -> None:
+        round_to_grid(0.0, step, limit_low=limit_low, limit_high=limit_high)  # checks them
+        self.step = float(step)
+        self._lowest = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
+        self._highest = None if limit_high is None else _outermost(np.float64(limit_high), step)
+
+    def round(self, values: FloatArray) -> FloatArray:
+        """Round finite values, bit for bit as `round_to_grid` does.
+
+        Parameters
+        ----------
+        values : ndarray
+            In the unit of the step; not checked.
+        """
+        if self.step == 0.0:
+            result = values
+        else:
+            size = np.abs(values)
+            # NaN, and what cannot be counted in steps, take the general way.
+            simple = size.size and float(size.max()) * _COUNTABLE < min(self.step, 1e200)
+            result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
+            np.copysign(result, values, out=result)
+        if self._highest is not None:
+            result = np.minimum(result, self._highest)
+        if self._lowest is not None:
+            result = np.maximum(result, self._lowest)
+        return np.asarray(result + 0.0)  # adding 0 turns -0 into 0
+
+
 def _finite(name: str, value: ArrayLike) -> Any:
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -113,11 +162,30 @@ def _whole_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
 def _nearest(size: Any, steps: Any) -> Any:
     """Round size >= 0 to the grid."""
     counts, whole, rest = _whole_steps(size, steps)
+    return np.where(counts, (whole + _goes_up(whole, rest, steps)) * steps, size)
+
+
+def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
+    """Round sizes >= 0 of which all can be counted in steps."""
+    rest = np.fmod(size, step)
+    whole = size - rest
+    whole /= step
+    np.rint(whole, out=whole)
+    whole += _goes_up(whole, rest, step)
+    whole *= step
+    return whole
+
+
+def _goes_up(whole: Any, rest: Any, steps: Any) -> Any:
+    """Say where the next grid point is nearer; half-way it is the even one."""
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
     other = steps - rest
-    up = (rest > other) | ((rest == other) & (np.fmod(whole, 2.0) == 1.0))
-    return np.where(counts, (whole + up) * steps, size)
+    up = rest > other
+    halfway = rest == other
+    if halfway.any():
+        up |= halfway & (np.fmod(whole, 2.0) == 1.0)
+    return up
 
 
 def _outermost(limit: Any, steps: Any) -> Any:

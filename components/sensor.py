@@ -6,7 +6,7 @@ engine's business.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -18,7 +18,7 @@ from components.messages import Detections, SensorOffer
 from components.mounting import BodyAxes, Mounting
 from components.navigation import NavigationReport
 from components.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
-from components.resolution import round_to_grid
+from components.resolution import Grid
 from components.sensor_parameters import SensorParameters
 from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.component import Component
@@ -108,7 +108,7 @@ class Cells:
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
-        return stream.uniform(self.roster.keys[self.target], self.scan, draw)
+        return stream.uniform(self.roster.keys_of(self.target), self.scan, draw)
 
 
 #: Effects that every sensor has, after its own.
@@ -128,6 +128,8 @@ class Sensor(Component):
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
+    lockstep = True
+    rewindable = True
     #: Whether detections carry a range.
     measures_range = False
     effects = SENSOR_EFFECTS
@@ -145,10 +147,24 @@ class Sensor(Component):
         self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
         self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
+        #: What a look at nothing gave; while there is still nothing, it is not repeated.
+        self._idle: Look | None = None
 
     def request(self, port: str) -> Any:
         """Ask whoever feeds us for the targets in our reach."""
-        return self._reach_from_body
+        slack, because = self.range_slack(), self.exact_because()
+        return replace(self._reach_from_body, range_slack=slack, exact_because=because)
+
+    def range_slack(self) -> float:
+        """Return the largest relative error of range that leaves results within ``[accuracy]``.
+
+        Infinite where nothing that ``[accuracy]`` bounds depends on the range.
+        """
+        return math.inf
+
+    def exact_because(self) -> str:
+        """Say why only an exact line of sight will do, or nothing."""
+        return ""
 
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""
@@ -172,8 +188,15 @@ class Sensor(Component):
     def _reporting(self) -> list[Any]:
         return self.built("report")
 
+    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets as this sensor sees them, and the row of each scan."""
+        return targets, rows
+
     def look(self, cells: Cells) -> Look:
-        """Decide for each cell whether it is detected; the physics of the sensor."""
+        """Decide for each cell whether it is detected; the physics of the sensor.
+
+        A second look in a row that has no cells is not asked for.
+        """
         raise TypeError(f"{type(self).__name__} has no look(cells)")
 
     def run(self, wake: Wake) -> Detections | None:
@@ -181,13 +204,16 @@ class Sensor(Component):
         held = wake.held("targets")
         if held is None:
             return None
-        targets, rows = held
+        targets, rows = self.seen(*held)
         cells, reason = self.cells(targets, rows, wake)
         rows = cells.message_rows
         wanted = reason == EVALUATE
-        look = self.look(cells)
-        for judge in self._judgements:
-            look = judge(cells, look)
+        look = self._idle
+        if look is None or len(cells):
+            look = self.look(cells)
+            for judge in self._judgements:
+                look = judge(cells, look)
+            self._idle = None if len(cells) else look
         found = np.flatnonzero(look.detected)
         per_scan = np.bincount(cells.row[found], minlength=len(wake))
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
@@ -263,28 +289,42 @@ class Sensor(Component):
             Range is NaN when the sensor measures none.
         """
         azimuth = self._round_azimuth(p_rad)
-        elevation = round_to_grid(
-            q_rad,
-            self.elevation_step_rad,
-            limit_low=self.reach.elevation_rad[0],
-            limit_high=self.reach.elevation_rad[1],
-        )
+        elevation = self._elevation_grid.round(q_rad)
         if not self.measures_range:
             return azimuth, elevation, np.full(len(range_m), np.nan)
-        return azimuth, elevation, round_to_grid(range_m, self.range_step_m, limit_low=0.0)
+        return azimuth, elevation, self._range_grid.round(range_m)
+
+    @cached_property
+    def _elevation_grid(self) -> Grid:
+        low, high = self.reach.elevation_rad
+        return Grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+
+    @cached_property
+    def _range_grid(self) -> Grid:
+        return Grid(self.range_step_m, limit_low=0.0)
+
+    @cached_property
+    def _azimuth_sector(self) -> tuple[float, float]:
+        """The field of view with its upper edge at or above its lower one."""
+        low, high = self.reach.azimuth_rad
+        return low, high + 2.0 * math.pi if high < low else high
+
+    @cached_property
+    def _azimuth_grid(self) -> Grid:
+        low, high = self._azimuth_sector
+        if high - low >= 2.0 * math.pi:
+            return Grid(self.azimuth_step_rad)
+        return Grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
     def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
-        low, high = self.reach.azimuth_rad
-        step = self.azimuth_step_rad
-        if high < low:
-            high += 2.0 * math.pi
+        low, high = self._azimuth_sector
         if high - low >= 2.0 * math.pi:
-            return wrap_pi(round_to_grid(p_rad, step))
+            return wrap_pi(self._azimuth_grid.round(p_rad))
         if low >= -math.pi and high <= math.pi:
-            return round_to_grid(p_rad, step, limit_low=low, limit_high=high)
+            return self._azimuth_grid.round(p_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
         unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
-        return wrap_pi(round_to_grid(unwrapped, step, limit_low=low, limit_high=high))
+        return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
 def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:

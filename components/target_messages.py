@@ -4,7 +4,7 @@ All messages hold rows (one per scan, see `dsa_des.message`). Angles are in radi
 clockwise and elevation upward.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
@@ -14,7 +14,14 @@ import numpy as np
 from components.aircraft import Roster
 from components.reach import Decision
 from dsa_des.message import Message, per_row, static
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
+
+#: Where the ownship and some targets (columns of the roster) are at times (rows, columns): two
+#: states as `components.traffic.state.TrajectoryState` holds them. Sources whose aircraft move
+#: whatever sensors report can give it.
+Flights = Callable[[IntArray, FloatArray], tuple[Any, Any]]
+#: The fields (rows, targets) of `RelativeTargets`, for some columns at times (rows, columns).
+Revisit = Callable[[IntArray, FloatArray], dict[str, AnyArray]]
 
 
 @dataclass(eq=False)
@@ -32,6 +39,8 @@ class TrafficStates(Message):
         What all targets of the run are.
     columns : (targets,) of int
         Which of them the arrays hold, ascending; the others are out of everybody's reach.
+    flights : Flights or None
+        For whoever must know them at other instants: a beam that sweeps. None where nobody does.
     """
 
     own_lat_deg: FloatArray
@@ -49,6 +58,9 @@ class TrafficStates(Message):
     present: BoolArray
     roster: Roster = static()
     columns: IntArray = static()
+    flights: Flights | None = static(default=None, kw_only=True)
+
+    joins_static = frozenset({"columns"})
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -79,6 +91,8 @@ class RelativeTargets(Message):
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
         ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
+    revisit : Revisit or None
+        The targets at other instants than those of the rows.
     """
 
     azimuth_rad: FloatArray
@@ -95,6 +109,9 @@ class RelativeTargets(Message):
     roster: Roster = static()
     columns: IntArray = static()
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
+    revisit: Revisit | None = static(default=None, kw_only=True)
+
+    joins_static = frozenset({"columns"})
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

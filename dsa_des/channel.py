@@ -5,10 +5,13 @@ reader only ever sees those that have arrived by the instant it asks about.
 """
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
 from dsa_des.message import Message
+from dsa_des.replica_time import ReplicaTime
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wire_faults import WireFaults
 
@@ -24,18 +27,41 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
+    replicas : ReplicaTime, optional
+        For replicas in lock step: no row arrives in another replica than its own.
     """
 
-    def __init__(self, source: str, delay_ticks: int = 0, faults: WireFaults | None = None) -> None:
+    def __init__(
+        self,
+        source: str,
+        delay_ticks: int = 0,
+        faults: WireFaults | None = None,
+        replicas: ReplicaTime | None = None,
+    ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
+        self._replicas = replicas
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
 
     def hold(self, message: Message, tick: int) -> None:
         """Make `message` the last arrived one, as if it had come at `tick`."""
         self._last = (np.array([tick], dtype=np.int64), message)
+
+    def state(self) -> tuple[Any, Any]:
+        """Return what waits and what is held, for `set_state`."""
+        return tuple(self._waiting), self._last
+
+    def set_state(self, state: tuple[Any, Any]) -> None:
+        """Go back to a state that `state` gave."""
+        self._waiting, self._last = deque(state[0]), state[1]
+
+    def earliest_since(self, state: tuple[Any, Any]) -> int | None:
+        """Return the tick of the first arrival of what was pushed since a `state`, or None."""
+        before = {id(item) for item in state[0]}
+        ticks = [int(item[0][0]) for item in self._waiting if id(item) not in before]
+        return min(ticks) if ticks else None
 
     def push(self, message: Message, sent: int | None = None) -> IntArray:
         """Deposit a message and return the ticks at which its rows arrive, in order.
@@ -55,6 +81,11 @@ class Channel:
             arrivals, message = arrivals[order], message.take(kept[order])
             if len(kept) == 0:
                 return arrivals
+        if self._replicas is not None and self.delay_ticks:
+            in_time = arrivals % self._replicas.span_ticks < self._replicas.end_tick
+            arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
+            if len(arrivals) == 0:
+                return arrivals
         self._waiting.append((arrivals, message))
         return arrivals
 
@@ -62,7 +93,7 @@ class Channel:
         """Return the ticks at which rows arrive before `end` that were not collected yet."""
         ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
         if self._faults is not None and ticks:
-            return np.unique(np.concatenate(ticks))  # late rows overtake and may coincide
+            return sorted_union(ticks)  # late rows overtake and may coincide
         return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     def collect(self, end: int) -> tuple[IntArray, Message] | None:
@@ -106,7 +137,11 @@ class Channel:
         if held is None:
             return None
         arrivals, message = held
-        return message, np.searchsorted(arrivals, ticks, side="right") - 1
+        rows = np.searchsorted(arrivals, ticks, side="right") - 1
+        if self._replicas is not None:
+            span = self._replicas.span_ticks
+            rows[arrivals[rows] // span != ticks // span] = -1
+        return message, rows
 
 
 def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:

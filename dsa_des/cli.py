@@ -159,5 +159,51 @@ def components(name: str | None) -> None:
     show_components(name)
 
 
+_workers_option = click.option(
+    "--workers", type=int, metavar="N", help="Processes [default: one per processor]."
+)
+
+
+@main.command()
+@click.argument("words", nargs=-1, metavar="STUDY.toml | show FOLDER")
+@click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Change one value of the study file."
+)
+@_workers_option
+@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
+@click.option("--executor", type=click.Choice(["local", "dask"]), default="local")
+@click.option("--scheduler", metavar="ADDR", help="Dask scheduler, e.g. tcp://localhost:8786.")
+@click.option("--out", metavar="DIR", help="Folder for the results [default: studies/STUDY-NNN].")
+@click.option("--metrics", is_flag=True, help="List what studies can measure.")
+@click.option("--quiet", is_flag=True, help="Print no tables.")
+@plain_errors
+def study(**options: Any) -> None:
+    """Run a STUDY: many runs of a scene over axes and random draws, with their statistics."""
+    from dsa_des.commands.study import study_command
+
+    study_command(**options)
+
+
+@main.command()
+@click.argument("paths", nargs=-1, required=True, metavar="A [B ...]")
+@click.option(
+    "--swap",
+    "swaps",
+    multiple=True,
+    metavar="BLOCK=TYPE",
+    help="Compare A with itself after putting another component into a block.",
+)
+@click.option("--replicas", type=int, default=20, help="Runs of each scene [default: 20].")
+@click.option("--metric", "results", multiple=True, help="Show these results only.")
+@_workers_option
+@click.option("--out", metavar="DIR", help="Folder for the results [default: studies/...].")
+@plain_errors
+def compare(**options: Any) -> None:
+    """Compare studies, scenes or a swap: paired differences on the same encounters and draws."""
+    from dsa_des.commands.compare import compare_command
+
+    compare_command(**options)
+
+
 if __name__ == "__main__":
     main()

@@ -151,6 +151,8 @@ class Context:
         when `Component.setup` is called.
     simulate_everything : bool
         Whether a block must not leave out work that cannot change a result.
+    tolerance : mapping
+        What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
     """
 
     streams: Streams
@@ -161,6 +163,7 @@ class Context:
     sections: Mapping[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
     simulate_everything: bool = False
+    tolerance: Mapping[str, float] = field(default_factory=dict)
 
 
 class Component:
@@ -177,6 +180,13 @@ class Component:
     Parameters: ClassVar[Any] = Parameters
     #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
     windowed: ClassVar[bool] = False
+    #: Whether the engine may take the block back to an earlier state. Its attributes, and those of
+    #: its effects, must then hold all of that state; arrays, lists, dicts and sets among them may
+    #: be changed in place, anything within them must be replaced instead.
+    rewindable: ClassVar[bool] = False
+    #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
+    #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
+    lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
@@ -240,7 +250,7 @@ class Component:
         return {}
 
     def left_out(self) -> list[str]:
-        """Say, after `setup`, what work this block spares itself and why no result can notice."""
+        """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []
 
     def built(self, acts_on: str) -> list[Any]:
@@ -250,6 +260,12 @@ class Component:
             for effect in type(self).effects
             if effect.acts_on == acts_on and effect.name in self.context.effects
         ]
+
+    def serves_replicas(self) -> bool:
+        """Return whether this block, with the effects built, may serve replicas in lock step."""
+        return type(self).lockstep and all(
+            effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
+        )
 
     def stream(self, purpose: str) -> Stream:
         """Return this block's keyed random numbers for one purpose."""

@@ -6,13 +6,22 @@ from dsa_des.channel import Channel
 from dsa_des.errors import Problem, SceneError
 from dsa_des.process import Demand, Node
 from dsa_des.randomness import Streams
+from dsa_des.replica_time import ReplicaTime
 from dsa_des.scene import Scene
 from dsa_des.wire_faults import WireFaults
 from dsa_des.wiring import Wire
 
 
-def connect(scene: Scene, nodes: Mapping[str, Node]) -> None:
+def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | None = None) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
+
+    Parameters
+    ----------
+    scene : Scene
+    nodes : mapping
+        Running blocks by name.
+    replicas : ReplicaTime, optional
+        For replicas in lock step.
 
     Raises
     ------
@@ -22,7 +31,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node]) -> None:
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
-        channel = Channel(wire.source, delay, _faults(scene, wire))
+        channel = Channel(wire.source, delay, _faults(scene, wire), replicas)
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             try:
@@ -35,13 +44,15 @@ def connect(scene: Scene, nodes: Mapping[str, Node]) -> None:
             (channel, target, wire.input)
         )
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name)
+        node.demands = find_demands(nodes, name, replicas)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
             raise SceneError([_problem(scene, f"blocks.{name}", message)])
 
 
-def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
+def find_demands(
+    nodes: Mapping[str, Node], name: str, replicas: ReplicaTime | None = None
+) -> list[Demand]:
     """Return the first clocked blocks on every way downstream, and the delay on the way."""
     found: dict[tuple[str, int], Demand] = {}
     seen = {(name, 0)}
@@ -53,7 +64,7 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
         ):
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
-                found[reached] = Demand(node.name, node.clock, reached[1])
+                found[reached] = Demand(node.name, node.clock, reached[1], replicas)
             elif reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)

@@ -42,6 +42,9 @@ class Effect:
     acts_on: ClassVar[str]
     #: Whether it can be built when the scene does not call for it, without changing a bit.
     neutral: ClassVar[bool] = True
+    #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
+    #: of different replicas may come in one call.
+    lockstep: ClassVar[bool] = False
 
     def verdict(self, block: "Component") -> Verdict:
         """Say whether the scene calls for this effect in this block."""
@@ -103,6 +106,16 @@ def plan(
             built, because = True, f"though {verdict.because}: everything is simulated"
         planned.append(Planned(block.name, effect, verdict, built, because))
     return planned
+
+
+def unspent(planned: Sequence[Planned], tolerance: Mapping[str, float]) -> dict[str, float]:
+    """Return what is left of a tolerance after the bounds of all that it let go."""
+    left = dict(tolerance)
+    for item in planned:
+        if item.verdict.simulated and not item.built:
+            for quantity, bound in item.verdict.bound.items():
+                left[quantity] -= bound
+    return left
 
 
 def _within(

@@ -97,9 +97,12 @@ def _check_reach(
     classes: Mapping[str, type[Component]],
     problems: list[Problem],
 ) -> None:
-    sources = [name for name in graph if not classes[name].inputs]
+    sources = [
+        name for name in graph if not any(port.required for port in classes[name].inputs.values())
+    ]
     if not sources and len(graph):
-        problems.append(scene.problem(("blocks",), "no block is a source (has no inputs)"))
+        message = "no block is a source (has no required inputs)"
+        problems.append(scene.problem(("blocks",), message))
         return
     reached = set(sources).union(*(nx.descendants(graph, name) for name in sources))
     for name in sorted(set(graph) - reached):
@@ -151,13 +154,16 @@ def windowed_blocks(
     return windowed
 
 
-def window_order(graph: nx.DiGraph, windowed: set[str]) -> dict[str, int]:
+def window_order(
+    graph: nx.DiGraph, windowed: set[str], cut: Collection[tuple[str, str]] = ()
+) -> dict[str, int]:
     """Return the depth of windowed blocks over all their edges, delayed ones included.
 
     A window is handled block by block, so a sender must be done with it before its receiver
-    starts, whatever the delay between them.
+    starts, whatever the delay between them; over the edges in `cut` it need not be.
     """
-    part = graph.subgraph(windowed)
+    part = nx.DiGraph(graph.subgraph(windowed))
+    part.remove_edges_from(cut)
     depth: dict[str, int] = {}
     for name in nx.topological_sort(part):
         depth[name] = max((depth[before] + 1 for before in part.predecessors(name)), default=0)

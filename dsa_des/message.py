@@ -76,6 +76,14 @@ Columns = dict[str, AnyArray | Text]
 Schema = dict[str, str]
 
 
+def rows_of(columns: Columns, rows: slice) -> Columns:
+    """Return some rows of recorded columns."""
+    return {
+        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
+        for name, values in columns.items()
+    }
+
+
 @dataclass(eq=False)
 class Message:
     """A batch of rows; subclasses add fields.
@@ -91,6 +99,9 @@ class Message:
     #: What a recorder writes: table → column → "int64", "float64", "bool" or "text".
     #: Columns block, tick and time_s are added by the engine.
     recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+
+    #: Static fields that may differ between messages: `concatenate` brings them together.
+    joins_static: ClassVar[frozenset[str]] = frozenset()
 
     def __len__(self) -> int:
         return len(self.tick)
@@ -112,6 +123,14 @@ class Message:
             result.offsets = offsets  # type: ignore[attr-defined]
             for name in entry_names:
                 setattr(result, name, _pick(getattr(self, name), index))
+        return result
+
+    def shifted(self, ticks: int, scans: int) -> Self:
+        """Return the message with its ticks, and its scan numbers if it has any, moved."""
+        result = copy(self)
+        result.tick = self.tick + ticks
+        if hasattr(self, "scan"):
+            result.scan = self.scan + scans  # type: ignore[attr-defined]
         return result
 
     def tables(self) -> dict[str, dict[str, AnyArray | Text]]:

@@ -39,6 +39,22 @@ def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
     if isinstance(parsed, Problem):
         return [parsed]
     text, value = parsed
+    return set_value(scene, text, parse_value(value), COMMAND_LINE)
+
+
+def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
+    """Put a value at a dotted key of the scene's tables and return what is wrong with that.
+
+    Parameters
+    ----------
+    scene : SceneFile
+    text : str
+        The dotted key, for example ``blocks.traffic.intruders[0].east_m``.
+    value : object
+        As TOML would give it.
+    source : str
+        Where it was written, for messages.
+    """
     parts = text.replace("[", ".").replace("]", "").split(".")
     container: Any = scene.data
     key: list[str | int] = []
@@ -47,21 +63,21 @@ def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
         step = _step(container, part)
         if isinstance(step, str) and isinstance(container, list):
             message = f"there is no item {part!r}: the list has {len(container)} (from 0)"
-            return [Problem(COMMAND_LINE, text, message)]
+            return [Problem(source, text, message)]
         if key == ["blocks"] and step not in container:
             hint = did_you_mean(str(step), container)
-            return [Problem(COMMAND_LINE, text, f"the scene has no block {part!r}{hint}")]
+            return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
         key.append(step)
         if last:
-            container[step] = parse_value(value)
+            container[step] = value
         elif isinstance(container, dict) and step not in container:
             container[step] = {}
         elif not isinstance(container[step], dict | list):
-            return [Problem(COMMAND_LINE, text, f"{'.'.join(parts[: position + 1])} is no table")]
+            return [Problem(source, text, f"{'.'.join(parts[: position + 1])} is no table")]
         container = container[step]
     for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
         del scene.sources[source_key]
-    scene.sources[tuple(key)] = COMMAND_LINE
+    scene.sources[tuple(key)] = source
     return []
 
 

@@ -1,5 +1,6 @@
 """What pydantic found wrong with a table, said in a scene's own words."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,6 +44,11 @@ def explain(
             message = message.replace(
                 "a valid number, unable to parse string as a number", "a number"
             )
+            message = message.replace("a valid boolean, unable to interpret input", "true or false")
+            if item["type"] == "literal_error":
+                names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
+                close = nearest(str(item["input"]), names)
+                message += f"; did you mean {close!r}?" if close else ""
             problems.append(scene_file.problem(at, message, _shown(item["input"])))
     return problems
 

@@ -19,6 +19,8 @@ from dsa_des.component import Component
 from dsa_des.events import Bell, WakeUp
 from dsa_des.message import Message
 from dsa_des.processors import Processor
+from dsa_des.replica_time import ReplicaTime
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -45,11 +47,16 @@ class Demand:
     block: str
     clock: ScanClock
     lead_ticks: int = 0
+    replicas: ReplicaTime | None = None
 
     def between(self, start: int, end: int) -> IntArray:
         """Return the ticks in [start, end) at which this block needs a row."""
         _, ticks = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
-        return ticks - self.lead_ticks if self.lead_ticks else ticks
+        if not self.lead_ticks:
+            return ticks
+        if self.replicas is not None:  # rows from before a replica's start do not exist
+            ticks = ticks[ticks % self.replicas.span_ticks >= self.lead_ticks]
+        return ticks - self.lead_ticks
 
 
 @dataclass
@@ -161,7 +168,7 @@ class Node:
         ticks = [demand.between(start, end) for demand in self.demands]
         if len(ticks) == 1:
             return ticks[0]
-        return np.unique(np.concatenate(ticks)) if ticks else np.empty(0, dtype=np.int64)
+        return sorted_union(ticks) if ticks else np.empty(0, dtype=np.int64)
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -189,7 +196,7 @@ class Node:
             if len(own) == 0 and len(arrivals) == 1:
                 ticks = arrivals[0]
             else:
-                ticks = np.unique(np.concatenate([own, *arrivals]))
+                ticks = sorted_union([own, *arrivals])
             if len(own):
                 place = np.searchsorted(ticks, own)
                 numbered = np.full(len(ticks), -1, dtype=np.int64)
@@ -202,23 +209,29 @@ class Node:
 
     def _run(self, ticks: IntArray, scans: IntArray, start: int, end: int) -> None:
         held: dict[str, tuple[Message, IntArray]] = {}
-        late = 0
+        missing = np.zeros(len(ticks), dtype=bool)
         for port in self._held_ports:
             for channel in self.channels.get(port, []):
                 sample = channel.sample(ticks, end)
                 if sample is not None:
                     held[port] = sample
                 if self.component.inputs[port].required:
-                    missing = len(ticks) if sample is None else int((sample[1] < 0).sum())
-                    late = max(late, missing)
-        if late == len(ticks):
-            return
-        if late:  # rows are in order, so those before the first messages come first
-            ticks, scans = ticks[late:], scans[late:]
-            held = {port: (message, rows[late:]) for port, (message, rows) in held.items()}
+                    missing |= True if sample is None else sample[1] < 0
+        if missing.any():  # before the first messages
+            there = np.flatnonzero(~missing)
+            if len(there) == 0:
+                return
+            ticks, scans = ticks[there], scans[there]
+            held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
         arrived = {port: self._collect(port, end) for port in self._queue_ports}
         wake = Wake(
-            ticks, scans, self.simulation.ticks_per_s, held, arrived, self._rows_asked_for(ticks)
+            ticks,
+            scans,
+            self.simulation.ticks_per_s,
+            held,
+            arrived,
+            self._rows_asked_for(ticks),
+            self.simulation.span_ticks,
         )
         if self.simulation.trace is not None:
             self.simulation.trace += [(int(tick), self.name) for tick in ticks]

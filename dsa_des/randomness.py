@@ -8,6 +8,7 @@ nobody else's draws.
 
 from collections.abc import Callable
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -83,13 +84,18 @@ class Stream:
         key = key_of(seed, block, purpose)
         self._key = (key & 0xFFFFFFFF, key >> 32)
 
+    def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
+        """Return the generator's key, and the scan numbers that count."""
+        return self._key, scans
+
     def _words(
         self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int
     ) -> tuple[UInt64Array, UInt64Array, UInt64Array, UInt64Array]:
         if not 0 <= draw < 2**16:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
         target = np.asarray(targets, dtype=np.uint64)
-        scan = np.asarray(scans, dtype=np.int64).astype(np.uint64)
+        key, numbers = self._key_and_scan(np.asarray(scans, dtype=np.int64))
+        scan = numbers.astype(np.uint64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
         counter = (
             np.uint64(draw) | ((scan >> _32) & np.uint64(0xFFFF)) << np.uint64(16),
@@ -97,7 +103,7 @@ class Stream:
             target & _LOW,
             target >> _32,
         )
-        return philox4x32(counter, self._key)
+        return philox4x32(counter, key)
 
     def uniform(self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0) -> FloatArray:
         """Return uniform draws in [0, 1) with 53 bits, keyed by target, scan and draw number.

@@ -26,7 +26,7 @@ def find(type_name: str) -> type[Component]:
         If it cannot be imported or is not a `Component`.
     """
     if ":" in type_name:
-        found = _import(type_name)
+        found = import_named(type_name)
     else:
         point = registered().get(type_name)
         if point is None:
@@ -41,7 +41,14 @@ def find(type_name: str) -> type[Component]:
     return found
 
 
-def _import(type_name: str) -> Any:
+def import_named(type_name: str) -> Any:
+    """Return what ``module:Class`` names, also beside the working directory.
+
+    Raises
+    ------
+    UnknownType
+        If it cannot be imported.
+    """
     module_name, _, class_name = type_name.partition(":")
     # `module:Class` beside the user's scene is the common case; a console script, unlike
     # `python -m`, does not put the working directory on the path.

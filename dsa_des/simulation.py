@@ -20,7 +20,7 @@ import simpy
 from dsa_des.clock import ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.connections import connect
-from dsa_des.effects import Planned, plan
+from dsa_des.effects import Planned, plan, unspent
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.graph import depths, window_order
 from dsa_des.message import Message
@@ -29,11 +29,15 @@ from dsa_des.process import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
+from dsa_des.replica_time import ReplicaTime
+from dsa_des.rewind import Checkpoint, cut_loops, may_rewind
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
-CELLS_PER_WINDOW = 32768
+CELLS_PER_WINDOW = 131072
+# After something came back, a window starts at this part of its full length.
+_RESTART = 32
 
 
 @dataclass
@@ -121,24 +125,38 @@ class Simulation:
         self._window = window
         self._cuts = sorted(cuts)
         self._depth = depths(scene.graph)
+        queued = any(block.options.processor for block in scene.blocks.values())
+        self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
+        self._cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
+        self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
         self._offer_down_the_chain()
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
-        connect(scene, self.nodes)
+        connect(scene, self.nodes, self.replicas)
         self._window_ticks = self._window_length(window)
+
+    #: When replicas share this run (`dsa_des.lockstep`): how they lie on its timeline.
+    replicas: ReplicaTime | None = None
+
+    @property
+    def span_ticks(self) -> int:
+        """Ticks from one replica's start to the next; 0 for a single run."""
+        return 0 if self.replicas is None else self.replicas.span_ticks
 
     # -- building ------------------------------------------------------------------------------
 
+    def _make_streams(self) -> Streams:
+        return Streams(self.scene.seed)
+
     def _build_components(self, simulate_everything: bool) -> dict[str, Component]:
-        streams = Streams(self.scene.seed)
         components: dict[str, Component] = {}
         problems: list[Problem] = []
         for name, block in self.scene.blocks.items():
             context = Context(
-                streams,
+                self.streams,
                 self.ticks_per_s,
                 sections=self.scene.sections,
                 simulate_everything=simulate_everything,
@@ -193,6 +211,8 @@ class Simulation:
                 problems.append(self._problem(f"blocks.{name}", error))
                 continue
             planned += found
+            if not everything:
+                component.context.tolerance = unspent(found, self.scene.tolerance)
             component.context.effects = {
                 item.effect.name: effect if wrap is None else wrap(item, effect)
                 for item, effect in built.items()
@@ -222,7 +242,9 @@ class Simulation:
     def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
         graph = self.scene.graph
         windowed = set() if window == 1 else self.scene.look_ahead_blocks()
-        order = window_order(graph, windowed)
+        if self._rewinds:
+            windowed = set(self.components)
+        order = window_order(graph, windowed, self._cut_edges)
         processors = self._build_processors()
         shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
         nodes = {}
@@ -234,14 +256,17 @@ class Simulation:
             )
             by_name = base + number / (len(self.components) + 1)
             node = Node(self, component, name in windowed, _priority(base, by_name, shuffle))
-            spec = component.clock_of(component.p)
-            if spec is not None:
-                draw = component.context.streams.scan_normals(name, "clock jitter")
-                node.clock = ScanClock(spec, self.ticks_per_s, draw)
+            node.clock = self._clock(name, component)
             node.processor = processors.get(self.scene.blocks[name].options.processor or "")
-            node.on_demand = component.clocked == "demand" and spec is None
+            node.on_demand = component.clocked == "demand" and node.clock is None
             nodes[name] = node
         return nodes
+
+    def _clock(self, name: str, component: Component) -> ScanClock | None:
+        spec = component.clock_of(component.p)
+        if spec is None:
+            return None
+        return ScanClock(spec, self.ticks_per_s, self.streams.scan_normals(name, "clock jitter"))
 
     def _build_processors(self) -> dict[str, Processor]:
         """Start the shared processors of the scene."""
@@ -300,12 +325,13 @@ class Simulation:
             messages: list[type[Message]] = [output.message for output in outputs]
             if self.scene.processors:
                 messages.append(Processing)
-            self.recorder.open(messages, self.ticks_per_s)
+            self.recorder.open(messages, self.ticks_per_s, self.span_ticks)
         for node in self.nodes.values():
             node.start()
-        for window in self._windows(end):
-            self.window = window
-            self._run_window(*window)
+        for window in self._rewinding(end) if self._rewinds else self._windows(end):
+            if not self._rewinds:
+                self.window = window
+                self._run_window(*window)
             if self.recorder is not None:
                 self.recorder.advance(self.window[1])
             if progress is not None:
@@ -328,11 +354,58 @@ class Simulation:
             inner = [cut for cut in self._cuts if start < cut < stop]
             yield from pairwise([start, *inner, stop])
 
+    def _rewinding(self, end: int) -> Iterator[tuple[int, int]]:
+        """Run and yield windows in which nothing came back unseen (`dsa_des.rewind`)."""
+        feedback = [
+            channel
+            for node in self.nodes.values()
+            for wires in node.channels.values()
+            for channel in wires
+            if (channel.source, node.name) in self._cut_edges
+        ]
+        start, length = 0, self._window_ticks
+        came = 0  # when something came back last
+        while start < end:
+            stop = min(start + length, end, *(cut for cut in self._cuts if cut > start))
+            checkpoint = Checkpoint(self.nodes.values(), self.recorder, self.trace)
+            self.window = (start, stop)
+            self._run_window(start, stop)
+            early = checkpoint.earliest_since(feedback, stop)
+            if self._failure is not None and (early < stop or len(self.failed_at) > 1):
+                # What failed may never have happened: look less far.
+                self._failure = None
+                checkpoint.restore()
+                middle = int(self.failed_at[len(self.failed_at) // 2])
+                length = max(1, min(early, middle) - start)
+                continue
+            self._raise_failure()
+            if early < stop:
+                checkpoint.restore()
+                stop = early
+                self.window = (start, stop)
+                self._run_window(start, stop)
+                self._raise_failure()
+            coming = checkpoint.earliest_since(feedback, -1)
+            if coming < 0:
+                length = min(2 * length, self._window_ticks)
+            else:  # what comes back often comes regularly; at first, or after a hurry, start small
+                small = self._window_ticks // _RESTART
+                length = min(max(1, coming - came if came else small), self._window_ticks)
+                came = coming
+            yield start, stop
+            start = stop
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            failure, cause = self._failure
+            raise failure from cause
+
     def _run_window(self, start: int, end: int) -> None:
         for node in self.nodes.values():
             node.open_window(start, end)
         try:
-            self.env.run(until=end)
+            # A window that may be rewound leaves the clock at its start, where all of it runs.
+            self.env.run(until=None if self._rewinds else end)
         except Abort:
             if self._failure is None:
                 raise
@@ -345,11 +418,14 @@ class Simulation:
 
     def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
+        if self._failure is not None:
+            return  # a window that may be rewound goes on; the first failure counts
         self.failed_at = ticks
         time_s = int(ticks[0]) / self.ticks_per_s
         failure = _failure(node.name, type(node.component), time_s, error, scan)
         self._failure = (failure, error)
-        raise Abort
+        if not self._rewinds:
+            raise Abort
 
 
 def _failure(

@@ -18,7 +18,7 @@ def _table(table: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) ->
     nested = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     for key, value in table.items():
         if key not in nested:
-            lines.append(f"{_key(key)} = {_value(value)}")
+            lines.append(f"{_key(key)} = {inline(value)}")
     for key, value in nested.items():
         inner = (*path, key)
         lines += ["", f"[{'.'.join(_key(part) for part in inner)}]"]
@@ -33,7 +33,8 @@ def _text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _value(value: Any) -> str:
+def inline(value: Any) -> str:
+    """Return one value as TOML text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -41,10 +42,10 @@ def _value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Mapping):
-        items = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
+        items = ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items())
         return f"{{{items}}}" if items else "{}"
     if isinstance(value, list | tuple):
-        texts = [_value(item) for item in value]
+        texts = [inline(item) for item in value]
         if sum(map(len, texts)) > 80:
             return "[\n" + "".join(f"  {text},\n" for text in texts) + "]"
         return f"[{', '.join(texts)}]"

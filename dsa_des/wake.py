@@ -43,6 +43,9 @@ class Wake:
         For queued inputs, and for inputs with many writers: the new rows of each wire.
     demand : mapping
         For each clocked block downstream: the rows of this wake at which it scans.
+    span_ticks : int
+        When replicas run in lock step: ticks from the start of one to the start of the next
+        (`dsa_des.replica_time`); 0 otherwise.
     """
 
     def __init__(
@@ -53,6 +56,7 @@ class Wake:
         held: Mapping[str, tuple[Any, IntArray]],
         arrived: Mapping[str, list[Arrivals]],
         demand: Mapping[str, IntArray] | None = None,
+        span_ticks: int = 0,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -60,6 +64,7 @@ class Wake:
         self._held = held
         self._arrived = arrived
         self.demand = demand or {}
+        self.span_ticks = span_ticks
 
     def __len__(self) -> int:
         return len(self.ticks)
@@ -67,7 +72,13 @@ class Wake:
     @property
     def time_s(self) -> FloatArray:
         """Time of each row since the start of the run, s."""
-        return self.ticks / self.ticks_per_s
+        ticks = self.ticks % self.span_ticks if self.span_ticks else self.ticks
+        return ticks / self.ticks_per_s
+
+    @property
+    def replica(self) -> IntArray:
+        """Replica of each row, in order; 0 when only one runs."""
+        return self.ticks // self.span_ticks if self.span_ticks else np.zeros_like(self.ticks)
 
     def held(self, port: str) -> tuple[Any, IntArray] | None:
         """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""

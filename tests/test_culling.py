@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
@@ -61,7 +62,7 @@ def flights(count: int, seed: int) -> list[ScriptedTrajectory]:
 def test_whoever_comes_in_reach_is_active(seed: int) -> None:
     targets = flights(60, seed)
     fleet = ScriptedFleet(targets)
-    culling = Culling(OWN, targets, fleet, ScriptedFleet, 15_000.0)
+    culling = Culling(OWN, targets, fleet, 15_000.0, 320.0)
     left_out = 0
     for start in np.arange(0, 300, 7.3):
         times = np.linspace(start, start + 13.0, 60)
@@ -77,6 +78,53 @@ def test_whoever_comes_in_reach_is_active(seed: int) -> None:
         # The few are moved exactly as they would be among all.
         np.testing.assert_array_equal(subset.at(times).lat_deg, all_states.lat_deg[:, columns])
     assert left_out > 500
+
+
+def test_intervals_are_those_of_entry_and_exit() -> None:
+    targets, reach = flights(80, 11), 15_000.0
+    found = Culling(OWN, targets, ScriptedFleet(targets), reach, 400.0).intervals
+    times = np.arange(0, 400, 0.05)
+    own, states = OWN.at(times), ScriptedFleet(targets).at(times)
+    _, _, range_m = line_of_sight(
+        own.lat_deg[:, None], own.lon_deg[:, None], own.alt_m[:, None],
+        states.lat_deg, states.lon_deg, states.alt_m,
+    )  # fmt: skip
+    covered = np.zeros(range_m.shape, dtype=bool)
+    for target, start, end in zip(found.target, found.start_s, found.end_s, strict=True):
+        inside = (times >= start) & (times <= end)
+        covered[inside, target] = True
+        # Each interval has a moment, within the finest step of its ends, at the very edge.
+        for edge in (start, end):
+            if 0 < edge < 400:
+                near_edge = np.abs(times - edge) <= 0.6
+                assert np.min(np.abs(range_m[near_edge, target] - reach)) < 300 * 0.6
+    assert covered[range_m <= reach].all()
+    spare = covered & (range_m > reach + 2.0)
+    assert 0 < spare.sum() * 0.05 < len(found.target) * 1.2
+    assert found.most_at_once() == covered.sum(axis=1).max()
+
+
+def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
+    def flight(name: str, start: float, end: float | None) -> ScriptedTrajectory:
+        return ScriptedTrajectory(
+            name, lat_deg=52, lon_deg=4, alt_m=900, start_time_s=start, end_time_s=end
+        )
+
+    targets = [flight("early", 0, 20), flight("late", 70, None), flight("always", 0, None)]
+    culling = Culling(flight("own", 0, 60), targets, ScriptedFleet(targets), 1000.0, 100.0)
+    assert culling.intervals.target.tolist() == [0, 2]
+    assert culling.intervals.end_s == pytest.approx([20, 60], abs=0.6)
+    none = Culling(OWN, [], ScriptedFleet([]), 1000.0, 100.0)
+    assert len(none.active(0, 100)[0]) == 0 == none.intervals.most_at_once()
+
+
+def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:
+    beside = ScriptedTrajectory.from_offset(
+        "beside", east_m=15_000, north_m=0, up_m=0, reference=(52.0, 4.0, 1000.0), speed_mps=50
+    )
+    culling = Culling(OWN, [beside], ScriptedFleet([beside]), 15_000.0, 86_400.0)
+    assert len(culling.intervals.target) < 200
+    assert culling.active(40_000, 40_001)[0].tolist() == [0]
 
 
 def test_speed_bounds_hold_for_sampled_flights() -> None:
@@ -167,3 +215,12 @@ def test_culling_changes_nothing_but_the_counts(
         again, _ = run(window=window)
         for name in ("detections", "fused", "tracks"):
             assert planned[name].equals(again[name]), (name, window)
+
+
+def test_keys_of_draws_are_made_for_those_who_are_drawn_for() -> None:
+    roster = Roster.of([(f"t{i}", Aircraft()) for i in range(50)])
+    some = np.array([7, 3, 7, 49])
+    keys = roster.keys_of(some)
+    assert "keys" not in vars(roster)
+    np.testing.assert_array_equal(roster.keys_of(np.array([3, 4])), roster.keys[[3, 4]])
+    np.testing.assert_array_equal(keys, roster.keys[some])

@@ -14,7 +14,7 @@ from components.atmosphere.standard_atmosphere import (
     SEA_LEVEL_VAPOUR_DENSITY_G_M3,
     standard_atmosphere,
 )
-from components.radar.inputs import FloatArray, as_numbers, not_negative, refuse
+from components.checks import FloatArray, as_numbers, not_negative, refuse
 
 BOTTOM_M = -1_000.0
 TOP_M = 40_000.0

@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from components.atmosphere.inputs import checked_frequency, within
-from components.radar.inputs import broadcast_flat, not_negative, unflatten
+from components.checks import broadcast_flat, not_negative, unflatten
 
 HIGHEST_FREQUENCY_HZ = 200e9
 

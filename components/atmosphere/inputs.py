@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import FloatArray, as_numbers, refuse
+from components.checks import FloatArray, as_numbers, refuse
 
 LOWEST_FREQUENCY_HZ = 1e9
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from components.atmosphere.inputs import checked_frequency, within
 from components.atmosphere.recommendation_tables import rows
-from components.radar.inputs import FloatArray, broadcast_flat, not_negative, one_of, unflatten
+from components.checks import FloatArray, broadcast_flat, not_negative, unflatten
+from components.radar.inputs import one_of
 
 HIGHEST_FREQUENCY_HZ = 1e12
 

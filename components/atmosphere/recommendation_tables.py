@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.radar.inputs import FloatArray
+from components.checks import FloatArray
 
 _FOLDER = Path(__file__).parent / "data"
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
 from components.optical.contrast import KOSCHMIEDER
-from components.radar.inputs import as_numbers, broadcast_flat, not_negative, refuse, unflatten
 
 __all__ = [
     "combined_visibility_m",

@@ -1,15 +1,13 @@
 """Drawing a run's figures without a window system, the same bytes on every drawing."""
 
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dsa_des.drawing import DPI, drawing
+
 if TYPE_CHECKING:
     from dsa_des.simulation import Simulation
-
-DPI = 110
 
 #: Okabe and Ito's colours, told apart with any kind of colour vision, each with its marker and
 #: its size in points. Sensors see the same target in the same place: big open marks first and
@@ -70,40 +68,9 @@ def mark_of(style: tuple[str, str, float]) -> dict[str, Any]:
     }
 
 
-@contextmanager
-def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG when the block is done.
-
-    Neither the user's matplotlibrc nor the date goes into it.
-    """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(
-            {
-                "font.size": 9,
-                "axes.titlesize": 10,
-                "axes.spines.top": False,
-                "axes.spines.right": False,
-                "legend.fontsize": 8,
-                "legend.framealpha": 0.9,
-                "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-            }
-        )
-        figure = Figure(figsize=(width_in, height_in), dpi=DPI)
-        canvas = FigureCanvasAgg(figure)
-        yield figure
-        with warnings.catch_warnings():
-            # Names may hold letters that the font lacks; they are drawn as boxes.
-            warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            canvas.print_png(
-                str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
-            )
-
-
 def plain(label: str) -> str:
     """Return a label that Matplotlib shows: it leaves those that begin with ``_`` out."""
     return f" {label}" if label.startswith("_") else label
+
+
+__all__ = ["DPI", "STYLES", "draw", "drawing", "mark_of", "plain", "style_of"]

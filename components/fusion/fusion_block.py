@@ -22,6 +22,8 @@ class Fusion(Component):
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     windowed = True
+    lockstep = True
+    rewindable = True
 
     def setup(self) -> None:
         """Rank the sensors."""
@@ -44,6 +46,10 @@ class Fusion(Component):
         ]
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
         self._recent: dict[str, Arrivals] = {}
+
+    def serves_replicas(self) -> bool:
+        """Say no to a gate that would reach from one replica into the one before."""
+        return super().serves_replicas() and self.window_s() <= self.context.duration_s
 
     def window_s(self) -> Any:
         """Return how old a detection may be and still be put together with a new one, s."""

@@ -13,6 +13,7 @@ from components.fusion.ladder import FUSION
 from components.messages import FusedDetections
 from components.true_entries import true_entries
 from dsa_des.component import NonNegativeRational, Parameters
+from dsa_des.sorted_union import sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -55,7 +56,7 @@ class PickBest(Fusion):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = np.unique(np.concatenate(keys))
+        union = sorted_union(keys)
         row, target = np.divmod(union, width)
         if self.gate_ticks:
             arrivals = self.with_recent(arrivals)

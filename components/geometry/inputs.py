@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from components.checks import FloatArray, as_numbers, common_shape
 
 LARGEST = 1e150
 """Largest size of a number we accept: its square still fits in a double, so nothing overflows."""
@@ -20,10 +20,7 @@ def contiguous(name: str, value: npt.ArrayLike) -> FloatArray:
     Contiguous because NumPy's loops over sin, cos or arctan2 may take another code path, with
     other last bits, when they step through memory with a stride.
     """
-    try:
-        return np.asarray(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {value!r}: it must be a number or an array of them") from error
+    return np.asarray(as_numbers(name, value), order="C")
 
 
 def require_between(name: str, array: FloatArray, low: float, high: float, allowed: str) -> None:
@@ -59,15 +56,6 @@ def finite(name: str, value: npt.ArrayLike) -> FloatArray:
     array = contiguous(name, value)
     require_between(name, array, -LARGEST, LARGEST, f"be finite and within ±{LARGEST:g}")
     return array
-
-
-def common_shape(**arrays: FloatArray) -> tuple[int, ...]:
-    """Return the shape that the named arrays broadcast to."""
-    try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
-    except ValueError as error:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"shapes do not broadcast together: {shapes}") from error
 
 
 def shaped(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[FloatArray, ...]:

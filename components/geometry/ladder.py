@@ -99,5 +99,4 @@ ATTITUDE = Ladder(
     QUANTITIES,
     measure,
     truth,
-    clears=("model",),
 )  # fmt: skip

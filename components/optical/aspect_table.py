@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import FloatArray, as_finite, flatten_together, require, unflatten
+from components.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
 
 _SQUARE_FOOT_M2 = 0.3048**2
 
@@ -57,10 +57,10 @@ class AspectTable:
     area_m2: FloatArray
 
     def __post_init__(self) -> None:
-        azimuth = as_finite("azimuth_deg", self.azimuth_deg)
-        elevation = as_finite("elevation_deg", self.elevation_deg)
-        area = as_finite("area_m2", self.area_m2)
-        require("area_m2", area, area >= 0.0, "0 or more")
+        azimuth = finite("azimuth_deg", self.azimuth_deg)
+        elevation = finite("elevation_deg", self.elevation_deg)
+        area = finite("area_m2", self.area_m2)
+        refuse("area_m2", area, ~(area >= 0.0), "be 0 or more")
         if azimuth.ndim != 1 or azimuth.size < 3:
             raise ValueError(
                 f"azimuth_deg has shape {azimuth.shape}: it must hold at least 3 azimuths"
@@ -106,15 +106,15 @@ class AspectTable:
         ValueError
             If a direction is not finite or an elevation lies beyond the poles.
         """
-        elevation = as_finite("elevation_rad", elevation_rad)
-        require(
+        elevation = finite("elevation_rad", elevation_rad)
+        refuse(
             "elevation_rad",
             elevation,
-            np.abs(elevation) <= 0.5 * np.pi + 1e-12,
-            "between -pi/2 and pi/2",
+            ~(np.abs(elevation) <= 0.5 * np.pi + 1e-12),
+            "be between -pi/2 and pi/2",
         )
-        shape, (azimuth, elevation) = flatten_together(
-            azimuth_rad=as_finite("azimuth_rad", azimuth_rad), elevation_rad=elevation
+        shape, (azimuth, elevation) = broadcast_flat(
+            azimuth_rad=finite("azimuth_rad", azimuth_rad), elevation_rad=elevation
         )
         first = self.azimuth_deg[0]
         # Turn into [first node, first node + 360); rounding may land on the far end, which is the
@@ -157,10 +157,10 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
     ValueError
         If a node is missing (the first one is named), contradicts itself, or is out of range.
     """
-    azimuth = as_finite("azimuth_deg", azimuth_deg).ravel()
-    elevation = as_finite("elevation_deg", elevation_deg).ravel()
-    area = as_finite("area_m2", area_m2).ravel()
-    require("el_deg", elevation, np.abs(elevation) <= 90.0, "between -90 and 90")
+    azimuth = finite("azimuth_deg", azimuth_deg).ravel()
+    elevation = finite("elevation_deg", elevation_deg).ravel()
+    area = finite("area_m2", area_m2).ravel()
+    refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
     turned = np.mod(azimuth, 360.0)
     turned = np.where(turned >= 360.0, 0.0, turned)
     nodes: dict[tuple[float, float], float] = {}

@@ -15,6 +15,7 @@ from dsa_des.types import FloatArray
 class Background(Effect):
     """Contrast of the painted target against sky or ground under the scene's sun."""
 
+    lockstep = True
     name = "background and sun"
     acts_on = "contrast"
     # There is no sun under which every target's contrast against its background is exactly 1.

@@ -27,6 +27,11 @@ class CameraParameters(SensorParameters):
     threshold: float = Field(default=1.0, description="Signature needed for a detection (eq. 19).")
     static_weight: float = Field(default=0.3, ge=0, description="Weight a of eq. 18, per pixel.")
     dynamic_weight: float = Field(default=0.0, ge=0, description="Weight b of eq. 18, s/rad.")
+    model: Literal["auto"] | None = Field(
+        default=None,
+        description="'auto' would pick a cheaper `silhouette` by its error; no bound is proven, so "
+        "it stays, and `explain` says so.",
+    )
     silhouette: Literal[
         "exact", "thesis", "convex_hull", "aspect_table", "sampled_table", "mesh"
     ] = Field(
@@ -87,15 +92,28 @@ class Camera(Sensor):
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
+    def exact_because(self) -> str:
+        """A rate divides the change of an error from scan to scan by the scan's period."""
+        if not self._signatures:
+            return ""
+        weight = self.p.dynamic_weight
+        return f"{self.name} weighs the line of sight's rate (dynamic_weight is {weight:g})"
+
     def left_out(self) -> list[str]:
-        """Say beyond which range nothing can reach the threshold."""
-        if self.reach.range_max_m >= self.stated_reach.range_max_m:
-            return []
-        range_km = self.reach.range_max_m / 1000.0
-        return [
-            f"targets beyond {range_km:.2f} km: not looked at, even the largest of them, seen from "
-            "its largest side, cannot reach the threshold there"
-        ]
+        """Say beyond which range nothing can reach the threshold, and what `auto` came to."""
+        said = []
+        if self.reach.range_max_m < self.stated_reach.range_max_m:
+            range_km = self.reach.range_max_m / 1000.0
+            said.append(
+                f"targets beyond {range_km:.2f} km: not looked at, even the largest of them, seen "
+                "from its largest side, cannot reach the threshold there"
+            )
+        if self.p.model == "auto":
+            said.append(
+                f"silhouette: {self.p.silhouette}, as the scene says: for no other model is an "
+                "error bound proven"
+            )
+        return said
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell, m²."""

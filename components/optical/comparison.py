@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from components.optical.arrays import FloatArray
+from components.checks import FloatArray
 
 # Called with relative heading, pitch, roll and elevation in radians (flat arrays), gives m²:
 # `visible_area` with its areas, table or mesh filled in.

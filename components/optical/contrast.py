@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import flatten_together, non_negative, positive, unflatten
+from components.checks import broadcast_flat, not_negative, positive, unflatten
 from components.optical.line_of_sight_rate import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
 
@@ -76,7 +76,7 @@ def contrast_gain(
     """
     if model not in ("constant", "daylight"):
         raise ValueError(f"model is {model!r}: it must be 'constant' or 'daylight'")
-    gain = non_negative("contrast", contrast)
+    gain = not_negative("contrast", contrast)
     if model == "daylight":
         target = target_luminance(
             azimuth_rad,
@@ -97,7 +97,7 @@ def contrast_gain(
             background=background,
         )
         from_sun = angle_between(azimuth_rad, elevation_rad, sun_azimuth_rad, sun_elevation_rad)
-        blinded = from_sun < non_negative("sun_exclusion_rad", sun_exclusion_rad)
+        blinded = from_sun < not_negative("sun_exclusion_rad", sun_exclusion_rad)
         gain = gain * np.where(blinded, 0.0, inherent_contrast(target, behind))
     shape = np.broadcast_shapes(
         np.shape(gain), np.shape(azimuth_rad), np.shape(elevation_rad), np.shape(range_m)
@@ -130,8 +130,8 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
     ValueError
         If the range is negative, the visibility not above 0, or either not finite.
     """
-    shape, (distance, visibility) = flatten_together(
-        range_m=non_negative("range_m", range_m),
+    shape, (distance, visibility) = broadcast_flat(
+        range_m=not_negative("range_m", range_m),
         visibility_m=positive("visibility_m", visibility_m),
     )
     # From 200 visibilities on nothing is left that a double could hold.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import as_finite, flatten_together, require, unflatten
+from components.checks import broadcast_flat, finite, refuse, unflatten
 
 #: AFRL flight tests with a Beech Bonanza (thesis section 2.4.1): 0.045 % and 0.01 %, read as the
 #: probability of a false detection per frame (assumption).
@@ -38,9 +38,9 @@ def false_alarm_in_frame(uniform: ArrayLike, false_alarm_probability: ArrayLike)
         If an argument is out of range or not finite.
     """
     draws = _unit("uniform", uniform)
-    probability = as_finite("false_alarm_probability", false_alarm_probability)
+    probability = finite("false_alarm_probability", false_alarm_probability)
     allowed = (probability >= 0.0) & (probability <= 1.0)
-    require("false_alarm_probability", probability, allowed, "in [0, 1]")
+    refuse("false_alarm_probability", probability, ~allowed, "be in [0, 1]")
     return draws < probability
 
 
@@ -77,14 +77,16 @@ def false_alarm_direction(
     -----
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """
-    width = as_finite("azimuth_width_rad", azimuth_width_rad)
+    width = finite("azimuth_width_rad", azimuth_width_rad)
     good = (width > 0.0) & (width <= 2.0 * np.pi * (1.0 + 1e-12))
-    require("azimuth_width_rad", width, good, "in (0, 2π]")
-    lowest = as_finite("lowest_elevation_rad", lowest_elevation_rad)
-    highest = as_finite("highest_elevation_rad", highest_elevation_rad)
-    require("highest_elevation_rad", highest, highest >= lowest, "at least the lowest elevation")
-    start = as_finite("azimuth_start_rad", azimuth_start_rad)
-    shape, (across, upwards) = flatten_together(
+    refuse("azimuth_width_rad", width, ~good, "be in (0, 2π]")
+    lowest = finite("lowest_elevation_rad", lowest_elevation_rad)
+    highest = finite("highest_elevation_rad", highest_elevation_rad)
+    refuse(
+        "highest_elevation_rad", highest, ~(highest >= lowest), "be at least the lowest elevation"
+    )
+    start = finite("azimuth_start_rad", azimuth_start_rad)
+    shape, (across, upwards) = broadcast_flat(
         azimuth_uniform=_unit("azimuth_uniform", azimuth_uniform),
         elevation_uniform=_unit("elevation_uniform", elevation_uniform),
     )
@@ -94,6 +96,6 @@ def false_alarm_direction(
 
 
 def _unit(name: str, value: ArrayLike) -> Any:
-    array = as_finite(name, value)
-    require(name, array, (array >= 0.0) & (array < 1.0), "in [0, 1)")
+    array = finite(name, value)
+    refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "be in [0, 1)")
     return array

@@ -19,6 +19,7 @@ _NO_TARGET = np.uint64(0)
 class FrameFalseAlarms(Effect):
     """At most one false alarm per frame, anywhere in the picture."""
 
+    lockstep = True
     name = "false alarms"
     acts_on = "report"
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import angle, flatten_together, non_negative, unflatten
+from components.checks import broadcast_flat, not_negative, unflatten
+from components.optical.arrays import angle
 from components.optical.silhouette import visible_area
 from components.optical.silhouette_exact import line_of_sight_in_target_axes
 
@@ -59,13 +60,13 @@ def plume_area(
             f"engine is {engine!r}: it must be one of {', '.join(PLUME_SHARE_OF_BACK)}"
         )
     share = PLUME_SHARE_OF_BACK[engine] if plume_share_of_back is None else plume_share_of_back
-    shape, (heading, pitch, roll, elevation, back, shares) = flatten_together(
+    shape, (heading, pitch, roll, elevation, back, shares) = broadcast_flat(
         relative_heading_rad=angle("relative_heading_rad", relative_heading_rad),
         pitch_rad=angle("pitch_rad", pitch_rad),
         roll_rad=angle("roll_rad", roll_rad),
         elevation_rad=angle("elevation_rad", elevation_rad),
-        back_m2=non_negative("back_m2", back_m2),
-        plume_share_of_back=non_negative("plume_share_of_back", share),
+        back_m2=not_negative("back_m2", back_m2),
+        plume_share_of_back=not_negative("plume_share_of_back", share),
     )
     cos_off_nose, _, _, _ = line_of_sight_in_target_axes(heading, pitch, roll, elevation)
     return unflatten(shares * back * np.clip(0.5 + 0.5 * cos_off_nose, 0.0, 1.0), shape)

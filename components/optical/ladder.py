@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from components.ladder_values import over_cells
-from components.optical.arrays import flatten_together
 from components.optical.convex_hull import union_area
 from components.sensor import Cells
 from dsa_des.component import Component
@@ -58,11 +57,11 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         roster = cells.roster
         names = ["front_m2", "side_m2", "horizontal_m2"]
         names += ["back_m2"] if camera.areas == "ir" else []
-        _, angles = flatten_together(
-            heading=cells.relative_heading_rad,
-            pitch=cells.target_pitch_rad,
-            roll=cells.target_roll_rad,
-            elevation=cells.elevation_rad,
+        angles = (
+            cells.relative_heading_rad,
+            cells.target_pitch_rad,
+            cells.target_roll_rad,
+            cells.elevation_rad,
         )
         bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
         wide = [array.astype(np.longdouble) for array in (*angles, *bodies)]

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import angle, flatten_together, positive, unflatten
+from components.checks import broadcast_flat, positive, unflatten
+from components.optical.arrays import angle
 
 
 def angle_between(
@@ -37,7 +38,7 @@ def angle_between(
     ValueError
         If an angle is not finite.
     """
-    shape, flat = flatten_together(
+    shape, flat = broadcast_flat(
         first_azimuth_rad=angle("first_azimuth_rad", first_azimuth_rad),
         first_elevation_rad=angle("first_elevation_rad", first_elevation_rad),
         second_azimuth_rad=angle("second_azimuth_rad", second_azimuth_rad),
@@ -113,7 +114,7 @@ def line_of_sight_rate(
         "previous_elevation_rad", np.where(seen, _floats(previous_elevation_rad), 0.0)
     )
     interval = positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
-    shape, (p, q, p_before, q_before, time, seen_flag) = flatten_together(
+    shape, (p, q, p_before, q_before, time, seen_flag) = broadcast_flat(
         azimuth_rad=azimuth,
         elevation_rad=elevation,
         previous_azimuth_rad=previous_azimuth,

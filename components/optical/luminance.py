@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import (
+from components.checks import (
     FloatArray,
-    angle,
-    as_finite,
-    flatten_together,
-    non_negative,
+    broadcast_flat,
+    finite,
+    not_negative,
     positive,
-    require,
+    refuse,
     unflatten,
 )
+from components.optical.arrays import angle
 from components.optical.line_of_sight_rate import angle_between
 from components.optical.sun_and_sky import (
     beam_illuminance,
@@ -48,7 +48,7 @@ def inherent_contrast(target_cd_m2: ArrayLike, background_cd_m2: ArrayLike) -> A
     ValueError
         If a luminance is out of range or not finite.
     """
-    target = non_negative("target_cd_m2", target_cd_m2)
+    target = not_negative("target_cd_m2", target_cd_m2)
     behind = positive("background_cd_m2", background_cd_m2)
     return np.abs(target - behind) / behind
 
@@ -99,9 +99,9 @@ def target_luminance(
     -----
     Phase function of the Lambert sphere (classical, Lambert 1760), with the phase angle pi - χ.
     """
-    paint = as_finite("paint_reflectance", paint_reflectance)
-    require("paint_reflectance", paint, (paint >= 0.0) & (paint <= 1.0), "between 0 and 1")
-    shape, (azimuth, elevation, sun_azimuth, sun_elevation, rho, ground) = flatten_together(
+    paint = finite("paint_reflectance", paint_reflectance)
+    refuse("paint_reflectance", paint, ~((paint >= 0.0) & (paint <= 1.0)), "be between 0 and 1")
+    shape, (azimuth, elevation, sun_azimuth, sun_elevation, rho, ground) = broadcast_flat(
         azimuth_rad=angle("azimuth_rad", azimuth_rad),
         elevation_rad=angle("elevation_rad", elevation_rad),
         sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),
@@ -155,7 +155,7 @@ def background_luminance(
         raise ValueError(
             f"background is {background!r}: it must be one of {', '.join(BACKGROUNDS)}"
         )
-    shape, (azimuth, elevation, sun_azimuth, sun_elevation, ground) = flatten_together(
+    shape, (azimuth, elevation, sun_azimuth, sun_elevation, ground) = broadcast_flat(
         azimuth_rad=angle("azimuth_rad", azimuth_rad),
         elevation_rad=angle("elevation_rad", elevation_rad),
         sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),
@@ -170,9 +170,9 @@ def background_luminance(
 
 
 def _ground(ground_reflectance: ArrayLike) -> FloatArray:
-    ground = as_finite("ground_reflectance", ground_reflectance)
+    ground = finite("ground_reflectance", ground_reflectance)
     allowed = (ground > 0.0) & (ground <= 1.0)
-    require("ground_reflectance", ground, allowed, "above 0 and at most 1")
+    refuse("ground_reflectance", ground, ~allowed, "be above 0 and at most 1")
     return ground
 
 

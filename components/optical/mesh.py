@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.optical.arrays import FloatArray, as_finite
+from components.checks import FloatArray, finite
 from components.optical.aspect_table import AspectTable
 
 DEFAULT_ROWS = 1024
@@ -52,7 +52,7 @@ class TriangleMesh:
     is_convex: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
-        vertices = as_finite("vertices_m", self.vertices_m)
+        vertices = finite("vertices_m", self.vertices_m)
         faces = np.asarray(self.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise ValueError(f"vertices_m has shape {vertices.shape}: it must be (n, 3)")
@@ -100,7 +100,7 @@ class TriangleMesh:
         -------
         array of that shape, m²
         """
-        u = np.stack(np.broadcast_arrays(as_finite("u_x", u_x), u_y, u_z), axis=-1)
+        u = np.stack(np.broadcast_arrays(finite("u_x", u_x), u_y, u_z), axis=-1)
         shape = u.shape[:-1]
         corners = self.vertices_m[self.faces]
         crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

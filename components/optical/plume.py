@@ -15,6 +15,7 @@ from dsa_des.types import FloatArray
 class Plume(Effect):
     """Each aircraft's exhaust plume by its engine; those without one are not computed."""
 
+    lockstep = True
     name = "plume"
     acts_on = "area"
 

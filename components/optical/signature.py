@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import (
-    as_finite,
-    flatten_together,
-    non_negative,
-    positive,
-    unflatten,
-)
+from components.checks import broadcast_flat, finite, not_negative, positive, unflatten
 from components.optical.line_of_sight_rate import line_of_sight_rate
 
 __all__ = [
@@ -63,9 +57,9 @@ def pixels_covered(
         If an argument is not finite, an area or range is negative, or a pixel size or count is
         not above 0.
     """
-    shape, (area, distance, across, upward, most) = flatten_together(
-        area_m2=non_negative("area_m2", area_m2),
-        range_m=non_negative("range_m", range_m),
+    shape, (area, distance, across, upward, most) = broadcast_flat(
+        area_m2=not_negative("area_m2", area_m2),
+        range_m=not_negative("range_m", range_m),
         pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
         pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
         sensor_pixels=positive("sensor_pixels", sensor_pixels),
@@ -114,10 +108,10 @@ def total_signature(
         If an argument is negative or not finite.
     """
     return (
-        non_negative("static_weight", static_weight)
-        * non_negative("pixels", pixels)
-        * non_negative("contrast_gain", contrast_gain)
-    ) + non_negative("dynamic_weight", dynamic_weight) * non_negative("rate_rad_s", rate_rad_s)
+        not_negative("static_weight", static_weight)
+        * not_negative("pixels", pixels)
+        * not_negative("contrast_gain", contrast_gain)
+    ) + not_negative("dynamic_weight", dynamic_weight) * not_negative("rate_rad_s", rate_rad_s)
 
 
 def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
@@ -140,7 +134,7 @@ def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
     ValueError
         If an argument is not finite.
     """
-    return as_finite("signature", signature) - as_finite("threshold", threshold)
+    return finite("signature", signature) - finite("threshold", threshold)
 
 
 def detection_range(
@@ -185,14 +179,14 @@ def detection_range(
     Thesis eq. 14, 15, 18 and 19 solved for R; errata 10 and 23.
     """
     pixels = np.float64(1.0) if sensor_pixels is None else positive("sensor_pixels", sensor_pixels)
-    shape, flat = flatten_together(
-        area_m2=non_negative("area_m2", area_m2),
+    shape, flat = broadcast_flat(
+        area_m2=not_negative("area_m2", area_m2),
         pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
         pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
-        contrast_gain=non_negative("contrast_gain", contrast_gain),
-        static_weight=non_negative("static_weight", static_weight),
-        dynamic_signature=non_negative("dynamic_signature", dynamic_signature),
-        threshold=as_finite("threshold", threshold),
+        contrast_gain=not_negative("contrast_gain", contrast_gain),
+        static_weight=not_negative("static_weight", static_weight),
+        dynamic_signature=not_negative("dynamic_signature", dynamic_signature),
+        threshold=finite("threshold", threshold),
         sensor_pixels=np.asarray(pixels),
     )
     area, across, upward, gain, weight, dynamic, level, most = flat

@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import (
-    FloatArray,
-    angle,
-    flatten_together,
-    non_negative,
-    unflatten,
-)
+from components.checks import FloatArray, broadcast_flat, not_negative, unflatten
+from components.optical.arrays import angle
 from components.optical.convex_hull import union_area
 from components.optical.silhouette_exact import exact_area, line_of_sight_in_target_axes
 from components.optical.silhouette_thesis import thesis_area
@@ -118,10 +113,10 @@ def visible_area(
     ):
         if value is None:
             raise ValueError(f"{name} is missing: model {model!r} needs it, in square metres")
-        areas[name] = non_negative(name, value)
+        areas[name] = not_negative(name, value)
     if back_m2 is not None:
-        areas["back_m2"] = non_negative("back_m2", back_m2)
-    shape, flat = flatten_together(**angles, **areas)
+        areas["back_m2"] = not_negative("back_m2", back_m2)
+    shape, flat = broadcast_flat(**angles, **areas)
     heading, pitch, roll, elevation, front, side, horizontal = flat[:7]
     back = flat[7] if back_m2 is not None else None
     area = _PARAMETRIC[model](heading, pitch, roll, elevation, front, side, horizontal, back)
@@ -135,7 +130,7 @@ def _measured_area(
     mesh: TriangleMesh | None,
 ) -> Any:
     """Look the area up in a table or project the mesh."""
-    shape, flat = flatten_together(**angles)
+    shape, flat = broadcast_flat(**angles)
     u_x, u_y, u_z, _ = line_of_sight_in_target_axes(*flat)
     if mesh is not None and model == "convex_hull":
         return unflatten(mesh.projected_area(u_x, u_y, u_z), shape)

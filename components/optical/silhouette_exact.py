@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from components.optical.arrays import FloatArray
+from components.checks import FloatArray
 
 
 def line_of_sight_in_target_axes(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.optical.arrays import FloatArray, angle, flatten_together, require, unflatten
+from components.checks import FloatArray, broadcast_flat, refuse, unflatten
+from components.optical.arrays import angle
 from components.optical.line_of_sight_rate import angle_between
 
 # Illuminance of the sun's beam outside the atmosphere, lux (IES RP-21, 1984).
@@ -75,7 +76,7 @@ def daylight_sun(sun_elevation_rad: ArrayLike) -> FloatArray:
     """
     sun = angle("sun_elevation_rad", sun_elevation_rad)
     up = (sun > 0.0) & (sun <= 0.5 * np.pi + 1e-12)
-    require("sun_elevation_rad", sun, up, "above 0 and at most pi/2 (daylight models)")
+    refuse("sun_elevation_rad", sun, ~up, "be above 0 and at most pi/2 (daylight models)")
     return sun
 
 
@@ -104,7 +105,7 @@ def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
     IES RP-21 (1984), sea level.
     """
     extinction = find_sky(sky).beam_extinction
-    shape, (sun,) = flatten_together(sun_elevation_rad=daylight_sun(sun_elevation_rad))
+    shape, (sun,) = broadcast_flat(sun_elevation_rad=daylight_sun(sun_elevation_rad))
     if extinction is None:
         return unflatten(np.zeros_like(sun), shape)
     air_mass = 1.0 / np.maximum(np.sin(sun), _SMALLEST_SINE)
@@ -134,7 +135,7 @@ def sky_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
     IES RP-21 (1984): A + B sin(elevation)^C.
     """
     base, rise, exponent = find_sky(sky).diffuse_lux
-    shape, (sun,) = flatten_together(sun_elevation_rad=daylight_sun(sun_elevation_rad))
+    shape, (sun,) = broadcast_flat(sun_elevation_rad=daylight_sun(sun_elevation_rad))
     sine = np.sin(sun)
     shaped = np.sqrt(sine) if exponent == 0.5 else sine
     return unflatten(base + rise * shaped, shape)
@@ -175,7 +176,7 @@ def sky_luminance(
     linear): worst error measured 4e-5.
     """
     find_sky(sky)
-    shape, (azimuth, elevation, sun_azimuth, sun_elevation) = flatten_together(
+    shape, (azimuth, elevation, sun_azimuth, sun_elevation) = broadcast_flat(
         azimuth_rad=angle("azimuth_rad", azimuth_rad),
         elevation_rad=angle("elevation_rad", elevation_rad),
         sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),

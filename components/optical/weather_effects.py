@@ -23,6 +23,7 @@ class Visibility(Effect):
     The visibility is the scene's own, or follows from its fog and rain.
     """
 
+    lockstep = True
     name = "visibility"
     acts_on = "contrast"
 

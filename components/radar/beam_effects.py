@@ -1,25 +1,27 @@
-"""When within a scan does a radar's beam pass each of its detections?"""
+"""When within a scan does a radar's beam pass each target, and where is the target then?"""
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from components.messages import Detections
-from components.radar.beam_sweep import illumination_offset_s
+from components.radar.beam_sweep import first_illumination, illumination_offset_s
 from components.radar.field_of_view import azimuth_width_rad
-from components.target_messages import RelativeTargets
+from components.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
+from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.effects import Effect, Verdict
-from dsa_des.types import IntArray
+from dsa_des.message import per_row
+from dsa_des.types import FloatArray, IntArray
 
 
 class BeamSweep(Effect):
     """A beam that sweeps once per scan lights each target at an instant of its own.
 
-    The instant is recorded as ``illuminated_s``. Everything else in the report is still that of
-    the scan's start: a position is old by up to one period, so it is off by at most the target's
-    relative speed times the period (110 m at 110 m/s and 1 Hz).
+    Everything about a target is then that of this instant, which is recorded as
+    ``illuminated_s``: whether it is in reach, its SNR, its measured and true position. A target
+    that the beam does not meet counts as outside the field of view. What the ownship believes of
+    itself (`components.navigation`) stays that of the scan's start.
     """
 
     name = "beam sweep"
@@ -31,28 +33,87 @@ class BeamSweep(Effect):
         """Ask for ``beam_sweep``."""
         return Verdict(block.p.beam_sweep, f"beam_sweep is {str(block.p.beam_sweep).lower()}")
 
-    def build(self, block: Any) -> Callable[..., Detections]:
-        """Return what adds the instants to a report."""
-        start_rad = block.reach.azimuth_rad[0]
-        width_rad = azimuth_width_rad(block.reach)
-        period_s = float(1 / block.p.scan_rate_hz)
-        ticks_per_s = block.context.ticks_per_s
+    def build(self, block: Any) -> "Sweep":
+        """Return the sweep of this radar's beam."""
+        return Sweep(block)
 
-        def add(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
-            # A false alarm has no true direction: the beam was where it is reported.
-            false = detections.target < 0
-            azimuth, _ = block.axes(
-                np.where(false, detections.azimuth_rad, detections.true_azimuth_rad),
-                np.where(false, detections.elevation_rad, detections.true_elevation_rad),
-            )
-            offset_s = illumination_offset_s(
-                azimuth,
-                start_rad=start_rad,
-                width_rad=width_rad,
-                scan_period_s=period_s,
-            )
-            scan_s = np.repeat(detections.tick / ticks_per_s, np.diff(detections.offsets))
-            extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
-            return replace(detections, extras=extras)
 
-        return add
+@dataclass(eq=False)
+class LitTargets(GatedTargets):
+    """Targets at the instants at which a beam lights them.
+
+    Parameters
+    ----------
+    offset_s : (rows, targets)
+        Time since the start of the scan.
+    """
+
+    offset_s: FloatArray = per_row(kw_only=True)
+
+
+class Sweep:
+    """The sweep of one radar's beam; called with a report, it adds when everything was lit."""
+
+    def __init__(self, block: Any) -> None:
+        self.period_s = float(1 / block.p.scan_rate_hz)
+        self._block = block
+        self._turn = {
+            "start_rad": block.reach.azimuth_rad[0],
+            "width_rad": azimuth_width_rad(block.reach),
+            "scan_period_s": self.period_s,
+        }
+        self._ticks_per_s = block.context.ticks_per_s
+
+    def lit(self, targets: RelativeTargets, rows: IntArray) -> LitTargets:
+        """Return the targets as the beam meets them, one row per scan.
+
+        Raises
+        ------
+        ValueError
+            If the targets can be known only at the instants of the rows.
+        """
+        revisit = targets.revisit
+        if revisit is None:
+            raise ValueError(
+                "beam_sweep needs to know the targets at instants of its own; the traffic, or a "
+                "block on the way, passes no flights on: set beam_sweep to false"
+            )
+        block, columns = self._block, targets.columns
+        at_start = targets.take(rows)
+        start_s = (at_start.tick / self._ticks_per_s)[:, np.newaxis]
+        found: dict[str, Any] = {}
+
+        def azimuth_at(offset_s: FloatArray) -> FloatArray:
+            found.update(revisit(columns, start_s + offset_s))
+            azimuth, _ = block.axes(found["body_azimuth_rad"], found["body_elevation_rad"])
+            return azimuth
+
+        before, _ = block.axes(at_start.body_azimuth_rad, at_start.body_elevation_rad)
+        offset_s, met = first_illumination(azimuth_at, before, **self._turn)
+        azimuth_at(offset_s)
+        lit = replace(at_start, **found)
+        reason = block.axes.reach(block.reach).decide(
+            lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present
+        )
+        reason[~met & ((reason == EVALUATE) | (reason == RANGE))] = FIELD_OF_VIEW
+        fields = {**vars(lit), "decisions": {block.name: Decision(np.arange(len(rows)), reason)}}
+        return LitTargets(**fields, offset_s=offset_s)
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray
+    ) -> Detections:
+        """Add ``illuminated_s`` to what `lit` targets gave."""
+        counts = np.diff(detections.offsets)
+        # A false alarm has no true direction: the beam was where it is reported.
+        false = detections.target < 0
+        azimuth, _ = self._block.axes(
+            detections.azimuth_rad[false], detections.elevation_rad[false]
+        )
+        offset_s = np.empty(len(detections.target))
+        offset_s[false] = illumination_offset_s(azimuth, **self._turn)
+        assert isinstance(targets, LitTargets)
+        column = np.searchsorted(targets.columns, detections.target[~false])
+        offset_s[~false] = targets.offset_s[np.repeat(rows, counts)[~false], column]
+        scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
+        extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
+        return replace(detections, extras=extras)

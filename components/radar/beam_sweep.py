@@ -7,14 +7,21 @@ what is left of the period: it looks one way only.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import FloatArray, broadcast_flat, finite, positive, unflatten
+from components.checks import FloatArray, broadcast_flat, finite, positive, unflatten
+from components.geometry.angles import wrap_pi
+from dsa_des.types import BoolArray
 
 _TURN = 2.0 * math.pi
+# Where the beam counts as meeting the target: far below any beam's width, and above the rounding
+# of times in a run of days.
+_MET_RAD = 1e-9
+_MOST_STEPS = 60
 
 
 def illumination_offset_s(
@@ -80,6 +87,84 @@ def illumination_offset_s(
         )
     swept = _into_sweep(azimuth - start, width_rad)
     return unflatten(np.minimum(swept / (beam_rate - rate), sweep_s), shape)
+
+
+def first_illumination(
+    azimuth_at: Callable[[FloatArray], FloatArray],
+    azimuth_rad: FloatArray,
+    *,
+    start_rad: float,
+    width_rad: float,
+    scan_period_s: float,
+) -> tuple[FloatArray, BoolArray]:
+    """Return when in its scan the beam first meets each target, wherever that flies meanwhile.
+
+    Parameters
+    ----------
+    azimuth_at : callable
+        The targets' azimuths (rad, clockwise, in the frame in which the beam sweeps) at times of
+        their own after the start of the scan: takes and returns arrays like `azimuth_rad`.
+    azimuth_rad : ndarray, rad
+        Their azimuths at the start of the scan.
+    start_rad, width_rad : float, rad
+        The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π].
+    scan_period_s : float, s
+        The sweep takes all of it.
+
+    Returns
+    -------
+    offset_s : ndarray, s
+        In [0, scan_period_s].
+    lit : ndarray of bool
+        False where the beam does not meet the target in this scan: it lies outside the field of
+        view, came in behind the beam, or kept ahead of it. The offset is then that of the nearer
+        end.
+
+    Notes
+    -----
+    Each element is solved by itself, by the secant method inside a shrinking bracket, until beam
+    and target are within 1e-9 rad; a target at 0.1 rad/s under a beam of 3.8 rad/s takes three or
+    four evaluations. So the answer is that of the flight as given, not of a rate: against a brute
+    force search over exact trajectories it errs by less than 1 ns of illumination time and 1 µm
+    of position, where the position at the start of the scan is off by up to speed times period.
+    A target that crosses the seam of a full circle against the sweep is lit twice in one scan;
+    the first counts.
+    """
+    beam_rate = width_rad / scan_period_s
+    swept = np.mod(azimuth_rad - start_rad, _TURN)
+    # Outside the field of view it is ahead of the nearer edge, or behind it.
+    swept = np.where(swept > 0.5 * (width_rad + _TURN), swept - _TURN, swept)
+
+    def lead(offset: FloatArray) -> FloatArray:
+        """Return how far the target is ahead of the beam."""
+        ahead: FloatArray = swept + wrap_pi(azimuth_at(offset) - azimuth_rad) - beam_rate * offset
+        return ahead
+
+    low, high = np.zeros_like(swept), np.full_like(swept, scan_period_s)
+    at_low, at_high = swept, lead(high)
+    lit = (at_low >= -_MET_RAD) & (at_high <= _MET_RAD)
+    offset = np.where(at_low > 0.0, high, low)
+    # Not to be searched: unlit ones, and those that are met at one of the ends.
+    met = ~lit | (np.abs(at_low) <= _MET_RAD) | (np.abs(at_high) <= _MET_RAD)
+    offset = np.where(lit & (np.abs(at_low) <= _MET_RAD), 0.0, offset)
+    before, at_before = high, at_high
+    at_offset = at_low
+    point = low
+    for _ in range(_MOST_STEPS):
+        if met.all():
+            break
+        change = at_offset - at_before
+        flat = change == 0.0
+        step = at_offset * (point - before) / np.where(flat, 1.0, change)
+        guess = point - step
+        guess = np.where(flat | ~((guess > low) & (guess < high)), 0.5 * (low + high), guess)
+        guess = np.where(met, offset, guess)
+        found = lead(guess)
+        before, at_before, point, at_offset = point, at_offset, guess, found
+        low, high = np.where(found > 0.0, guess, low), np.where(found > 0.0, high, guess)
+        offset = np.where(met, offset, guess)
+        met = met | (np.abs(found) <= _MET_RAD)
+    return offset, lit
 
 
 def _into_sweep(angle: FloatArray, width: float) -> FloatArray:

@@ -21,6 +21,7 @@ class GroundClutter(Effect):
     target's. Clutter that is detected where no target is, is not reported.
     """
 
+    lockstep = True
     name = "ground clutter"
     acts_on = "clutter"
 

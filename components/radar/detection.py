@@ -8,20 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.checks import FloatArray, broadcast_flat, unflatten
 from components.radar.detection_albersheim import albersheim_probability
 from components.radar.detection_exact import exact_probability
 from components.radar.detection_gram_charlier import gram_charlier_probability
 from components.radar.detection_shnidman import shnidman_probability
 from components.radar.detection_table import table_probability
 from components.radar.inputs import (
-    FloatArray,
-    broadcast_flat,
     checked_model,
     checked_probability,
     checked_pulses,
     checked_snr,
     one_of,
-    unflatten,
 )
 from components.radar.threshold import detection_threshold
 

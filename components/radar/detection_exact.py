@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from components.checks import FloatArray
 from components.radar.detection_series import (
     chain_gain,
     chain_miss,
     geometric_gain,
     geometric_miss,
 )
-from components.radar.inputs import FloatArray
 from components.radar.threshold import noise_terms, threshold_of
 
 # Computes one tail for a flat array of SNR.

@@ -8,10 +8,14 @@ from dsa_des.effects import Effect, Verdict
 #: Largest absolute error of ``method="table"`` over all SNR (its contract; 2.9e-8 was measured).
 TABLE_ERROR = 1e-6
 
+#: Worst absolute errors of ``method="gram_charlier"`` by number of pulses, found by search.
+GRAM_CHARLIER_ERROR = {1: 0.025, 2: 0.010, 5: 0.003, 10: 0.001, 100: 5e-5}
+
 
 class ExactDetection(Effect):
     """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
 
+    lockstep = True
     name = "exact Pd"
     acts_on = "method of Pd"
     neutral = False
@@ -20,7 +24,7 @@ class ExactDetection(Effect):
         """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""
         if block.p.detection != "exact":
             return Verdict(False, f"detection is {block.p.detection!r}")
-        if block.p.pulses == 1 and self._models(block) <= {1, 2}:
+        if closed_form(block):
             return Verdict(True, "with 1 pulse and Swerling I or II it is a closed form")
         bound = {"detection_probability": TABLE_ERROR}
         return Verdict(True, "detection is 'exact'", bound)
@@ -29,12 +33,49 @@ class ExactDetection(Effect):
         """Return the method's name."""
         return "exact"
 
-    def _models(self, block: Any) -> set[int]:
-        if block.p.fluctuation == "sampled":
-            return {0}
-        if block.p.swerling is not None:
-            return {block.p.swerling % 5}
-        rosters = known_targets(block.context)
-        if not rosters:
-            return {0}
-        return {craft.swerling % 5 for roster in rosters for craft in roster.aircraft}
+
+def closed_form(block: Any) -> bool:
+    """Say whether the exact Pd of all of a radar's targets is one power, cheaper than any rung."""
+    return block.p.pulses == 1 and _models(block) <= {1, 2}
+
+
+def picked_method(block: Any, method: str) -> list[str]:
+    """Say why a radar with ``model = "auto"`` computes Pd as it does.
+
+    Parameters
+    ----------
+    block : SwerlingRadar
+        After its setup.
+    method : {"exact", "table"}
+    """
+    allowed = block.context.sections["accuracy"].detection_probability
+    if method == "table":
+        said = f"table, its error is at most {TABLE_ERROR:g} and [accuracy] allows {allowed:g}"
+    elif closed_form(block):
+        said = "exact, with 1 pulse and Swerling I or II a closed form and the cheapest"
+    elif block.context.simulate_everything:
+        said = "exact, the reference: everything is simulated"
+    elif allowed is None:
+        said = "exact, the reference: [accuracy] allows no error of Pd"
+    else:
+        said = (
+            f"exact, the reference: a table may err by {TABLE_ERROR:g}, and of the {allowed:g} "
+            f"that [accuracy] allows {block.context.tolerance['detection_probability']:.2g} is left"
+        )
+    # Fewer pulses err more: the entry at or below the radar's own is an upper estimate.
+    error = GRAM_CHARLIER_ERROR[max(n for n in GRAM_CHARLIER_ERROR if n <= block.p.pulses)]
+    return [
+        f"Pd: {said}",
+        f"Pd: not gram_charlier: 11 times as slow as the table, and it errs by up to {error:g}",
+    ]
+
+
+def _models(block: Any) -> set[int]:
+    if block.p.fluctuation == "sampled":
+        return {0}
+    if block.p.swerling is not None:
+        return {block.p.swerling % 5}
+    rosters = known_targets(block.context)
+    if not rosters:
+        return {0}
+    return {craft.swerling % 5 for roster in rosters for craft in roster.aircraft}

@@ -12,8 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from components.checks import FloatArray
 from components.radar.detection_exact import exact_probability
-from components.radar.inputs import FloatArray
 
 _CELL_BITS = 6
 _CELLS_PER_OCTAVE = 1 << _CELL_BITS

@@ -24,6 +24,7 @@ class FalseAlarms(Effect):
     on the sensor's grid after the true detections of their scan, with no target and nothing true.
     """
 
+    lockstep = True
     name = "false alarms"
     acts_on = "report"
     # A report that holds none is what there is without it.

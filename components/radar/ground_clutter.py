@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import (
+from components.checks import (
     as_numbers,
     broadcast_flat,
     finite,

@@ -1,60 +1,20 @@
-"""Which arguments do the radar functions accept, and how do they become arrays of one shape?"""
+"""Which arguments do the radar functions accept?"""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from components.checks import FloatArray, as_numbers, refuse
 
 MODELS = ("swerling0", "swerling1", "swerling2", "swerling3", "swerling4")
 _ALIASES = {"swerling5": "swerling0"}
 
 # Beyond this the sums would grow long; the contract and the tests reach 1000.
 MAX_PULSES = 100_000
-
-
-def as_numbers(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as a float64 array, or say that it is not a number."""
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {value!r}: it must be a number or an array") from error
-
-
-def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> None:
-    """Raise a ValueError naming the first bad element, if there is one."""
-    if np.any(bad):
-        first = float(np.broadcast_to(array, np.shape(bad))[bad].flat[0])
-        # In full where six digits would show another number, as 1 for 1.0000001 pulses.
-        short = f"{first:g}"
-        shown = short if float(short) == first or first != first else repr(first)
-        raise ValueError(f"{name} is {shown}: it must {rule}")
-
-
-def positive(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as float64, all of it finite and above 0."""
-    array = as_numbers(name, value)
-    refuse(name, array, ~((array > 0.0) & np.isfinite(array)), "be finite and above 0")
-    return array
-
-
-def not_negative(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as float64, all of it finite and 0 or more."""
-    array = as_numbers(name, value)
-    refuse(name, array, ~((array >= 0.0) & np.isfinite(array)), "be finite and 0 or more")
-    return array
-
-
-def finite(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as float64, all of it finite."""
-    array = as_numbers(name, value)
-    refuse(name, array, ~np.isfinite(array), "be finite")
-    return array
 
 
 def checked_snr(value: ArrayLike) -> FloatArray:
@@ -101,24 +61,3 @@ def checked_model(value: object) -> str:
     """Return the canonical name of a Swerling model; swerling5 is another name of swerling0."""
     name = one_of("model", value, (*MODELS, *_ALIASES))
     return _ALIASES.get(name, name)
-
-
-def broadcast_flat(**arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Broadcast together and return the shape and contiguous flat arrays.
-
-    NumPy's vector loops for exp, log and the like may give other last bits for strided input than
-    for contiguous input; flattening first makes each element's result independent of the shape.
-    """
-    try:
-        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
-    except ValueError as error:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"the shapes do not broadcast together: {shapes}") from error
-    return shape, [
-        np.ascontiguousarray(np.broadcast_to(array, shape)).reshape(-1) for array in arrays.values()
-    ]
-
-
-def unflatten(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Give a flat result its shape back; a 0-d result becomes a NumPy scalar."""
-    return flat.reshape(shape)[()]

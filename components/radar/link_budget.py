@@ -9,13 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import (
-    broadcast_flat,
-    not_negative,
-    positive,
-    refuse,
-    unflatten,
-)
+from components.checks import broadcast_flat, not_negative, positive, refuse, unflatten
 from components.radar.radar_equation import (
     SMALLEST_MINIMUM_RANGE_M,
     checked_minimum_range,

@@ -18,8 +18,8 @@ class RadarParameters(SensorParameters):
     )
     beam_sweep: bool = Field(
         default=False,
-        description="Whether a beam sweeps clockwise over the field of view once per scan; when "
-        "it lights each detection is recorded.",
+        description="Whether a beam sweeps clockwise over the field of view once per scan: each "
+        "target is measured at the instant it is lit, which is recorded.",
     )
 
 

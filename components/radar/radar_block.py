@@ -1,10 +1,16 @@
 """What every radar block has in common: it measures range, and effects act on its echoes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from components.radar.beam_effects import BeamSweep, Sweep
+from components.reach import farthest_look
 from components.sensor import Cells, Sensor
-from dsa_des.types import FloatArray
+from components.target_messages import RelativeTargets
+from dsa_des.types import FloatArray, IntArray
 
 CellFactor = Callable[[Cells], FloatArray]
 
@@ -21,3 +27,20 @@ class Radar(Sensor):
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+
+    @property
+    def _sweep(self) -> Sweep | None:
+        return self.context.effects.get(BeamSweep.name)
+
+    def request(self, port: str) -> Any:
+        """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
+        reach = super().request(port)
+        if self._sweep is None:
+            return reach
+        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
+
+    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets at the instants at which the beam lights them."""
+        if self._sweep is None:
+            return targets, rows
+        return self._sweep.lit(targets, rows), np.arange(len(rows))

@@ -13,6 +13,7 @@ from dsa_des.types import FloatArray
 class BlindRange(Effect):
     """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
 
+    lockstep = True
     name = "blind range"
     acts_on = "SNR"
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import (
+from components.checks import (
     FloatArray,
     broadcast_flat,
-    checked_model,
     finite,
     not_negative,
     positive,
     refuse,
     unflatten,
 )
+from components.radar.inputs import checked_model
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9

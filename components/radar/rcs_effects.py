@@ -22,6 +22,7 @@ _UNKNOWN = "the targets are not known before the run"
 class RcsFluctuation(Effect):
     """Swerling fluctuation I to IV (thesis §4.1.2); without it every target is steady."""
 
+    lockstep = True
     name = "RCS fluctuation"
     acts_on = "RCS"
 
@@ -44,6 +45,7 @@ class RcsFluctuation(Effect):
 class AspectRcs(Effect):
     """Mean RCS from a table over the direction from which the radar sees the aircraft."""
 
+    lockstep = True
     name = "aspect RCS"
     acts_on = "mean RCS"
 

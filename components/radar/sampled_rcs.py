@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from components.radar.inputs import FloatArray, checked_model
+from components.checks import FloatArray
+from components.radar.inputs import checked_model
 from components.radar.rcs import fluctuating_rcs
 
 

@@ -1,6 +1,7 @@
 """A radar that detects with the probability its SNR gives (``radar.swerling``, thesis §4.1.2)."""
 
 import math
+from functools import lru_cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -9,11 +10,12 @@ from pydantic import Field, model_validator
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability
-from components.radar.detection_rung import ExactDetection
+from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.threshold_radar import LinkBudgetRadar
+from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor import Cells, Look
 from dsa_des.types import FloatArray
 
@@ -29,6 +31,10 @@ class SwerlingParameters(LinkBudgetParameters):
         description="Fluctuation inside Pd, or a sampled RCS (per scan for I and III, per pulse "
         "for II and IV) and a steady target's Pd at it; the same share of detections.",
     )
+    model: Literal["auto"] | None = Field(
+        default=None,
+        description="'auto' has `detection` picked by error and cost, and `explain` say why.",
+    )
     detection: Literal["exact", "table", "gram_charlier"] = Field(
         default="exact",
         description="How Pd is computed: exactly, by table (error < 1e-6), or by the thesis's "
@@ -40,6 +46,10 @@ class SwerlingParameters(LinkBudgetParameters):
 
     @model_validator(mode="after")
     def _covered(self) -> Self:
+        if self.model == "auto" and self.detection != "exact":
+            raise ValueError(
+                f"model is 'auto' and detection is {self.detection!r}: leave one of them out"
+            )
         steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
         if self.detection == "gram_charlier" and not steady:
             raise ValueError(
@@ -80,6 +90,28 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.detection == "exact":
             (self._method,) = self.built("method of Pd") or ["table"]
 
+    def left_out(self) -> list[str]:
+        """Say which method of Pd was picked, and why, if the scene asks for that."""
+        said = super().left_out()
+        return said if self.p.model is None else [*said, *picked_method(self, self._method)]
+
+    def range_slack(self) -> float:
+        """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.
+
+        SNR goes with the fourth power of range, and Pd changes by max |dPd / d ln SNR| per unit
+        of ln SNR at most. Nothing is proven where more than that depends on the line of sight.
+        """
+        allowed = self.context.tolerance.get("detection_probability")
+        if allowed is None:
+            return math.inf
+        steepness = self.steepest_pd()
+        others = {"aspect RCS", *(effect.name for effect in WEATHER_EFFECTS)}
+        if steepness is None or others & set(self.context.effects):
+            return 0.0
+        # |4 ln(1 ± e)| is at most 4 e / (1 - e).
+        share = allowed / (4.0 * steepness)
+        return share / (1.0 + share)
+
     def false_alarm_zero_db(self) -> float:
         """Return the SNR that the radar's own model needs for `reference_pd`; steady if none."""
         return self._reference((self.p.swerling or 0) % 5)
@@ -103,7 +135,7 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.fluctuation == "probability" or self._models is steady:
             return super().snr(cells)
         rcs = self.mean_rcs_m2(cells)
-        keys = cells.roster.keys[cells.target]
+        keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
             target, scan = keys[chosen], cells.scan[chosen]
 
@@ -145,18 +177,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """
         if terrain_of(self) is not None:
             return None
-        log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
-        steepest = 0.0
-        for model in range(5):
-            pd = detection_probability(
-                np.exp(log_snr),
-                pulses=self.p.pulses,
-                false_alarm_probability=self.p.false_alarm_probability,
-                model=f"swerling{model}",
-            )
-            steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
-        # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
-        return 1.01 * steepest
+        return _steepest_pd(self.p.pulses, self.p.false_alarm_probability)
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
@@ -170,3 +191,20 @@ class SwerlingRadar(LinkBudgetRadar):
                 self.p.reference_pd, f"swerling{model}"
             )
         return self._reference_db[model]
+
+
+@lru_cache(maxsize=16)
+def _steepest_pd(pulses: int, false_alarm_probability: float) -> float:
+    """Return the largest |dPd / d ln SNR| of any fluctuation model."""
+    log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
+    steepest = 0.0
+    for model in range(5):
+        pd = detection_probability(
+            np.exp(log_snr),
+            pulses=pulses,
+            false_alarm_probability=false_alarm_probability,
+            model=f"swerling{model}",
+        )
+        steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
+    # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
+    return 1.01 * steepest

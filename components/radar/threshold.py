@@ -10,13 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import (
-    FloatArray,
-    broadcast_flat,
-    checked_probability,
-    checked_pulses,
-    unflatten,
-)
+from components.checks import FloatArray, broadcast_flat, unflatten
+from components.radar.inputs import checked_probability, checked_pulses
 from components.radar.poisson_terms import poisson
 
 

@@ -18,6 +18,7 @@ from dsa_des.types import FloatArray
 class Attenuation(Effect):
     """Loss along the slant path, evaluated once per run into a table over altitude."""
 
+    lockstep = True
     acts_on = "SNR"
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:

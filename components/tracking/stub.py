@@ -34,11 +34,14 @@ class TrackerStub(Component):
     outputs = {"tracks": Output(Tracks, "What is held of every target.")}
     Parameters = StubParameters
     windowed = True
+    lockstep = True
+    rewindable = True
 
     def setup(self) -> None:
         """Start with no tracks."""
         self._targets: IntArray = np.empty(0, dtype=np.int64)
         self._held: dict[str, Any] = {name: np.empty(0) for name in _HELD}
+        self._replica = 0
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
@@ -50,13 +53,19 @@ class TrackerStub(Component):
         updated = np.flatnonzero(counts)
         if len(updated) == 0:
             return None
-        targets = np.union1d(self._targets, fused.target)
+        replica = wake.replica[updated]
+        if replica[0] != self._replica:  # another run: nothing is held yet
+            self._targets = self._targets[:0]
+        self._replica = int(replica[-1])
+        targets = _present(self._targets, fused.target, len(fused.roster))
         pool, start = self._pool(fused, counts)
         last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
         last[0, np.searchsorted(targets, self._targets)] = np.arange(start)
         rows = np.repeat(np.arange(1, len(updated) + 1), counts[updated])
         last[rows, np.searchsorted(targets, fused.target)] = start + np.arange(len(fused.target))
         last = np.maximum.accumulate(last, axis=0)
+        if replica[0] != replica[-1]:
+            _forget_other_replicas(last, replica, start, counts[updated])
         self._targets = targets[last[-1] >= 0]
         held_at_end = last[-1][last[-1] >= 0]
         self._held = {name: values[held_at_end] for name, values in pool.items()}
@@ -99,3 +108,21 @@ class TrackerStub(Component):
             roster=fused.roster,
             sensors=fused.sensors,
         )
+
+
+def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:
+    """Return the targets that are held or newly measured, ascending."""
+    there = np.zeros(targets, dtype=bool)
+    there[held] = True
+    there[new] = True
+    return np.flatnonzero(there)
+
+
+def _forget_other_replicas(last: IntArray, replica: IntArray, start: int, counts: IntArray) -> None:
+    """Drop what each row holds from replicas before its own; entries are in order of rows."""
+    first_entry = start + np.cumsum(counts) - counts
+    begins = np.concatenate(([True], replica[1:] != replica[:-1]))
+    own_from = np.maximum.accumulate(np.where(begins, first_entry, 0))
+    own_from[replica == replica[0]] = 0  # what was held before belongs to the first
+    later = last[1:]
+    later[later < own_from[:, np.newaxis]] = -1

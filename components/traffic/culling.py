@@ -1,41 +1,31 @@
-"""Which targets can come near enough to matter, and when.
+"""Which targets need moving: those that somebody may look at during a window."""
 
-A target whose distance from the ownship is d at the middle of an interval of length 2h stays
-farther away than d - (v_own + v_target)·h all through it, with v the largest speeds. Where that
-is beyond every sensor's range, no sensor can look at the target during the interval: it need not
-even be moved.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight
-from components.traffic.state import TrajectoryState
-from dsa_des.types import FloatArray, IntArray
-
-EPOCH_S = 10.0
-# The speeds of turns and long legs hold to 2e-4; a metre covers the rounding of positions.
-_SPEED_MARGIN = 1.001
-_RANGE_MARGIN_M = 1.0
+from components.traffic.near_intervals import NearIntervals, near_intervals
+from dsa_des.types import IntArray
 
 
 class Culling:
-    """The targets that can come within a range of the ownship, epoch by epoch.
+    """The targets that can come within a range of the ownship, by intervals of entry and exit.
 
-    Epochs last `EPOCH_S` seconds from time 0, so that the answer for an instant does not depend
-    on how the instants are grouped into windows.
+    The intervals are found once, for all targets together; which targets a window needs is then
+    a look at them, so the answer for an instant does not depend on how instants are grouped.
 
     Parameters
     ----------
-    own, targets : objects with `at(time_s)` and `max_speed_mps`
-    fleet : object with `at(time_s)`
+    own, targets : objects with `at(time_s)`, `max_speed_mps` and `interval_present()`
+    fleet : object with `each(aircraft, time_s)` and `subset(columns)`
         All targets.
-    subset : callable
-        Makes a fleet of some targets.
     reach_m : float
         Farthest range at which any sensor looks.
+    end_s : float
+        Length of the run.
+    lasts_s : float
+        How long a look lasts: a sweeping beam sees targets where they are later in the scan.
     """
 
     def __init__(
@@ -43,16 +33,24 @@ class Culling:
         own: Any,
         targets: Sequence[Any],
         fleet: Any,
-        subset: Callable[[Sequence[Any]], Any],
         reach_m: float,
+        end_s: float,
+        lasts_s: float = 0.0,
     ) -> None:
-        self._own, self._targets, self._fleet = own, targets, fleet
-        self._subset = subset
+        self._fleet, self._lasts_s = fleet, lasts_s
         self.reach_m = reach_m
-        speeds = np.array([target.max_speed_mps for target in targets]) + own.max_speed_mps
-        half = EPOCH_S / 2.0
-        self._near_m: FloatArray = reach_m + speeds * (_SPEED_MARGIN * half) + _RANGE_MARGIN_M
-        self._last: tuple[int, int, IntArray, Any] | None = None
+        there = np.array([target.interval_present() for target in targets]).reshape(-1, 2)
+        first, last = own.interval_present()
+        speeds = np.array([target.max_speed_mps for target in targets])
+        self.intervals: NearIntervals = near_intervals(
+            own.at,
+            fleet.each,
+            closing_speed_mps=speeds + own.max_speed_mps,
+            present_s=(np.maximum(there[:, 0], first), np.minimum(there[:, 1], last)),
+            reach_m=reach_m,
+            end_s=end_s + lasts_s,
+        )
+        self._last: tuple[IntArray, Any] | None = None
 
     def active(self, first_s: float, last_s: float) -> tuple[IntArray, Any]:
         """Return the targets that may come in reach between two times, and a fleet of them.
@@ -68,29 +66,7 @@ class Culling:
             Indices into the targets, ascending.
         fleet : object with `at(time_s)`
         """
-        epochs = int(first_s // EPOCH_S), int(last_s // EPOCH_S)
-        if self._last is None or self._last[:2] != epochs:
-            columns = self._columns(*epochs)
-            same = self._last is not None and np.array_equal(columns, self._last[2])
-            fleet = (
-                self._last[3]
-                if same and self._last is not None
-                else self._subset([self._targets[i] for i in columns.tolist()])
-            )
-            self._last = (*epochs, columns, fleet)
-        return self._last[2], self._last[3]
-
-    def _columns(self, first: int, last: int) -> IntArray:
-        middles = (np.arange(first, last + 1) + 0.5) * EPOCH_S
-        own: TrajectoryState = self._own.at(middles)
-        states: TrajectoryState = self._fleet.at(middles)
-        _, _, range_m = line_of_sight(
-            own.lat_deg[:, np.newaxis],
-            own.lon_deg[:, np.newaxis],
-            own.alt_m[:, np.newaxis],
-            states.lat_deg,
-            states.lon_deg,
-            states.alt_m,
-            validate=False,
-        )
-        return np.flatnonzero((range_m <= self._near_m).any(axis=0))
+        columns = self.intervals.during(first_s, last_s + self._lasts_s)
+        if self._last is None or not np.array_equal(columns, self._last[0]):
+            self._last = columns, self._fleet.subset(columns)
+        return self._last

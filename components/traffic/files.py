@@ -1,6 +1,8 @@
 """Recorded traffic: flights read from files (``traffic.daa_file``, ``traffic.csv``)."""
 
 from fractions import Fraction
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,7 @@ class RecordedTraffic(TrafficSource):
     Time 0 is the file's earliest sample.
     """
 
+    lockstep = True
     Parameters = FileParameters
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -96,12 +99,21 @@ class DaaFile(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
-        return read_daa(
-            self.p.file,
-            reference_lat_deg=self.p.reference_lat_deg,
-            reference_lon_deg=self.p.reference_lon_deg,
-            reference_alt_m=self.p.reference_alt_m,
-        )
+        reference = (self.p.reference_lat_deg, self.p.reference_lon_deg, self.p.reference_alt_m)
+        try:
+            state = self.p.file.stat()
+        except OSError:  # the reader says what is wrong with it
+            return _read_daa(self.p.file, None, reference)
+        return _read_daa(self.p.file, (state.st_mtime_ns, state.st_size), reference)
+
+
+@lru_cache(maxsize=4)
+def _read_daa(path: Path, state: Any, reference: tuple[float, float, float]) -> TrafficFile:
+    """Read a file; the replicas of a study read the same one over and over."""
+    lat_deg, lon_deg, alt_m = reference
+    return read_daa(
+        path, reference_lat_deg=lat_deg, reference_lon_deg=lon_deg, reference_alt_m=alt_m
+    )
 
 
 class CsvFile(RecordedTraffic):

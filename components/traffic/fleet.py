@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 import numpy.typing as npt
 
 from components.traffic.geodesic_motion import geodesic_state
 from components.traffic.leg_builder import hold_state
+from components.traffic.leg_table import LegTable
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
+from components.traffic.piece_search import PieceSearch
 from components.traffic.trajectory import (
     SampledTrajectory,
     TrajectoryState,
     evaluate_segments,
     locate,
 )
+
+IntArray = npt.NDArray[np.int64]
 
 CELLS_AT_ONCE = 16_384
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
@@ -26,7 +31,7 @@ class ScriptedFleet:
     """Scripted aircraft evaluated together, bit for bit as each would be alone.
 
     All aircraft with a single straight leg are one array expression, all that stand still
-    another; the others are evaluated one by one.
+    another; those with several legs are looked up leg by leg.
 
     Parameters
     ----------
@@ -43,7 +48,29 @@ class ScriptedFleet:
             for kind, formula in (("geodesic", geodesic_state), ("hold", hold_state))
             if kind in kinds
         ]
-        self._single = [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")]
+        self._others = np.array(
+            [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")], dtype=np.int64
+        )
+        self._legs: LegTable | None = None
+        self._place_in_legs = np.arange(len(self.trajectories))
+
+    def subset(self, columns: IntArray) -> ScriptedFleet:
+        """Return the fleet of some aircraft, without preparing them anew.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (n,)
+            Indices into the aircraft, ascending.
+        """
+        fleet = copy(self)
+        fleet.trajectories = [self.trajectories[i] for i in columns.tolist()]
+        fleet.names = [trajectory.name for trajectory in fleet.trajectories]
+        parts = [group.subset(columns) for group in self._groups]
+        fleet._groups = [part for part in parts if part is not None]
+        fleet._others = np.flatnonzero(np.isin(columns, self._others))
+        # The table of legs is found by our own places, so that there is one for all subsets.
+        fleet._place_in_legs = self._place_in_legs[columns]
+        return fleet
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.
@@ -62,11 +89,20 @@ class ScriptedFleet:
         state = _empty_state(len(times), len(self.trajectories))
         for group in self._groups:
             group.fill(state, times)
-        for i in self._single:
-            alone = self.trajectories[i].at(times)
-            for out, column in zip(state.arrays(), alone.arrays(), strict=True):
-                out[:, i] = column
+        if len(self._others):
+            shape = len(times), len(self._others)
+            aircraft = np.broadcast_to(self._others, shape).reshape(-1)
+            several = self.each(aircraft, np.repeat(times, len(self._others))).reshaped(shape)
+            for out, columns in zip(state.arrays(), several.arrays(), strict=True):
+                out[:, self._others] = columns
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        if self._legs is None:
+            self._legs = LegTable(self.trajectories)
+            self._place_in_legs = np.arange(len(self.trajectories))
+        return _in_blocks(self._legs.state, self._place_in_legs[aircraft], time_s)
 
 
 class _Group:
@@ -80,8 +116,9 @@ class _Group:
     ) -> None:
         chosen = [trajectories[i] for i in members]
         self._formula = formula
+        self._members = np.array(members)
         everyone = len(members) == len(trajectories)
-        self._columns: slice | list[int] = slice(None) if everyone else members
+        self._columns: slice | IntArray = slice(None) if everyone else self._members
         self._table = np.stack([t.segments[0].parameters for t in chosen], axis=-1)[:, np.newaxis]
         self._start = np.array([t.start_time_s for t in chosen])
         self._end = np.array([t.end_time_s for t in chosen])
@@ -94,6 +131,22 @@ class _Group:
             ]
         ).T
         self._yaw_is_fixed = np.array([t.fixed_attitude_rad[0] is not None for t in chosen])
+
+    def subset(self, columns: IntArray) -> _Group | None:
+        """Return the group of those of its members that are among some aircraft."""
+        place = np.searchsorted(columns, self._members)
+        place[place == len(columns)] = 0
+        kept = np.flatnonzero(columns[place] == self._members) if len(columns) else place[:0]
+        if len(kept) == 0:
+            return None
+        group = copy(self)
+        group._members = place[kept]
+        group._columns = slice(None) if len(kept) == len(columns) else group._members
+        group._table = np.ascontiguousarray(self._table[..., kept])
+        group._start, group._end = self._start[kept], self._end[kept]
+        group._until, group._yaw_is_fixed = self._until[kept], self._yaw_is_fixed[kept]
+        group._attitude = np.ascontiguousarray(self._attitude[:, kept])
+        return group
 
     def fill(self, state: TrajectoryState, times: FloatArray) -> None:
         """Write the group's columns of the state."""
@@ -142,6 +195,11 @@ class SampledFleet:
             if self.trajectories
             else np.zeros((25, 0))
         )
+        self._find: PieceSearch | None = None
+
+    def subset(self, columns: IntArray) -> SampledFleet:
+        """Return the fleet of some aircraft, given by their indices, ascending."""
+        return SampledFleet([self.trajectories[i] for i in columns.tolist()])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times.
@@ -178,6 +236,42 @@ class SampledFleet:
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        if self._find is None:
+            self._find = PieceSearch([t.sample_times_s for t in self.trajectories])
+        return _in_blocks(self._state, aircraft, time_s)
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        assert self._find is not None
+        samples, first, last = self._find.starts_s, self._find.first, self._find.last
+        start, end = samples[first[aircraft]], samples[last[aircraft]]
+        inside = np.where(time_s > start, time_s, start)
+        inside = np.where(inside < end, inside, end)
+        segment = self._find(aircraft, inside)
+        present = (time_s >= start) & (time_s <= end)
+        return evaluate_segments(
+            self._table.take(segment, axis=1), inside - samples[segment], present
+        )
+
+
+def _in_blocks(
+    state: Callable[[IntArray, FloatArray], TrajectoryState],
+    aircraft: IntArray,
+    time_s: FloatArray,
+) -> TrajectoryState:
+    """Evaluate pairs of aircraft and time, a cache's worth at a time."""
+    blocks = [
+        state(aircraft[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE])
+        for first in range(0, len(aircraft), CELLS_AT_ONCE)
+    ]
+    if len(blocks) == 1:
+        return blocks[0]
+    if not blocks:
+        return _empty_state(1, 0).reshaped((0,))
+    columns = zip(*(block.arrays() for block in blocks), strict=True)
+    return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
 
 def _times(time_s: npt.ArrayLike) -> FloatArray:

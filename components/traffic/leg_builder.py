@@ -63,7 +63,7 @@ def hold_state(
     return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
 
 
-_FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
+FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
 
 
 def segment_state(segment: Segment, elapsed: FloatArray) -> tuple[FloatArray, ...]:
@@ -80,7 +80,7 @@ def segment_state(segment: Segment, elapsed: FloatArray) -> tuple[FloatArray, ..
     -------
     lat_deg, lon_deg, alt_m, yaw_rad, pitch_rad, roll_rad : ndarray, shape (m,)
     """
-    state = _FORMULAS[segment.kind](segment.parameters[:, np.newaxis], elapsed)
+    state = FORMULAS[segment.kind](segment.parameters[:, np.newaxis], elapsed)
     pitch, roll = (np.full_like(elapsed, a) for a in (segment.pitch_rad, segment.roll_rad))
     return (*state, pitch, roll)
 

@@ -1,5 +1,7 @@
 """Scripted traffic: flights written in the scene (``traffic.scripted``)."""
 
+from collections import Counter
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -7,6 +9,7 @@ from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
 from components.traffic import leg_types
+from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
@@ -130,18 +133,19 @@ class ScriptedTraffic(TrafficSource):
     """Ownship and intruders on flights written in the scene: legs, turns, climbs, waypoints."""
 
     Parameters = ScriptedParameters
+    lockstep = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         own = parameters.ownship
         reference = (own.lat_deg, own.lon_deg, own.alt_m)
         self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **_flight(own)
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
         )
-        names = [intruder.name for intruder in parameters.intruders]
-        for twice in sorted({name for name in names if names.count(name) > 1}):
+        used = Counter(intruder.name for intruder in parameters.intruders)
+        for twice in sorted(name for name, count in used.items() if count > 1):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        flights = [_intruder(craft, reference) for craft in parameters.intruders]
+        flights = _intruders(parameters.intruders, reference)
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
@@ -153,7 +157,8 @@ class ScriptedTraffic(TrafficSource):
         return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
 
 
-def _flight(flight: Flight) -> dict[str, Any]:
+def flight_arguments(flight: Flight) -> dict[str, Any]:
+    """Return what a scene says of a flight as arguments of `ScriptedTrajectory`."""
     return {
         "alt_m": flight.alt_m,
         "heading_deg": flight.heading_deg,
@@ -174,32 +179,57 @@ def _leg(leg: Any) -> Any:
     return getattr(leg_types, leg.kind.capitalize())(**values)
 
 
-def _intruder(craft: Intruder, reference: tuple[float, float, float]) -> ScriptedTrajectory:
-    values = _flight(craft) | {
-        "start_time_s": craft.start_time_s,
-        "end_time_s": craft.end_time_s,
-    }
-    geodetic = (craft.lat_deg, craft.lon_deg, craft.alt_m)
-    offset = (craft.east_m, craft.north_m, craft.up_m)
-    if None not in geodetic and offset == (None, None, None):
-        return ScriptedTrajectory(
-            craft.name,
-            lat_deg=float(craft.lat_deg or 0.0),
-            lon_deg=float(craft.lon_deg or 0.0),
-            reference=reference,
-            **values,
-        )
-    if None not in offset[:2] and geodetic == (None, None, None):
-        del values["alt_m"]
-        return ScriptedTrajectory.from_offset(
-            craft.name,
-            east_m=float(craft.east_m or 0.0),
-            north_m=float(craft.north_m or 0.0),
-            up_m=float(craft.up_m or 0.0),
-            reference=reference,
-            **values,
-        )
-    raise ValueError(
-        f"intruder {craft.name!r}: its start must be given as lat_deg, lon_deg and alt_m, or as "
-        "east_m, north_m and up_m from the ownship's start"
+def _intruders(
+    crafts: Sequence[Intruder], reference: tuple[float, float, float]
+) -> list[ScriptedTrajectory]:
+    """Return the flights of all intruders; starts given as offsets are converted together."""
+    starts: list[tuple[float, float, float] | None] = []
+    offsets: list[tuple[float, float, float]] = []
+    for craft in crafts:
+        geodetic = (craft.lat_deg, craft.lon_deg, craft.alt_m)
+        offset = (craft.east_m, craft.north_m, craft.up_m)
+        if None not in geodetic and offset == (None, None, None):
+            starts.append((craft.lat_deg or 0.0, craft.lon_deg or 0.0, craft.alt_m or 0.0))
+        elif None not in offset[:2] and geodetic == (None, None, None):
+            starts.append(None)
+            offsets.append((craft.east_m or 0.0, craft.north_m or 0.0, craft.up_m or 0.0))
+        else:
+            raise ValueError(
+                f"intruder {craft.name!r}: its start must be given as lat_deg, lon_deg and alt_m, "
+                "or as east_m, north_m and up_m from the ownship's start"
+            )
+    converted = iter(_geodetic(offsets, reference))
+    return [
+        _intruder(craft, next(converted) if start is None else start, reference)
+        for craft, start in zip(crafts, starts, strict=True)
+    ]
+
+
+def _geodetic(
+    offsets: list[tuple[float, float, float]], reference: tuple[float, float, float]
+) -> list[tuple[float, float, float]]:
+    east, north, up = np.array(offsets).reshape(-1, 3).T
+    lat, lon, alt = enu_to_geodetic(
+        east,
+        north,
+        up,
+        reference_lat_deg=reference[0],
+        reference_lon_deg=reference[1],
+        reference_alt_m=reference[2],
+    )
+    return list(zip(lat.tolist(), lon.tolist(), alt.tolist(), strict=True))
+
+
+def _intruder(
+    craft: Intruder, start: tuple[float, float, float], reference: tuple[float, float, float]
+) -> ScriptedTrajectory:
+    lat_deg, lon_deg, alt_m = start
+    return ScriptedTrajectory(
+        craft.name,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        reference=reference,
+        start_time_s=craft.start_time_s,
+        end_time_s=craft.end_time_s,
+        **flight_arguments(craft) | {"alt_m": alt_m},
     )

@@ -10,18 +10,22 @@ from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
+from components.known_targets import KnownTraffic
 from components.reach import farthest_look
+from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
+from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.state import TrajectoryState
+from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain
 from dsa_des.clock import ClockSpec
 from dsa_des.component import Component, Parameters, PositiveRational
 from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
-from dsa_des.ports import Output
-from dsa_des.types import FloatArray
-from dsa_des.wake import Wake
+from dsa_des.ports import Input, Output
+from dsa_des.types import FloatArray, IntArray
+from dsa_des.wake import Arrivals, Wake
 
 
 class SourceParameters(Parameters):
@@ -49,17 +53,31 @@ class Fleet(Protocol):
     def at(self, time_s: Any) -> TrajectoryState:
         """Return their states, shape (times, aircraft)."""
 
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of aircraft (n,), each at a time (n,) of its own."""
+
+    def subset(self, columns: IntArray) -> "Fleet":
+        """Return the flights of some of them, given by their indices, ascending."""
+
 
 class TrafficSource(Component):
     """Publishes where the ownship and its targets are.
+
+    When manoeuvres are wired to it, its ownship flies them from the time they come.
 
     Subclasses set `own`, `fleet` and `roster` in `setup`, and say at which times their data hold
     samples.
     """
 
+    inputs = {
+        "manoeuvres": Input(
+            Manoeuvres, "queued", "Turns that the ownship is told to fly.", required=False
+        )
+    }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
     Parameters: ClassVar[Any] = SourceParameters
     windowed = True
+    rewindable = True
     clocked = "demand"
 
     own: Trajectory
@@ -73,9 +91,13 @@ class TrafficSource(Component):
         rate = parameters.update_rate_hz
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
-    def offer(self, port: str) -> Roster:
-        """Say what the targets are."""
-        return self.roster
+    def offer(self, port: str) -> KnownTraffic:
+        """Say what the targets are, and where they can be."""
+        return KnownTraffic(self.roster, None if self.context.producers else self._envelope)
+
+    def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
+        duration_s = float(self.context.duration_s) + lasts_s
+        return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
 
     def setup(self) -> None:
         """Learn how far anybody looks; what stays beyond it is not moved."""
@@ -84,16 +106,24 @@ class TrafficSource(Component):
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
         self._everybody = np.arange(len(self.roster))
         self._culling: Culling | None = None
-        reach_m = farthest_look(c.request for c in self.context.consumers).range_m
-        on_demand = self.clock_of(self.p) is None
-        if math.isfinite(reach_m) and on_demand and not self.context.simulate_everything:
-            subset = type(self.fleet)
-            self._culling = Culling(self.own, self.targets, self.fleet, subset, reach_m)
+        self._steered = bool(self.context.producers)
+        if self._steered:
+            self.own = SteeredFlight(self.own)
+        look = farthest_look(c.request for c in self.context.consumers)
+        self._flights_asked_for = look.lasts_s > 0.0
+        known = self.clock_of(self.p) is None and not self._steered
+        if math.isfinite(look.range_m) and known and not self.context.simulate_everything:
+            end_s = float(self.context.duration_s)
+            self._culling = Culling(
+                self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
+            )
 
     @property
     def width(self) -> int:
-        """Number of targets that are moved at the start."""
-        return len(self.roster) if self._culling is None else len(self._culling.active(0, 0)[0])
+        """Most targets that are moved at one time."""
+        if self._culling is None:
+            return len(self.roster)
+        return self._culling.intervals.most_at_once()
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
@@ -104,11 +134,13 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
+        for new in wake.arrivals("manoeuvres"):
+            self._steer(new)
         time_s = wake.time_s
         own = self.own.at(time_s)
         columns, fleet = self._everybody, self.fleet
         if self._culling is not None:
-            columns, fleet = self._culling.active(float(time_s[0]), float(time_s[-1]))
+            columns, fleet = self._culling.active(float(time_s.min()), float(time_s.max()))
         states = fleet.at(time_s)
         return TrafficStates(
             tick=wake.ticks,
@@ -127,7 +159,41 @@ class TrafficSource(Component):
             present=states.present & own.present[:, np.newaxis],
             roster=self.roster,
             columns=columns,
+            flights=self.flights if self._flights_asked_for else None,
         )
+
+    def flights(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the states of the ownship and of some targets, each at a time of its own.
+
+        Parameters
+        ----------
+        columns : (targets,) of int
+        time_s : (rows, targets)
+            With an ``update_rate_hz``, the last publication up to then counts.
+
+        Returns
+        -------
+        own, others : TrajectoryState
+            Arrays (rows, targets).
+        """
+        if self.p.update_rate_hz is not None:
+            rate = float(self.p.update_rate_hz)
+            time_s = np.floor(time_s * rate) / rate
+        others = self.fleet.each(
+            np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        )
+        return self.own.at(time_s), others.reshaped(time_s.shape)
+
+    def _steer(self, new: Arrivals) -> None:
+        """Turn the ownship at the times at which manoeuvres have come."""
+        told = zip(new.tick.tolist(), new.message.turn_rad, new.message.rate_rad_s, strict=True)
+        for tick, turn_rad, rate_rad_s in told:
+            assert isinstance(self.own, SteeredFlight)
+            self.own = self.own.turned(
+                tick / self.context.ticks_per_s, float(turn_rad), float(rate_rad_s)
+            )
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""

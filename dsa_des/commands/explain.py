@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from dsa_des.commands.loading import load
@@ -54,30 +55,39 @@ def _bound(item: Planned) -> str:
 
 
 class _Timed:
-    """A built effect that adds up the processor time spent in it."""
+    """A built effect that adds up the time spent in it, in calls of it and of its methods."""
 
-    def __init__(self, built: Callable[..., Any]) -> None:
+    def __init__(self, built: Any) -> None:
         self.built = built
-        self.cpu_s = 0.0
+        self.spent_s = 0.0
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        started = time.perf_counter()
-        try:
-            return self.built(*args, **kwargs)
-        finally:
-            self.cpu_s += time.perf_counter() - started
+        return self._timed(self.built, *args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.built, name)
+        value = getattr(self.built, name)
+        return partial(self._timed, value) if callable(value) else value
+
+    def _timed(self, call: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        started = time.perf_counter()
+        try:
+            return call(*args, **kwargs)
+        finally:
+            self.spent_s += time.perf_counter() - started
 
 
 def measured_shares(
     scene: Scene, simulate_everything: bool = False
 ) -> dict[tuple[str, str], float]:
-    """Run a scene and return each built effect's share of the run time, by (block, effect)."""
+    """Run a scene and return each built effect's share of the run time, by (block, effect).
+
+    An effect that is a choice rather than a calculation, such as the name of a method, has none.
+    """
     timed: dict[tuple[str, str], _Timed] = {}
 
     def wrap(item: Planned, built: Any) -> Any:
+        if not callable(built):
+            return built
         timed[item.block, item.effect.name] = _Timed(built)
         return timed[item.block, item.effect.name]
 
@@ -85,4 +95,4 @@ def measured_shares(
     started = time.perf_counter()
     simulation.run()
     whole = time.perf_counter() - started
-    return {key: effect.cpu_s / whole for key, effect in timed.items()}
+    return {key: effect.spent_s / whole for key, effect in timed.items()}

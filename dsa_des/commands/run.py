@@ -17,6 +17,7 @@ from dsa_des.commands.loading import load
 from dsa_des.recording import ObserverSink, Recorder
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
 from dsa_des.toml_text import to_toml
 
@@ -37,6 +38,29 @@ def run_scene(
     """Run a scene into a folder, then print its summary."""
     loaded = load(scene, sets, swaps, seed, duration)
     target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
+    summary = record_run(
+        loaded, target, simulate_everything=simulate_everything, silent=quiet or as_json
+    )
+    if as_json:
+        click.echo(json.dumps(summary, indent=2))
+    elif not quiet:
+        from rich.console import Console
+
+        console = Console()
+        for report in load_reports():
+            report.show(console, summary)
+
+
+def record_run(
+    loaded: Scene, target: Path, *, simulate_everything: bool = False, silent: bool = True
+) -> dict[str, Any]:
+    """Run a checked scene into the folder `target` and return its summary.
+
+    Raises
+    ------
+    UsageError
+        If the folder holds something other than a run.
+    """
     check_target(target)
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
@@ -50,7 +74,7 @@ def run_scene(
 
         recorder.sinks += [ParquetSink(folder), observers]
         started = time.perf_counter()
-        with _progress(simulation, silent=quiet or as_json) as progress:
+        with _progress(simulation, silent=silent) as progress:
             outcome = simulation.run(progress)
         summary = _summary(observers, outcome, target)
         scene_text = to_toml(loaded.resolved())
@@ -60,14 +84,7 @@ def run_scene(
         write_json(folder / RUN_JSON, info)
         for report in reports:
             report.draw(simulation, folder, summary)
-    if as_json:
-        click.echo(json.dumps(summary, indent=2))
-    elif not quiet:
-        from rich.console import Console
-
-        console = Console()
-        for report in reports:
-            report.show(console, summary)
+    return summary
 
 
 def _summary(observers: ObserverSink, outcome: Outcome, target: Path) -> dict[str, Any]:

@@ -116,6 +116,9 @@ def run_rung(scene: Scene, block: str) -> RungRun:
 
     def watched(wake: Wake) -> Any:
         nonlocal spent
+        # In a feedback loop the engine may take a window back and run it again from some instant.
+        while wakes and wakes[-1].ticks[0] >= wake.ticks[0]:
+            wakes.pop()
         wakes.append(wake)
         started = time.process_time_ns()
         result = own(wake)

@@ -1,7 +1,7 @@
 """Write itur_table.csv: values of the library ITU-Rpy, an independent reading of the same
 Recommendations, frozen so that the tests need neither it nor a network.
 
-Run where `pip install itur==0.4.0` has been done: python tests/atmosphere/make_itur_table.py
+Run where `pip install -e '.[oracle]'` has been done: python tests/atmosphere/make_itur_table.py
 """
 
 import csv
@@ -19,7 +19,8 @@ def gas(frequency_ghz, dry_pressure_hpa, temperature_k, vapour_density_g_m3):
     return float(itu676.__gamma0_exact__(model, *air) + itu676.__gammaw_exact__(model, *air))
 
 
-def main():
+def table():
+    """Return rows of quantity, up to four arguments ("" where there are fewer), and value."""
     rng = random.Random(7)
     rows = []
     for frequency in (
@@ -58,10 +59,14 @@ def main():
         height = np.array(km)
         rows.append(("pressure", km, "", "", "", float(model.standard_pressure(height))))
         rows.append(("temperature", km, "", "", "", float(model.standard_temperature(height))))
+    return rows
+
+
+def main():
     with open(Path(__file__).with_name("itur_table.csv"), "w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("quantity", "a", "b", "c", "d", "value"))
-        writer.writerows((*row[:-1], f"{row[-1]:.16g}") for row in rows)
+        writer.writerows((*row[:-1], f"{row[-1]:.16g}") for row in table())
 
 
 if __name__ == "__main__":

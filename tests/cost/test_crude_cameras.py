@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from components.known_targets import known_targets
 from components.optical.convex_hull import union_area
 from components.optical.projection import fuselage_length_m
 from components.optical.sampled_silhouette import body_mesh, sampled_table
@@ -41,18 +42,14 @@ def test_a_range_boundary_sees_all_within_3_km_on_a_grid_of_a_tenth_of_a_degree(
 def test_a_line_is_detected_where_its_pixels_reach_the_threshold():
     simulation, tables = run(swaps=["eo=optical.projection"])
     camera = simulation.components["eo"]
-    craft = dict(zip(*_roster(simulation), strict=True))
+    (roster,) = known_targets(camera.context)
+    craft = dict(zip(roster.names, roster.aircraft, strict=True))
     for d in seen_by(tables, "eo"):
         areas = craft[d["target"]].eo
         length = float(fuselage_length_m(np.array(areas.front_m2), np.array(areas.side_m2)))
         pixels = length / (d["true_range_m"] * camera.pixel_azimuth_rad)
         assert d["pixels"] == pytest.approx(pixels, rel=1e-12)
         assert 0.3 * pixels * craft[d["target"]].contrast >= 1.0 - 1e-9
-
-
-def _roster(simulation):
-    roster = simulation.components["traffic"].offer("states")
-    return roster.names, roster.aircraft
 
 
 def test_the_fuselage_is_a_cylinder_with_round_ends():

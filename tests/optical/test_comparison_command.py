@@ -77,9 +77,9 @@ def test_aircraft_file_mesh_and_scale(configs, synthetic_aircraft, tmp_path, cap
 BAD = [
     ({"--areas": "4,20"}, "--areas is '4,20': it must be three numbers"),
     ({"--areas": "4,20,x"}, "must be three numbers"),
-    ({"--areas": "4,20,-1"}, "horizontal_m2 is -1.0: it must be 0 or more"),
+    ({"--areas": "4,20,-1"}, "horizontal_m2 is -1: it must be finite and 0 or more"),
     ({"--models": "exact,best"}, "--models has 'best'"),
-    ({"--step-deg": "7"}, "step_deg is 7.0"),
+    ({"--step-deg": "7"}, "step_deg is 7"),
     ({"--reference": None}, "--reference and --mesh are missing"),
     ({"--reference": "none.csv"}, "none.csv"),
     ({"--areas": None, "--aircraft": "sensors/oasys.toml"}, "has no eo.front_m2"),

@@ -125,11 +125,11 @@ def test_daylight_gain_and_blinding():
         ({"background": "sea"}, "background is 'sea'"),
         ({"sun_elevation_rad": -0.1}, "sun_elevation_rad is -0.1.*above 0"),
         ({"paint_reflectance": 1.2}, "paint_reflectance is 1.2"),
-        ({"ground_reflectance": 0.0}, "ground_reflectance is 0.0"),
-        ({"visibility_m": 0.0}, "visibility_m is 0.0"),
-        ({"range_m": -5.0, "visibility_m": 1.0}, "range_m is -5.0"),
+        ({"ground_reflectance": 0.0}, "ground_reflectance is 0"),
+        ({"visibility_m": 0.0}, "visibility_m is 0"),
+        ({"range_m": -5.0, "visibility_m": 1.0}, "range_m is -5"),
         ({"contrast": np.nan}, "contrast is nan"),
-        ({"sun_exclusion_rad": -1.0}, "sun_exclusion_rad is -1.0"),
+        ({"sun_exclusion_rad": -1.0}, "sun_exclusion_rad is -1"),
     ],
 )
 def test_bad_input_is_named(change, says):

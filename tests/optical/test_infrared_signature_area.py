@@ -50,7 +50,7 @@ def test_engine_adds_the_plume_and_none_is_the_thesis():
         ({"engine": "rocket"}, "engine is 'rocket'.*propeller, turbofan, turbojet"),
         ({"engine": "turbofan", "plume_share_of_back": -0.1}, "plume_share_of_back is -0.1"),
         ({"plume_share_of_back": 0.5}, "engine is None"),
-        ({"back_m2": -1.0}, "back_m2 is -1.0"),
+        ({"back_m2": -1.0}, "back_m2 is -1"),
     ],
 )
 def test_bad_input_is_named(change, says):

@@ -120,11 +120,11 @@ def test_detection_range_at_its_ends():
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: pixels_covered(1.0, -1.0, **CAMERA), "range_m is -1.0"),
+        (lambda: pixels_covered(1.0, -1.0, **CAMERA), "range_m is -1"),
         (lambda: pixels_covered([1.0, np.nan], 1.0, **CAMERA), "area_m2 is nan"),
         (lambda: pixels_covered(1.0, 1.0, **{**CAMERA, "sensor_pixels": 0}), "sensor_pixels is 0"),
         (lambda: detection_range(1.0, pixel_azimuth_rad=0.0, pixel_elevation_rad=1.0), "pixel_az"),
-        (lambda: line_of_sight_rate(0.0, 0.0, 0.0, 0.0, 0.0), "interval_s is 0.0"),
+        (lambda: line_of_sight_rate(0.0, 0.0, 0.0, 0.0, 0.0), "interval_s is 0"),
         (lambda: line_of_sight_rate(0.0, 0.0, np.nan, 0.0, 1.0), "previous_azimuth_rad is nan"),
         (lambda: line_of_sight_rate(0.0, 0.0, 0.0, 0.0, 1.0, model="x"), "model is 'x'"),
         (lambda: total_signature(1.0, contrast_gain=-0.5), "contrast_gain is -0.5"),

@@ -101,9 +101,9 @@ def test_back_is_shown_when_it_flies_away():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"front_m2": -1.0}, "front_m2 is -1.0"),
+        ({"front_m2": -1.0}, "front_m2 is -1"),
         ({"side_m2": np.nan}, "side_m2 is nan"),
-        ({"back_m2": [3.0, -2.0]}, "back_m2 is -2.0"),
+        ({"back_m2": [3.0, -2.0]}, "back_m2 is -2"),
         ({"horizontal_m2": None}, "horizontal_m2 is missing"),
         ({"front_m2": "wide"}, "front_m2 is 'wide'"),
         ({"model": "cube"}, "model is 'cube'.*exact, thesis"),

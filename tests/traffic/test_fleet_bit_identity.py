@@ -71,3 +71,32 @@ def test_empty_fleet(fleet):
 def test_times_need_one_axis():
     with pytest.raises(ValueError, match="time_s has shape"):
         ScriptedFleet(scripted(1)).at(np.zeros((2, 2)))
+
+
+def assert_each_same(fleet, low, high):
+    rng = np.random.default_rng(3)
+    aircraft = rng.integers(0, len(fleet.trajectories), 3000)
+    times = rng.uniform(low, high, 3000)
+    times[:200] = np.round(times[:200])  # some right at the start of a leg or at a sample
+    pairs = fleet.each(aircraft, times)
+    whole = fleet.at(times)
+    for a, b in zip(pairs.arrays(), whole.arrays(), strict=True):
+        np.testing.assert_array_equal(a, b[np.arange(3000), aircraft])
+    assert fleet.each(aircraft[:0], times[:0]).lat_deg.shape == (0,)
+
+
+def test_each_scripted_aircraft_at_a_time_of_its_own():
+    several = ScriptedTrajectory(
+        "many", lat_deg=1, lon_deg=2, alt_m=3, speed_mps=50,
+        legs=[leg for k in range(9) for leg in (Straight(3.0), Turn(rate_deg_s=3, duration_s=4))],
+    )  # fmt: skip
+    assert_each_same(ScriptedFleet([*scripted(40), several]), -5, 95)
+
+
+def test_each_sampled_aircraft_at_a_time_of_its_own():
+    made = []
+    for k, t in enumerate(scripted(9)):
+        times = np.arange(0, 60, 0.5 + k % 3) if k else np.array([30.0])
+        s = t.at(times)
+        made.append(SampledTrajectory(t.name, times, s.lat_deg, s.lon_deg, s.alt_m))
+    assert_each_same(SampledFleet(made), -5, 70)

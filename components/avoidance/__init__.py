@@ -1,0 +1,1 @@
+"""What the ownship does about what it sees."""

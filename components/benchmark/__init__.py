@@ -1,0 +1,1 @@
+"""How fast is a run, and compared with what?"""

@@ -1,0 +1,99 @@
+"""``dsa-des benchmark``: run every case in a process of its own, print and write the rows."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from components.benchmark.cases import Case, chosen
+from dsa_des.errors import UsageError
+from dsa_des.run_folder import write_json
+
+# The thesis's run time for its scene, 3 s for 21,600 target-scans (errata 24).
+_THESIS_PER_S = 7200.0
+
+
+def run_benchmark(
+    scenes: tuple[str, ...],
+    quick: bool,
+    repeats: int | None,
+    json_file: str | None,
+    compare: str | None,
+) -> None:
+    """Measure the cases; without names, all of them."""
+    from rich.console import Console
+
+    cases = chosen(scenes)
+    before = {} if compare is None else _read(Path(compare))
+    target = None if json_file is None else Path(json_file)
+    if target is not None and not target.parent.is_dir():
+        raise UsageError(f"--json {target}: the folder {target.parent} does not exist")
+    console = Console()
+    rows = []
+    for case in cases:
+        console.print(f"{case.name}: {case.what} ...", style="dim")
+        rows.append(_measured(case, quick, repeats or (2 if quick else 5)))
+    console.print(_table(cases, rows, before))
+    thesis = [row for row in rows if row["scene"] == "thesis"]
+    for row in thesis:
+        times = row["target_scans_per_s"] / _THESIS_PER_S
+        console.print(f"thesis scene: {times:.0f} times the thesis's own 7,200 target-scans/s")
+    if target is not None:
+        write_json(target, rows)
+        console.print(f"rows written to {target}")
+
+
+def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
+    """Measure times and memory in two fresh processes."""
+    row: dict[str, Any] = {}
+    for more in ([f"--repeats={repeats}"], ["--memory"]):
+        command = [sys.executable, "-m", "components.benchmark.measure", case.name, *more]
+        done = subprocess.run(
+            [*command, "--quick"] if quick else command, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            raise UsageError(f"scene {case.name} failed:\n{done.stderr.strip()}")
+        row.update(json.loads(done.stdout))
+    return row
+
+
+def _read(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        return {row["scene"]: row for row in rows}
+    except OSError as error:
+        raise UsageError(f"--compare {path}: {error.strerror}") from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise UsageError(f"--compare {path}: not the rows of a benchmark ({error})") from error
+
+
+def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    headings = ["scene", "target-scans/s", "x yardstick", "wanted", "CPU", "per simulated s"]
+    headings += ["peak memory", "Parquet adds", *(["speed since"] if before else [])]
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    for case, row in zip(cases, rows, strict=True):
+        cells = [
+            case.name,
+            f"{row['target_scans_per_s'] / 1e6:.2f} M",
+            f"{row['ratio_to_yardstick']:.1f}",
+            f"{case.wanted:g}",
+            f"{row['cpu_s']:.3f} s",
+            f"{row['cpu_ms_per_simulated_s']:.2f} ms",
+            f"{row['peak_memory_mb']:.0f} MB",
+            f"{row['parquet_adds']:+.0%}",
+        ]
+        if before:
+            old = before.get(case.name)
+            cells.append("" if old is None else _change(row, old))
+        table.add_row(*cells)
+    return table
+
+
+def _change(row: dict[str, Any], old: dict[str, Any]) -> str:
+    """Compare ratios to the yardstick, which survive a change of machine."""
+    return f"{row['ratio_to_yardstick'] / old['ratio_to_yardstick']:.2f} x"

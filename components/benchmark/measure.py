@@ -1,0 +1,133 @@
+"""Time one benchmark scene, the engine and the yardstick in turn, in this process.
+
+``python -m components.benchmark.measure SCENE ...`` prints one JSON object; the command starts it
+anew for every scene, so that peak memory is that scene's own and nothing is warm from another.
+"""
+
+import argparse
+import json
+import os
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from components.benchmark import yardstick
+from components.benchmark.cases import Case, chosen, replicas_of, scene_of
+from dsa_des.lockstep import LockStep
+from dsa_des.recording import MemorySink, Recorder, Sink
+from dsa_des.scene import Scene
+from dsa_des.simulation import Simulation
+
+# The yardstick samples this many replicas of many.
+_SAMPLED_REPLICAS = 5
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure one scene and print what was found."""
+    parser = argparse.ArgumentParser(prog="python -m components.benchmark.measure")
+    parser.add_argument("scene")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--memory", action="store_true", help="run the engine once, for its memory")
+    options = parser.parse_args(arguments)
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    (case,) = chosen([options.scene])
+    scene = scene_of(case, quick=options.quick)
+    scenes = replicas_of(scene, _replicas(case, options.quick)) if case.replicas else []
+    if options.memory:
+        _engine(scene, scenes, MemorySink())
+        print(json.dumps({"peak_memory_mb": _peak_mb()}))
+        return 0
+    print(json.dumps(measured(case, scene, scenes, options.repeats)))
+    return 0
+
+
+def measured(case: Case, scene: Scene, scenes: list[Scene], repeats: int) -> dict[str, Any]:
+    """Return medians over interleaved repetitions."""
+    engine, parquet, plain = [], [], []
+    units = 0
+    for _ in range(repeats):
+        cpu_s, units = _engine(scene, scenes, MemorySink())
+        engine.append(cpu_s)
+        plain.append(_yardstick(case, scene, scenes))
+        parquet.append(_with_parquet(scene, scenes))
+    cpu_s, seconds_per_unit = median(engine), median(plain)
+    simulated_s = float(Simulation(scene).duration_s) * max(1, len(scenes))
+    return {
+        "scene": case.name,
+        "target_scans": units,
+        "target_scans_per_s": units / cpu_s,
+        "ratio_to_yardstick": median(
+            per_unit * units / own for own, per_unit in zip(engine, plain, strict=True)
+        ),
+        "yardstick_target_scans_per_s": 1.0 / seconds_per_unit,
+        "cpu_s": cpu_s,
+        "cpu_s_min": min(engine),
+        "cpu_s_max": max(engine),
+        "cpu_ms_per_simulated_s": 1000.0 * cpu_s / simulated_s,
+        "parquet_adds": median(p / own - 1.0 for own, p in zip(engine, parquet, strict=True)),
+    }
+
+
+def _replicas(case: Case, quick: bool) -> int:
+    return case.quick_replicas if quick else case.replicas
+
+
+def _timed(run: Callable[[], Any]) -> float:
+    started = time.process_time()
+    run()
+    return time.process_time() - started
+
+
+def _made(scene: Scene, scenes: list[Scene], sink: Sink) -> Simulation:
+    recorder = Recorder([sink])
+    return LockStep(scenes, recorder=recorder) if scenes else Simulation(scene, recorder=recorder)
+
+
+def _engine(scene: Scene, scenes: list[Scene], sink: Sink) -> tuple[float, int]:
+    """Return the CPU time of the whole run with recording, and its target-scans."""
+    simulation = _made(scene, scenes, sink)
+    cpu_s = _timed(simulation.run)
+    scans = sum(
+        len(node.clock.between(0, simulation.end_tick)[0])
+        for node in simulation.nodes.values()
+        if node.clock is not None
+    )
+    traffic: Any = simulation.components["traffic"]
+    return cpu_s, scans * len(getattr(traffic, "face", traffic).roster)
+
+
+def _with_parquet(scene: Scene, scenes: list[Scene]) -> float:
+    from dsa_des.arrow import ParquetSink
+
+    with tempfile.TemporaryDirectory() as folder:
+        return _timed(_made(scene, scenes, ParquetSink(Path(folder))).run)
+
+
+def _yardstick(case: Case, scene: Scene, scenes: list[Scene]) -> float:
+    """Return the yardstick's seconds per target-scan."""
+    step = max(1, len(scenes) // _SAMPLED_REPLICAS)
+    prepared = [yardstick.prepare(Simulation(one)) for one in (scenes[::step] or [scene])]
+    units = 0
+
+    def run() -> None:
+        nonlocal units
+        for one in prepared:
+            units += yardstick.run(one, case.every).target_scans
+
+    return _timed(run) / max(1, units)
+
+
+def _peak_mb() -> float:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

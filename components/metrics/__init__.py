@@ -1,0 +1,1 @@
+"""What studies measure of a detect-and-sense run: detection, declaration, fusion, encounters."""

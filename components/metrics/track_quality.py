@@ -1,0 +1,231 @@
+"""How fresh, how steady and how right the fused picture is (``age_of_information``,
+``track_updates``, ``position_error``)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from components.metrics.rows import FUSED, TargetParameters, chosen, name_ranks, of_target
+from dsa_des.message import Text
+from dsa_des.scene import Scene
+from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
+from dsa_des.types import BoolArray, FloatArray, IntArray
+
+
+class _Lines:
+    """Rows of one table, sorted by replica, target and time; *gaps* lie between two of a line."""
+
+    def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
+        self.rows = chosen(columns, rows, "target", "time_s", *names)
+        target = name_ranks(self.rows["target"])
+        self.order = np.lexsort((self.rows["time_s"], target, self.rows["replica"]))
+        self.replica: IntArray = self.rows["replica"][self.order]
+        self.time_s: FloatArray = self.rows["time_s"][self.order]
+        target = target[self.order]
+        same = (self.replica[1:] == self.replica[:-1]) & (target[1:] == target[:-1])
+        #: Index of the row at which each gap ends.
+        self.end: IntArray = np.flatnonzero(same) + 1
+        self.gap_s = self.time_s[self.end] - self.time_s[self.end - 1]
+        self.of_gap = self.replica[self.end]
+
+
+def _sums(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
+    return np.bincount(replica, weights=values, minlength=count).astype(float)
+
+
+def _means(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
+    many = np.bincount(replica, minlength=count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.where(many > 0, _sums(replica, values, count) / many, np.nan))
+
+
+def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) -> FloatArray:
+    """Return each replica's quantile: the smallest value that `share` lie at or below."""
+    order = np.lexsort((values, replica))
+    many = np.bincount(replica, minlength=count)
+    start = np.cumsum(many) - many
+    place = start + np.maximum(np.ceil(share * many).astype(np.int64) - 1, 0)
+    found = np.full(count, np.nan)
+    some = many > 0
+    found[some] = values[order][place[some]]
+    return found
+
+
+class AgeOfInformation(Metric):
+    """Age of the newest detection that the fusion holds of a target, over its time in view.
+
+    Between two arrivals the age grows with time; the mean and the 95th percentile are over time,
+    from the first arrival to the last. Delays of the wires into the fusion count, random lateness
+    on them does not.
+    """
+
+    Parameters = TargetParameters
+    tables = {FUSED: ("target", "sensors", "time_s", "block")}
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        self.fusion = recorded_by(scene, FUSED)[0]
+        self.delay_s = {
+            wire.source: float(wire.total_delay_s)
+            for wire in scene.wires
+            if wire.target == self.fusion
+        }
+
+    def results(self) -> list[Result]:
+        """Return mean and 95th percentile."""
+        return [
+            Result("age_of_information_mean_s", NUMBER, "mean age of what the fusion holds, s"),
+            Result("age_of_information_p95_s", NUMBER, "age exceeded 5 % of the time, s"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return mean and percentile of every replica."""
+        columns = group.tables[FUSED]
+        lines = _Lines(columns, of_target(columns, self.p.target), "sensors")
+        delays = self._delays(lines.rows["sensors"])[lines.order]
+        # What arrives now may be older than what is held: the newest origin counts.
+        origin = _running_max(lines.time_s - delays, lines)
+        low = lines.time_s[lines.end - 1] - origin[lines.end - 1]
+        high = low + lines.gap_s
+        count = len(group)
+        area = _sums(lines.of_gap, (low + high) / 2.0 * lines.gap_s, count)
+        span = _sums(lines.of_gap, lines.gap_s, count)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.where(span > 0, area / span, np.nan)
+        return {
+            "age_of_information_mean_s": mean,
+            "age_of_information_p95_s": _ramp_quantiles(lines.of_gap, low, high, span, 0.95),
+        }
+
+    def _delays(self, column: Any) -> FloatArray:
+        assert isinstance(column, Text)
+        shortest = [
+            min((self.delay_s.get(name, 0.0) for name in names.split("+")), default=0.0)
+            for names in column.names
+        ]
+        return np.array([*shortest, 0.0])[column.codes]
+
+
+def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
+    """Return the largest value so far on each line."""
+    if len(values) == 0:
+        return values
+    starts = np.ones(len(values), dtype=bool)
+    starts[lines.end] = False
+    # Ranks are whole numbers: raising each line above the one before it rounds nothing.
+    known, rank = np.unique(values, return_inverse=True)
+    line = np.cumsum(starts)
+    highest: IntArray = np.maximum.accumulate(rank + line * len(known)) - line * len(known)
+    return known[highest]
+
+
+def _ramp_quantiles(
+    replica: IntArray, low: FloatArray, high: FloatArray, span: FloatArray, share: float
+) -> FloatArray:
+    """Return the age that is not exceeded for `share` of the time, ages being ramps low → high."""
+    found = np.full(len(span), np.nan)
+    for number in np.flatnonzero(span > 0).tolist():
+        start, end = np.searchsorted(replica, [number, number + 1])
+        lows, highs = np.sort(low[start:end]), np.sort(high[start:end])
+        # Time spent at or below age x is Σ min(x, high) - min(x, low): piecewise linear in x.
+        ages = np.unique(np.concatenate([lows, highs]))
+        below = _clipped_sums(highs, ages) - _clipped_sums(lows, ages)
+        found[number] = np.interp(share * span[number], below, ages)
+    return found
+
+
+def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
+    """Return Σ min(x, value) over ascending values, for every x."""
+    total = np.concatenate(([0.0], np.cumsum(ascending)))
+    place = np.searchsorted(ascending, at, side="right")
+    return total[place] + (len(ascending) - place) * at
+
+
+class TrackParameters(TargetParameters):
+    """Parameters of track metrics."""
+
+    break_after_s: float = Field(
+        default=2.0, gt=0, description="Time without an update after which a track is broken, s."
+    )
+
+
+class TrackUpdates(Metric):
+    """How often tracks are updated, and how much of the time they are not broken.
+
+    A track is broken from `break_after_s` after an update until the next one.
+    """
+
+    Parameters = TrackParameters
+    tables = {"tracks": ("target", "time_s", "age_s", "block")}
+
+    def results(self) -> list[Result]:
+        """Return interval, continuity and breaks."""
+        return [
+            Result("track_update_interval_s", NUMBER, "mean time between updates of a track, s"),
+            Result("track_update_interval_p95_s", NUMBER, "95th percentile of it, s"),
+            Result("track_continuity", NUMBER, "share of a track's time that it is not broken"),
+            Result("track_breaks", NUMBER, "number of breaks"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return all four of every replica."""
+        columns: Any = group.tables["tracks"]
+        updated = of_target(columns, self.p.target) & (columns["age_s"] <= 0.0)
+        lines = _Lines(columns, updated)
+        count = len(group)
+        broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)
+        span = _sums(lines.of_gap, lines.gap_s, count)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            continuity = np.where(span > 0, 1.0 - _sums(lines.of_gap, broken, count) / span, np.nan)
+        breaks = _sums(lines.of_gap, (broken > 0.0).astype(float), count)
+        has = np.bincount(lines.replica, minlength=count) > 0
+        return {
+            "track_update_interval_s": _means(lines.of_gap, lines.gap_s, count),
+            "track_update_interval_p95_s": _quantiles(lines.of_gap, lines.gap_s, count, 0.95),
+            "track_continuity": continuity,
+            "track_breaks": np.where(has, breaks, np.nan),
+        }
+
+
+class PositionError(Metric):
+    """How far fused positions lie from the true ones, root mean square over all of a run."""
+
+    Parameters = TargetParameters
+    tables = {
+        FUSED: (
+            "target", "azimuth_rad", "elevation_rad", "range_m",
+            "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+        )
+    }  # fmt: skip
+
+    def results(self) -> list[Result]:
+        """Return the error of positions (where there is a range) and of directions."""
+        return [
+            Result("fused_position_error_m", NUMBER, "distance to the true position, rms, m"),
+            Result("fused_angle_error_deg", NUMBER, "angle to the true direction, rms, deg"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return both errors of every replica."""
+        columns: Any = group.tables[FUSED]
+        rows = chosen(columns, of_target(columns, self.p.target), *self.tables[FUSED][1:])
+        seen = _direction(rows["azimuth_rad"], rows["elevation_rad"])
+        true = _direction(rows["true_azimuth_rad"], rows["true_elevation_rad"])
+        chord = np.sqrt(sum((s - t) ** 2 for s, t in zip(seen, true, strict=True)))
+        angle = 2.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
+        replica, count = rows["replica"], len(group)
+        ranged = np.flatnonzero(~np.isnan(rows["range_m"]))
+        r, t = rows["range_m"][ranged], rows["true_range_m"][ranged]
+        # Law of cosines, without cancellation where the two points are close.
+        square = (r - t) ** 2 + r * t * chord[ranged] ** 2
+        return {
+            "fused_position_error_m": np.sqrt(_means(replica[ranged], square, count)),
+            "fused_angle_error_deg": np.degrees(np.sqrt(_means(replica, angle**2, count))),
+        }
+
+
+def _direction(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> tuple[FloatArray, ...]:
+    level = np.cos(elevation_rad)
+    return level * np.cos(azimuth_rad), level * np.sin(azimuth_rad), np.sin(elevation_rad)

@@ -1,0 +1,131 @@
+"""Where the traffic's lines of sight can lie over a run, proven from samples and largest speeds.
+
+Nothing moves farther than its largest speed times half the spacing of the samples from where a
+sample saw it. What holds at the samples, widened by that, holds all the time.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.geometry.ellipsoid import (
+    ECCENTRICITY_SQUARED,
+    SEMI_MAJOR_AXIS_M,
+    line_of_sight,
+)
+from components.reach import REACH_MARGIN
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.trajectory import SampledTrajectory
+
+Interval = tuple[float, float]
+
+# Two per second where there are few aircraft, and a tenth of a second's work where there are many.
+_SPACING_S = 0.5
+_MOST_CELLS = 200_000
+# As in `culling`: speeds of turns and long legs hold to 2e-4, positions to less than a metre.
+_SPEED_MARGIN = 1.001
+_POSITION_MARGIN_M = 1.0
+
+
+@dataclass(frozen=True)
+class TrafficEnvelope:
+    """What the targets that come in reach, and the ownship, can do over a run.
+
+    Parameters
+    ----------
+    range_m : float
+        Longest line of sight within reach; 0 if no target ever comes in reach.
+    own_lat_deg, own_alt_m, target_alt_m : (low, high)
+    elevation_rad : float
+        Largest size of an elevation above the ownship's horizon, of targets in reach.
+    pitch_rad, roll_rad : float
+        Largest sizes of the ownship's pitch and roll.
+    """
+
+    range_m: float
+    own_lat_deg: Interval
+    own_alt_m: Interval
+    target_alt_m: Interval
+    elevation_rad: float
+    pitch_rad: float
+    roll_rad: float
+
+
+def traffic_envelope(
+    own: Any, targets: Any, fleet: Any, duration_s: float, reach_m: float
+) -> TrafficEnvelope:
+    """Bound a run's lines of sight up to a reach.
+
+    Parameters
+    ----------
+    own : object with `at(time_s)` and `max_speed_mps`
+    targets : sequence of the like
+    fleet : object with `at(time_s)`
+        All targets.
+    duration_s : float
+    reach_m : float
+        Infinite where somebody looks at everything.
+    """
+    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
+    intervals = max(1, math.ceil(count))
+    half_s = 0.5 * duration_s / intervals
+    times = (np.arange(intervals) + 0.5) * (2.0 * half_s)
+    own_state, states = own.at(times), fleet.at(times)
+    own_moves = _moves_m(own.max_speed_mps, half_s)
+    moves = np.array([_moves_m(target.max_speed_mps, half_s) for target in targets])
+    _, elevation, range_m = line_of_sight(
+        own_state.lat_deg[:, np.newaxis],
+        own_state.lon_deg[:, np.newaxis],
+        own_state.alt_m[:, np.newaxis],
+        states.lat_deg,
+        states.lon_deg,
+        states.alt_m,
+        validate=False,
+    )
+    apart = moves + own_moves
+    near = range_m - apart <= REACH_MARGIN * reach_m
+    lowest = float(own_state.alt_m.min()) - own_moves
+    # The normal turns fastest along the equator's meridian.
+    turns = own_moves / (SEMI_MAJOR_AXIS_M * (1.0 - ECCENTRICITY_SQUARED) + lowest)
+    lat, alt = own_state.lat_deg, (lowest, float(own_state.alt_m.max()) + own_moves)
+    latitudes = (
+        max(-90.0, float(lat.min()) - math.degrees(turns)),
+        min(90.0, float(lat.max()) + math.degrees(turns)),
+    )
+    pitch, roll = attitude_extremes_rad(own)
+    if not near.any():
+        return TrafficEnvelope(0.0, latitudes, alt, alt, 0.0, pitch, roll)
+    swing = np.arcsin(np.minimum(1.0, apart / np.maximum(range_m, 1e-3)))
+    steepest = float(np.max((np.abs(elevation) + swing)[near])) + turns
+    low, high = states.alt_m - moves, states.alt_m + moves
+    return TrafficEnvelope(
+        min(reach_m, float(np.max((range_m + apart)[near]))),
+        latitudes,
+        alt,
+        (float(low[near].min()), float(high[near].max())),
+        min(0.5 * math.pi, steepest),
+        pitch,
+        roll,
+    )
+
+
+def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
+    """Return the largest sizes of pitch and roll over a flight; pi/2 and pi where not known."""
+    if isinstance(trajectory, SampledTrajectory):
+        # Between samples both change evenly, roll by the shorter way round.
+        turned = np.diff(trajectory.roll_rad)
+        after = trajectory.roll_rad[:-1] + np.arctan2(np.sin(turned), np.cos(turned))
+        roll = np.concatenate((trajectory.roll_rad, after))
+        return float(np.max(np.abs(trajectory.pitch_rad))), float(np.max(np.abs(roll)))
+    if isinstance(trajectory, ScriptedTrajectory):
+        _, pitch, roll_fixed = trajectory.fixed_attitude_rad
+        pitches = [s.pitch_rad for s in trajectory.segments] if pitch is None else [pitch]
+        rolls = [s.roll_rad for s in trajectory.segments] if roll_fixed is None else [roll_fixed]
+        return max(map(abs, pitches)), max(map(abs, rolls))
+    return 0.5 * math.pi, math.pi
+
+
+def _moves_m(speed_mps: float, half_s: float) -> float:
+    return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M

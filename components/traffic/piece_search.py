@@ -1,0 +1,46 @@
+"""Which piece of its own path is each aircraft on, for many aircraft at once?"""
+
+import numpy as np
+
+from components.traffic.normals import FloatArray
+from dsa_des.types import IntArray
+
+
+class PieceSearch:
+    """The pieces of many paths, laid end to end.
+
+    Parameters
+    ----------
+    starts_s : sequence of ndarray
+        For each aircraft the times at which its pieces start, strictly increasing, at least one.
+    """
+
+    def __init__(self, starts_s: list[FloatArray]) -> None:
+        lengths = np.array([len(starts) for starts in starts_s], dtype=np.int64)
+        ends = np.cumsum(lengths)
+        self.starts_s = np.concatenate([*starts_s, np.empty(0)])
+        #: Index of each aircraft's first and last piece among all.
+        self.first, self.last = ends - lengths, ends - 1
+        self._steps = int(lengths.max(initial=1) - 1).bit_length()
+
+    def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
+        """Return the last piece that starts at or before a time, the first piece before them all.
+
+        Parameters
+        ----------
+        aircraft : (n,) of int
+        time_s : (n,)
+            On the clock of `starts_s`.
+
+        Returns
+        -------
+        (n,) of int
+            Index into all pieces.
+        """
+        low, high = self.first[aircraft], self.last[aircraft]
+        for _ in range(self._steps):
+            middle = (low + high + 1) // 2
+            begun = self.starts_s[middle] <= time_s
+            low = np.where(begun, middle, low)
+            high = np.where(begun, high, np.maximum(middle - 1, low))
+        return low

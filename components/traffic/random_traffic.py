@@ -1,0 +1,98 @@
+"""Random traffic: many intruders that cross a region in straight flight (``traffic.random``).
+
+For studies of density and for benchmarks. Every draw is keyed by the intruder's name, so that more
+intruders leave the first ones where they were.
+"""
+
+import math
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.aircraft import Aircraft, Roster
+from components.traffic.enu import enu_to_geodetic
+from components.traffic.fleet import ScriptedFleet
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.scripted import Ownship, flight_arguments
+from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from dsa_des.randomness import target_keys
+from dsa_des.types import FloatArray
+
+
+class RandomTrafficParameters(SourceParameters):
+    """Parameters of random traffic."""
+
+    ownship: Ownship = Field(description="The ownship.")
+    intruders: int = Field(ge=1, le=1_000_000, description="How many intruders.")
+    radius_km: float = Field(
+        gt=0, le=2000, description="They start evenly spread over a disc of this radius, km."
+    )
+    altitude_spread_m: float = Field(
+        default=300.0, ge=0, description="Largest difference from the ownship's altitude, m."
+    )
+    speed_min_mps: float = Field(default=40.0, ge=0, description="Slowest ground speed, m/s.")
+    speed_max_mps: float = Field(default=120.0, ge=0, description="Fastest ground speed, m/s.")
+    aircraft: Aircraft = Field(default=Aircraft(), description="What all of them are.")
+    sample_interval_s: float = Field(
+        default=1.0, gt=0, description="Spacing of the samples at which closest approach is sought."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.speed_max_mps < self.speed_min_mps:
+            raise ValueError(
+                f"speed_max_mps is {self.speed_max_mps:g}: it must be at least speed_min_mps, "
+                f"{self.speed_min_mps:g}"
+            )
+        return self
+
+
+class RandomTraffic(TrafficSource):
+    """Intruders that start evenly spread over a disc around the ownship and fly straight on."""
+
+    Parameters = RandomTrafficParameters
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        p = parameters
+        own = p.ownship
+        self.own = ScriptedTrajectory(
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
+        )
+        names = tuple(f"intruder_{number}" for number in range(1, p.intruders + 1))
+        keys = target_keys(names)
+        stream = self.stream("start")
+        bearing, share, height, heading, speed = (
+            stream.uniform(keys, np.int64(0), draw) for draw in range(5)
+        )
+        distance_m, bearing_rad = 1000.0 * p.radius_km * np.sqrt(share), 2.0 * math.pi * bearing
+        lat, lon, _ = enu_to_geodetic(
+            distance_m * np.sin(bearing_rad),
+            distance_m * np.cos(bearing_rad),
+            0.0,
+            reference_lat_deg=own.lat_deg,
+            reference_lon_deg=own.lon_deg,
+            reference_alt_m=own.alt_m,
+        )
+        altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
+        speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
+        flights = [
+            ScriptedTrajectory(
+                names[i],
+                lat_deg=float(lat[i]),
+                lon_deg=float(lon[i]),
+                alt_m=float(altitude[i]),
+                heading_deg=float(360.0 * heading[i]),
+                speed_mps=float(speed[i]),
+            )
+            for i in range(p.intruders)
+        ]
+        self.targets = flights
+        self.fleet = ScriptedFleet(flights)
+        self.roster = Roster.of([(name, p.aircraft) for name in names])
+
+    def sample_times_s(self, target: Trajectory) -> FloatArray:
+        """Return a regular grid over the run."""
+        step = self.p.sample_interval_s
+        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)

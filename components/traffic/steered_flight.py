@@ -1,0 +1,96 @@
+"""A flight that is told to turn while it is flown."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+
+from components.geometry.ellipsoid import line_of_sight_ned
+from components.traffic.legs import AnyLeg, ScriptedTrajectory, Straight, Turn
+from components.traffic.state import TrajectoryState
+
+# Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
+_BASE_S = 0.5
+
+
+class Flight(Protocol):
+    """What can be steered."""
+
+    name: str
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return the state at some times."""
+
+
+class SteeredFlight:
+    """A flight up to its first manoeuvre, and from each manoeuvre on a turn and then straight on.
+
+    It never changes: `turned` returns another one, so that a run can go back to the flight it had.
+
+    Parameters
+    ----------
+    flight : object with `name` and `at(time_s)`
+        What is flown until the first manoeuvre.
+    parts : tuple of (start in s, ScriptedTrajectory)
+        What is flown from then on.
+    """
+
+    def __init__(
+        self, flight: Flight, parts: tuple[tuple[float, ScriptedTrajectory], ...] = ()
+    ) -> None:
+        self.name, self.flight, self.parts = flight.name, flight, parts
+
+    def turned(self, time_s: float, turn_rad: float, rate_rad_s: float) -> SteeredFlight:
+        """Return the flight that turns at a time, levels off and flies on.
+
+        Parameters
+        ----------
+        time_s : float
+            Not before an earlier manoeuvre.
+        turn_rad : float
+            Change of heading, positive to the right; not 0.
+        rate_rad_s : float
+            Rate of the turn, above 0.
+        """
+        state = self.at(np.array([time_s - _BASE_S, time_s, time_s + _BASE_S]))
+        here = float(state.lat_deg[1]), float(state.lon_deg[1]), float(state.alt_m[1])
+        # Ends of the chord seen from its middle, so that the track is the one there.
+        north, east, _ = line_of_sight_ned(
+            *here, state.lat_deg[[0, 2]], state.lon_deg[[0, 2]], state.alt_m[[0, 2]]
+        )
+        along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
+        legs: list[AnyLeg] = [
+            Turn(
+                rate_deg_s=math.copysign(math.degrees(rate_rad_s), turn_rad),
+                angle_deg=math.degrees(abs(turn_rad)),
+            ),
+            Straight(),
+        ]
+        part = ScriptedTrajectory(
+            self.name,
+            lat_deg=here[0],
+            lon_deg=here[1],
+            alt_m=here[2],
+            heading_deg=math.degrees(math.atan2(along_east, along_north)),
+            speed_mps=math.hypot(along_north, along_east) / (2.0 * _BASE_S),
+            legs=legs,
+            start_time_s=time_s,
+        )
+        return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return the state at some times, of any shape."""
+        times = np.asarray(time_s, dtype=np.float64)
+        if not self.parts:
+            return self.flight.at(times)
+        flat = times.reshape(-1)
+        part = np.searchsorted([start for start, _ in self.parts], flat, side="right")
+        flights: list[Any] = [self.flight, *(flight for _, flight in self.parts)]
+        chosen = [np.flatnonzero(part == number) for number in range(len(flights))]
+        states = [flight.at(flat[rows]) for flight, rows in zip(flights, chosen, strict=True)]
+        # In order of time, rows of one flight follow those of another; others are put in place.
+        order = np.argsort(np.concatenate(chosen), kind="stable")
+        columns = zip(*(state.arrays() for state in states), strict=True)
+        return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)

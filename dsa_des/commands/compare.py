@@ -1,0 +1,238 @@
+"""``dsa-des compare``: the same encounters and draws under two or more conditions."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from dsa_des.commands.study import finish, read_study_of, run_into, show_study
+from dsa_des.entry_points import registered
+from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.run_folder import new_folder_name
+from dsa_des.scene import load_scene
+from dsa_des.scene_file import read_scene_file
+from dsa_des.studies.figures import draw_scatter
+from dsa_des.studies.folder import STUDY_JSON, StudyFolder
+from dsa_des.studies.metric import METRICS
+from dsa_des.studies.output import Tables
+from dsa_des.studies.printing import short, times
+from dsa_des.studies.statistics import difference
+from dsa_des.studies.study import MetricSpec, Study
+from dsa_des.studies.study_file import read_study, study_of_scene
+
+_MOST_SHOWN = 5
+
+
+def compare_command(
+    paths: tuple[str, ...],
+    swaps: tuple[str, ...],
+    replicas: int,
+    results: tuple[str, ...],
+    workers: int | None,
+    out: str | None,
+) -> None:
+    """Compare what the command line names."""
+    if replicas < 1:
+        raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
+    home = Path(out) if out else new_folder_name(Path("studies"), "compare")
+    if swaps:
+        if len(paths) != 1:
+            raise UsageError("--swap compares one scene or study with itself: name one file")
+        _compare_swap(Path(paths[0]), swaps, replicas, results, workers, home)
+        return
+    if len(paths) == 1 and (Path(paths[0]) / STUDY_JSON).is_file():
+        show_study(Path(paths[0]), results)
+        return
+    if len(paths) < 2:
+        raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
+    found = [_tables(Path(path), replicas, workers, home) for path in paths]
+    for other, path in zip(found[1:], paths[1:], strict=True):
+        _compare(found[0], other, (paths[0], path), results, home)
+
+
+def _compare_swap(
+    path: Path,
+    swaps: Sequence[str],
+    replicas: int,
+    results: Sequence[str],
+    workers: int | None,
+    home: Path,
+) -> None:
+    """Run a scene or study with and without swaps, and compare the two."""
+    chosen: list[tuple[str, list[str]]] = []
+    scene = _base_scene(path)
+    for swap in swaps:
+        block, equals, name = swap.partition("=")
+        if not equals or not name:
+            raise UsageError(f"--swap {swap!r}: must have the form BLOCK=TYPE")
+        if block not in scene.blocks:
+            hint = did_you_mean(block, scene.blocks)
+            raise UsageError(f"--swap {swap}: the scene has no block {block!r}{hint}")
+        own = scene.blocks[block].type_name
+        if own == name:
+            raise UsageError(f"--swap {swap}: {block} is a {name} already")
+        chosen.append((block, [own, name]))
+    study = _read(path, replicas, chosen)
+    folder = run_into(study, home, workers, resume=False)
+    tables = finish(study, folder, only=results)
+    axis = f"swap.{chosen[0][0]}"
+    place = tables.rows.axes.index(axis)
+    by_place = dict(tables.rows.each_place())
+    metrics = tables.telling(results)
+    for at, rows in by_place.items():
+        base = (*at[:place], chosen[0][1][0], *at[place + 1 :])
+        if at[place] == chosen[0][1][0] or base not in by_place:
+            continue
+        names = (chosen[0][1][0], str(at[place]))
+        for metric in metrics:
+            units = _Units(tables, by_place[base]), _Units(tables, rows)
+            _farthest_apart(metric, units, names, (study, study))
+
+
+def _base_scene(path: Path) -> Any:
+    if _is_study(path):
+        study = read_study(path)
+        return study.scene(0)
+    return load_scene(path)
+
+
+def _is_study(path: Path) -> bool:
+    data = read_scene_file(path).data
+    return "scene" in data and "blocks" not in data
+
+
+def _read(path: Path, replicas: int, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
+    if _is_study(path):
+        return read_study(path, swaps)
+    return study_of_scene(path, replicas, _applicable(path, swaps), swaps)
+
+
+def _applicable(path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]:
+    """Return the metrics that a scene has everything for, with each of the swaps."""
+    scenes = [load_scene(path)]
+    scenes += [load_scene(path, swaps=[f"{block}={types[-1]}"]) for block, types in swaps]
+    found = []
+    for name in registered(METRICS):
+        try:
+            for scene in scenes:
+                MetricSpec(name).build(scene)
+        except ValueError:
+            continue
+        found.append(name)
+    if not found:
+        raise UsageError(f"{path}: no metric can be measured of this scene")
+    return found
+
+
+def _tables(path: Path, replicas: int, workers: int | None, home: Path) -> Tables:
+    """Return the tables of a study's folder, or run the study or scene first."""
+    if path.is_dir():
+        folder = StudyFolder(path)
+        return Tables(read_study_of(folder), folder)
+    study = _read(path, replicas)
+    number = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:6]
+    folder = run_into(study, home / f"{path.stem}-{number}", workers, resume=False)
+    return Tables(study, folder)
+
+
+def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
+    names = [result.name for result in tables.results]
+    for name in only:
+        if name not in names:
+            raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, names)}")
+    return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
+
+
+class _Units:
+    """Some rows of a study: one value of a result per (encounter, replica)."""
+
+    def __init__(self, tables: Tables, rows: Any) -> None:
+        self.rows = rows
+        self.tables = tables
+        cells = tables.rows.column("cell")[rows]
+        replicas = tables.rows.column("replica")[rows]
+        over = tables.rows.over
+        labels = [tuple(str(tables.rows.column(n)[r]) for n in over) for r in rows]
+        self.keys = [(*at, int(k)) for at, k in zip(labels, replicas, strict=True)]
+        self.runs = list(zip(cells.tolist(), replicas.tolist(), strict=True))
+
+    def values(self, metric: str) -> dict[tuple[Any, ...], float]:
+        column = self.tables.rows.column(metric)[self.rows].astype(float)
+        return dict(zip(self.keys, column.tolist(), strict=True))
+
+
+def _farthest_apart(
+    metric: str,
+    units: tuple[_Units, _Units],
+    names: tuple[str, str],
+    studies: tuple[Study, Study],
+) -> None:
+    """List the runs in which a result differs most, with a command that opens each."""
+    first, second = units[0].values(metric), units[1].values(metric)
+    both = [key for key in first if key in second and not np.isnan(first[key] - second[key])]
+    both.sort(key=lambda key: (-abs(second[key] - first[key]), key))
+    both = [key for key in both if first[key] != second[key]][:_MOST_SHOWN]
+    if not both:
+        return
+    click.echo(f"\n{metric}: where {names[1]} differs most from {names[0]}")
+    runs = [dict(zip(side.keys, side.runs, strict=True)) for side in units]
+    for key in both:
+        where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
+        change = f"{short(first[key])} -> {short(second[key])}"
+        click.echo(f"  {where}replica {key[-1]}: {change}")
+        for study, run in zip(studies, runs, strict=True):
+            click.echo(f"    {study.command(*run[key])}")
+
+
+def _compare(
+    one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], home: Path
+) -> None:
+    """Print paired differences of two studies over the places and units that both have."""
+    if one.rows.axes != other.rows.axes or one.rows.over != other.rows.over:
+        raise UsageError(
+            f"{names[0]} and {names[1]} have different axes ({one.rows.axes + one.rows.over} and "
+            f"{other.rows.axes + other.rows.over}); only studies over the same ones can be paired"
+        )
+    if one.study.seed != other.study.seed:
+        raise UsageError(
+            f"{names[0]} has the seed {one.study.seed} and {names[1]} {other.study.seed}: their "
+            "draws are not the same, so they cannot be paired"
+        )
+    from rich.console import Console
+    from rich.table import Table
+
+    known = {result.name for result in other.results}
+    metrics = [name for name in _shown(one, only) if name in known]
+    table = Table(title=f"{names[1]} less {names[0]}, pair by pair", box=None, pad_edge=False,
+                  title_justify="left")  # fmt: skip
+    for heading in (*one.rows.axes, "result", "difference", "paired interval", "pairs",
+                    "unpaired interval", "narrower"):  # fmt: skip
+        table.add_column(heading)
+    theirs = dict(other.rows.each_place())
+    together: dict[str, list[tuple[Any, Any]]] = {}
+    for at, rows in one.rows.each_place():
+        if at not in theirs:
+            continue
+        sides = _Units(one, rows), _Units(other, theirs[at])
+        for metric in metrics:
+            first, second = sides[0].values(metric), sides[1].values(metric)
+            keys = [key for key in first if key in second]
+            pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
+            d = difference(*pair, one.study.confidence, one.study.interval)
+            table.add_row(
+                *map(short, at), metric, short(d.paired.value),
+                f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),
+                f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", times(d.narrower),
+            )  # fmt: skip
+            together.setdefault(metric, []).append(pair)
+            _farthest_apart(metric, sides, names, (one.study, other.study))
+    Console(width=160).print(table)
+    home.mkdir(parents=True, exist_ok=True)
+    for metric, pairs in together.items():
+        path = home / f"scatter-{metric}.png"
+        x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+        draw_scatter(path, x, y, names, metric, "compared")
+        click.echo(f"wrote {path}")

@@ -1,0 +1,203 @@
+"""Replicas of one scene in lock step: one run whose rows are those of every replica.
+
+Blocks that treat every row by itself serve all replicas at once; a block that remembers, or whose
+parameters differ between replicas, is split into one instance each (`dsa_des.split_block`). What
+is recorded equals the separate runs' recordings, with the replica as an additional column.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from dsa_des.clock import ScanClock
+from dsa_des.component import ClockedParameters, Component, Context, Parameters
+from dsa_des.effects import plan, unspent
+from dsa_des.randomness import Streams
+from dsa_des.recording import Recorder
+from dsa_des.replica_clock import ReplicaClock
+from dsa_des.replica_streams import ReplicaStreams
+from dsa_des.replica_time import ReplicaTime
+from dsa_des.scene import Scene
+from dsa_des.simulation import Simulation
+from dsa_des.split_block import NotInLockStep, SplitBlock
+
+__all__ = ["LockStep", "NotInLockStep"]
+
+_OF_THE_CLOCK = frozenset(ClockedParameters.model_fields)
+
+
+class LockStep(Simulation):
+    """Replicas of a scene made ready to run together, once.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        One for each replica: the same graph and block types, other seeds or parameters.
+    recorder : Recorder, optional
+        Every table it writes begins with the column ``replica``.
+    report : callable, optional
+        Called with a replica's number and what its blocks report (`Component.report`), for blocks
+        that are split; shared blocks report for nobody.
+    window : int, optional
+        Most scans in a look-ahead window, as for `Simulation`.
+
+    Raises
+    ------
+    NotInLockStep
+        If these replicas cannot run together, when made or while running.
+    SceneError
+        If a block cannot be set up.
+    """
+
+    def __init__(
+        self,
+        scenes: Sequence[Scene],
+        *,
+        recorder: Recorder | None = None,
+        report: Callable[[int, dict[str, Any]], None] | None = None,
+        window: int | None = None,
+    ) -> None:
+        self._scenes = list(scenes)
+        self._report = report
+        _check_alike(self._scenes)
+        super().__init__(self._scenes[0], recorder=recorder, window=window)
+        self._cells = max(1, max(component.width for component in self.components.values()))
+
+    # -- building ------------------------------------------------------------------------------
+
+    def _make_streams(self) -> Streams:
+        return ReplicaStreams([scene.seed for scene in self._scenes])
+
+    def _set_up_components(self) -> None:
+        super()._set_up_components()
+        self.replicas = ReplicaTime(len(self._scenes), self._run_ticks())
+        if not self.replicas.fits:
+            raise NotInLockStep(
+                f"{len(self._scenes)} runs of {float(self.duration_s):g} s do not fit on one line "
+                f"of 64-bit ticks at {self.ticks_per_s} per second"
+            )
+        for name, component in self.components.items():
+            if not (component.serves_replicas() and self._same_parameters(name)):
+                if component.process is not None:
+                    raise NotInLockStep(f"block {name} has a process of its own")
+                make = self._maker(name, component)
+                self.components[name] = SplitBlock(component, make, self._finished)
+
+    def _same_parameters(self, name: str) -> bool:
+        first = self._scenes[0].blocks[name].parameters
+        clocked = isinstance(first, ClockedParameters)
+        for scene in self._scenes[1:]:
+            other = scene.blocks[name].parameters
+            if other is first or other == first:
+                continue
+            if not clocked or _without_clock(other) != _without_clock(first):
+                return False
+        return True
+
+    def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
+        block = self.scene.blocks[name]
+
+        def make(number: int) -> Component:
+            scene = self._scenes[number]
+            context = Context(
+                Streams(scene.seed), self.ticks_per_s, duration_s=self.duration_s,
+                consumers=face.context.consumers, producers=face.context.producers,
+                sections=scene.sections,
+            )  # fmt: skip
+            component = block.cls(name, scene.blocks[name].parameters, context)
+            planned = plan(component, scene.tolerance)
+            context.tolerance = unspent(planned, scene.tolerance)
+            context.effects = {i.effect.name: i.effect.build(component) for i in planned if i.built}
+            component.setup()
+            self._check_same_word(face, component)
+            return component
+
+        return make
+
+    def _check_same_word(self, face: Component, component: Component) -> None:
+        """Refuse an instance that asks or offers its neighbours something else than the first."""
+        for port in face.inputs:
+            if component.request(port) != face.request(port):
+                raise NotInLockStep(f"block {face.name} asks for something else in some replica")
+        for port in face.outputs:
+            if component.offer(port) != face.offer(port):
+                raise NotInLockStep(f"block {face.name} offers something else in some replica")
+
+    def _finished(self, number: int, component: Component) -> None:
+        if self._report is not None:
+            self._report(number, component.report())
+
+    def _clock(self, name: str, component: Component) -> ScanClock | None:
+        clocks = []
+        for scene in self._scenes:
+            spec = component.clock_of(scene.blocks[name].parameters)
+            if spec is None:
+                return None
+            draw = Streams(scene.seed).scan_normals(name, "clock jitter")
+            clocks.append(ScanClock(spec, self.ticks_per_s, draw))
+        assert self.replicas is not None
+        return ReplicaClock(clocks, self.replicas)
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _run_ticks(self) -> int:
+        return super().end_tick
+
+    @property
+    def end_tick(self) -> int:
+        """First tick that is no longer simulated."""
+        if self.replicas is None:
+            return self._run_ticks()
+        return (self.replicas.replicas - 1) * self.span_ticks + self.replicas.end_tick
+
+    def _windows(self, end: int) -> Iterator[tuple[int, int]]:
+        """Give windows that hold many whole replicas, or parts of one."""
+        assert self.replicas is not None
+        span, length = self.span_ticks, self.replicas.end_tick
+        together = self._window_ticks // length
+        if together > 1:
+            for first in range(0, self.replicas.replicas, together):
+                last = min(first + together, self.replicas.replicas) - 1
+                yield first * span, last * span + length
+            return
+        for number in range(self.replicas.replicas):
+            for start, stop in super()._windows(length):
+                yield number * span + start, number * span + stop
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Any:
+        """Run all replicas; see `Simulation.run`."""
+        outcome = super().run(progress)
+        for component in self.components.values():
+            if isinstance(component, SplitBlock):
+                component.close()
+        return outcome
+
+
+def _without_clock(parameters: Parameters) -> dict[str, Any]:
+    return {
+        name: getattr(parameters, name)
+        for name in type(parameters).model_fields
+        if name not in _OF_THE_CLOCK
+    }
+
+
+def _check_alike(scenes: Sequence[Scene]) -> None:
+    """Refuse scenes that differ in more than seeds and parameters of blocks."""
+    first = scenes[0]
+    if first.look_ahead_blocks() != set(first.blocks):
+        late = sorted(set(first.blocks) - first.look_ahead_blocks())
+        raise NotInLockStep(f"blocks that run scan by scan: {', '.join(late)}")
+    if first.processors:
+        raise NotInLockStep("shared processors order messages of one run")
+    for wire in first.wires:
+        if wire.jitter_s or wire.drop_probability or isinstance(wire.holds, dict):
+            raise NotInLockStep(f"wire {wire} loses, jitters or holds messages")
+    for scene in scenes[1:]:
+        same = (
+            scene.wires == first.wires
+            and scene.duration_s == first.duration_s
+            and scene.ticks_per_s == first.ticks_per_s
+            and scene.classes == first.classes
+            and all(scene.sections[name] == model for name, model in first.sections.items())
+        )
+        if not same:
+            raise NotInLockStep("the replicas differ in wires, types, duration, ticks or sections")

@@ -1,0 +1,127 @@
+"""Looking ahead in a feedback loop: run a window as if nothing came back, and rewind if it did.
+
+In a loop every way back has a delay. A window is run with its feedback wires cut: blocks see what
+had come back before the window began. If then a message turns out to arrive inside the window,
+everything from that instant on was wrong; the run goes back to the window's start and runs it
+again up to that instant, where it was right. Windows start small after such a message and double
+while nothing comes back.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+import numpy as np
+
+from dsa_des.channel import Channel
+from dsa_des.component import Component
+from dsa_des.graph import in_cycles
+
+if TYPE_CHECKING:
+    from dsa_des.process import Node
+    from dsa_des.recording import Recorder
+
+_CONTAINERS = (list, dict, set, deque, np.ndarray)
+
+
+def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
+    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+
+    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
+
+    Parameters
+    ----------
+    graph : networkx.DiGraph
+        From `dsa_des.graph.build_graph`.
+    classes : mapping
+        The class of each block.
+    """
+    looped = in_cycles(graph)
+    inside = [
+        (source, target)
+        for source, target in sorted(graph.edges)
+        if source in looped and looped.get(target) == looped[source]
+    ]
+    kept = nx.DiGraph()
+    kept.add_nodes_from(looped)
+    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
+
+    def optional(edge: tuple[str, str]) -> bool:
+        inputs = classes[edge[1]].inputs
+        return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
+
+    cut = set()
+    for edge in sorted((e for e in inside if graph.edges[e]["delayed"]), key=optional):
+        kept.add_edge(*edge)
+        if not nx.is_directed_acyclic_graph(kept):
+            kept.remove_edge(*edge)
+            cut.add(edge)
+    return cut
+
+
+def may_rewind(graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: bool) -> bool:
+    """Return whether a scene with feedback can look ahead: every block must let itself rewind."""
+    return (
+        bool(in_cycles(graph))
+        and not queued
+        and all(c.windowed and c.rewindable and c.process is None for c in classes.values())
+    )
+
+
+class Checkpoint:
+    """The state of all blocks and wires at the start of a window.
+
+    Parameters
+    ----------
+    nodes : iterable of Node
+    recorder : Recorder or None
+    trace : list or None
+    """
+
+    def __init__(
+        self,
+        nodes: Iterable["Node"],
+        recorder: "Recorder | None",
+        trace: list[tuple[int, str]] | None,
+    ) -> None:
+        self._objects: list[tuple[Any, dict[str, Any]]] = []
+        for node in nodes:
+            for thing in (node.component, *node.component.context.effects.values()):
+                if hasattr(thing, "__dict__"):
+                    self._objects.append((thing, _copied(vars(thing))))
+        channels = {
+            id(channel): channel
+            for node in nodes
+            for wires in node.channels.values()
+            for channel in wires
+        }
+        self._channels: list[tuple[Channel, Any]] = [(c, c.state()) for c in channels.values()]
+        self._recorder, self._recorded = recorder, None if recorder is None else recorder.mark()
+        self._trace, self._traced = trace, 0 if trace is None else len(trace)
+
+    def earliest_since(self, channels: Iterable[Channel], end: int) -> int:
+        """Return the first arrival over some wires of what was sent since, or `end`."""
+        before = dict(self._channels)
+        ticks = [channel.earliest_since(before[channel]) for channel in channels]
+        return min((tick for tick in ticks if tick is not None), default=end)
+
+    def restore(self) -> None:
+        """Bring everything back to how it was."""
+        for thing, state in self._objects:
+            vars(thing).clear()
+            vars(thing).update(_copied(state))
+        for channel, state in self._channels:
+            channel.set_state(state)
+        if self._recorder is not None and self._recorded is not None:
+            self._recorder.rewind(self._recorded)
+        if self._trace is not None:
+            del self._trace[self._traced :]
+
+
+def _copied(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy what a block might change in place; messages and tables are never changed so."""
+    return {
+        name: value.copy() if isinstance(value, _CONTAINERS) else value
+        for name, value in state.items()
+    }

@@ -1,0 +1,133 @@
+"""A block that cannot be shared by replicas: one instance each, behind the face of one block."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from dsa_des.component import Component
+from dsa_des.message import STATIC, Message
+from dsa_des.replica_time import first_scan
+from dsa_des.types import IntArray
+from dsa_des.wake import Arrivals, Wake
+
+
+class NotInLockStep(Exception):
+    """These replicas cannot run in lock step; the message says why. They can run one by one."""
+
+
+class SplitBlock(Component):
+    """One instance per replica, made when its replica begins and let go when it has ended.
+
+    Each instance sees only its own replica's rows, with its own ticks and scan numbers, as in a
+    run of its own.
+
+    Parameters
+    ----------
+    face : Component
+        The block as the first replica has it; its ports, requests and offers stand for all.
+    make : callable
+        Makes the instance of a replica.
+    finished : callable
+        Called with a replica's number and its instance when its last window is over.
+    """
+
+    def __init__(
+        self,
+        face: Component,
+        make: Callable[[int], Component],
+        finished: Callable[[int, Component], None],
+    ) -> None:
+        super().__init__(face.name, face.p, face.context)
+        self.face = face
+        self.inputs, self.outputs = face.inputs, face.outputs  # type: ignore[misc]
+        self.windowed, self.clocked = True, face.clocked  # type: ignore[misc]
+        self._make, self._finished = make, finished
+        self._instances: dict[int, Component] = {}
+
+    @property
+    def width(self) -> int:
+        """Number of targets per row."""
+        return self.face.width
+
+    def run(self, wake: Wake) -> dict[str, Message] | None:
+        """Let every replica's instance handle its rows."""
+        replica = wake.replica
+        cuts = np.flatnonzero(replica[1:] != replica[:-1]) + 1
+        sent: dict[str, list[Message]] = {}
+        for first, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(wake)], strict=True):
+            number = int(replica[first])
+            if number not in self._instances:
+                self._let_go(number)
+                self._instances[number] = self._make(number)
+            result = self._instances[number].run(_part(wake, slice(first, end), number))
+            if isinstance(result, Message):
+                result = {next(iter(self.outputs)): result}
+            for port, message in (result or {}).items():
+                shift = number * wake.span_ticks
+                sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
+        return {port: _joined(parts) for port, parts in sent.items()} or None
+
+    def close(self) -> None:
+        """Let the last instances go."""
+        self._let_go(None)
+
+    def _let_go(self, before: int | None) -> None:
+        for number in sorted(self._instances):
+            if before is None or number < before:
+                self._finished(number, self._instances.pop(number))
+
+
+def _part(wake: Wake, rows: slice, number: int) -> Wake:
+    """Return the rows of one replica as its own run would see them."""
+    begin, scan = number * wake.span_ticks, first_scan(number)
+    ticks, scans = wake.ticks[rows] - begin, wake.scans[rows]
+    held = {}
+    for port, (message, place) in wake._held.items():
+        mine = place[rows]
+        low = int(mine.min())
+        part = message.take(slice(low, int(mine.max()) + 1)).shifted(-begin, -scan)
+        held[port] = part, mine - low
+    arrived = {
+        port: [part for new in arrivals if (part := _arrivals(new, begin, scan, wake.span_ticks))]
+        for port, arrivals in wake._arrived.items()
+    }
+    demand = {block: _within(asked, rows) for block, asked in wake.demand.items()}
+    own = np.where(scans >= 0, scans - scan, -1)
+    return Wake(ticks, own, wake.ticks_per_s, held, arrived, demand)
+
+
+def _arrivals(new: Arrivals, begin: int, scan: int, span: int) -> Arrivals | None:
+    first, end = np.searchsorted(new.tick, [begin, begin + span]).tolist()
+    if first == end:
+        return None
+    message = new.message.take(slice(first, end)).shifted(-begin, -scan)
+    return Arrivals(new.source, new.tick[first:end] - begin, message)
+
+
+def _within(asked: IntArray, rows: slice) -> IntArray:
+    first, end = np.searchsorted(asked, [rows.start, rows.stop]).tolist()
+    return asked[first:end] - rows.start
+
+
+def _joined(parts: list[Message]) -> Message:
+    """Join messages of one port; what is the same for all rows must be the same for all parts."""
+    first = parts[0]
+    for item in fields(first):
+        if item.metadata.get("per") != STATIC or item.name in first.joins_static:
+            continue
+        value = getattr(first, item.name)
+        for part in parts[1:]:
+            other = getattr(part, item.name)
+            if other is not value and not _same(other, value):
+                raise NotInLockStep(f"{type(first).__name__}.{item.name} differs between replicas")
+    return type(first).concatenate(parts)
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other)
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    return bool(one == other)

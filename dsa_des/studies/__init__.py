@@ -1,0 +1,1 @@
+"""Studies: many runs of one scene over axes and random draws, their metrics and statistics."""

@@ -1,0 +1,243 @@
+"""Axes of a study: lists, ranges, logarithmic ranges, swaps, files, phases, and linked values."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from dsa_des.clock import parse_rational
+from dsa_des.component import as_written
+from dsa_des.errors import did_you_mean
+from dsa_des.scene import Scene
+
+SWAP = "swap."
+_SPEC_KEYS = ("from", "to", "step", "steps", "log", "files", "beat_with", "values", "set")
+_MOST_VALUES = 100_000
+_FRACTION = re.compile(r"\d+/[1-9]\d*")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a study.
+
+    Parameters
+    ----------
+    key : str
+        A dotted key of the scene, ``swap.BLOCK``, or a free name for linked values.
+    labels : tuple
+        What the axis is at each of its values: numbers or texts.
+    sets : tuple of tuple of (key, value)
+        What each value sets in the scene.
+    swaps : tuple of tuple of (block, type)
+    files : bool
+        Whether its values are files: encounters, of which the study is a sample.
+    """
+
+    key: str
+    labels: tuple[Any, ...]
+    sets: tuple[tuple[tuple[str, Any], ...], ...]
+    swaps: tuple[tuple[tuple[str, str], ...], ...]
+    files: bool = False
+
+    @property
+    def column(self) -> str:
+        """Its column in the results: the key without ``blocks.``."""
+        return self.key.removeprefix("blocks.")
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its values are numbers."""
+        return all(
+            isinstance(label, int | float) and not isinstance(label, bool) for label in self.labels
+        )
+
+
+def flatten_axes(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return dotted key → list or table of every axis; nested tables are keys of the scene."""
+    found: dict[str, Any] = {}
+    for name, value in tables.items():
+        key = f"{prefix}.{name}" if prefix else str(name)
+        nested = isinstance(value, dict) and not (value and set(value) & set(_SPEC_KEYS))
+        if nested and value:
+            found |= flatten_axes(value, key)
+        else:
+            found[key] = value
+    return found
+
+
+def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
+    """Return an axis from what a study says of it.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong and what is allowed.
+    """
+    if isinstance(spec, list):
+        values = spec
+    elif not isinstance(spec, dict):
+        raise ValueError(
+            "must be a list of values, or a table such as {from = 1, to = 5, step = 1}"
+        )
+    else:
+        for name in spec:
+            if name not in _SPEC_KEYS:
+                raise ValueError(f"unknown key {name!r} of an axis{did_you_mean(name, _SPEC_KEYS)}")
+        if "files" in spec:
+            return _files(key, spec)
+        if "set" in spec:
+            return _linked(key, spec)
+        if "beat_with" in spec:
+            values = _phases(key, spec, scene)
+        elif "values" in spec:
+            values = spec["values"]
+        else:
+            values = _range(spec)
+    if not isinstance(values, list) or not values:
+        raise ValueError("is empty: an axis needs at least one value")
+    if key.startswith(SWAP):
+        return _swap(key, values, scene)
+    labels = tuple(_label(value) for value in values)
+    _refuse_twice(labels)
+    return Axis(key, labels, tuple(((key, value),) for value in values), ((),) * len(values))
+
+
+def _label(value: Any) -> Any:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str) and _FRACTION.fullmatch(value):
+        return float(Fraction(value))
+    return value if isinstance(value, int | float) else str(value)
+
+
+def _refuse_twice(labels: tuple[Any, ...]) -> None:
+    for label in labels:
+        if labels.count(label) > 1:
+            raise ValueError(f"holds {label!r} more than once")
+
+
+def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
+    block = key.removeprefix(SWAP)
+    if block not in scene.blocks:
+        raise ValueError(f"the scene has no block {block!r}{did_you_mean(block, scene.blocks)}")
+    if not all(isinstance(value, str) for value in values):
+        raise ValueError("a swap takes types of blocks, as texts")
+    labels = tuple(str(value) for value in values)
+    _refuse_twice(labels)
+    return Axis(key, labels, ((),) * len(labels), tuple(((block, name),) for name in labels))
+
+
+def _files(key: str, spec: Mapping[str, Any]) -> Axis:
+    pattern = spec["files"]
+    patterns = pattern if isinstance(pattern, list) else [pattern]
+    if not patterns or not all(isinstance(item, str) for item in patterns):
+        raise ValueError('files must be a pattern such as "encounters/*.daa", or a list of names')
+    found: list[Path] = []
+    for item in patterns:
+        path = Path(item).expanduser()
+        folder = getattr(item, "folder", Path.cwd())
+        base = path if path.is_absolute() else folder / path
+        if any(sign in str(item) for sign in "*?["):
+            start = Path(base.anchor) if base.is_absolute() else Path()
+            matches = sorted(start.glob(str(base.relative_to(base.anchor))))
+            if not matches:
+                raise ValueError(f"no file matches {base}")
+            found += matches
+        elif base.is_dir():
+            raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
+        elif base.is_file():
+            found.append(base)
+        else:
+            raise ValueError(f"there is no file {base}")
+    names = [path.name for path in found]
+    labels = tuple(
+        name if names.count(name) == 1 else str(path)
+        for name, path in zip(names, found, strict=True)
+    )
+    _refuse_twice(labels)
+    sets = tuple(((key, str(path.resolve())),) for path in found)
+    return Axis(key, labels, sets, ((),) * len(labels), files=True)
+
+
+def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
+    labels, keys = spec.get("values"), spec["set"]
+    if not isinstance(labels, list) or not labels or not isinstance(keys, dict) or not keys:
+        raise ValueError(
+            "linked values need values = [...], and set = {key = [...]} with as many for each key"
+        )
+    columns = flatten_axes(keys)
+    for name, column in columns.items():
+        if not isinstance(column, list) or len(column) != len(labels):
+            raise ValueError(f"set: {name} must be a list of {len(labels)} values, one per value")
+    shown = tuple(_label(label) for label in labels)
+    _refuse_twice(shown)
+    sets = tuple(
+        tuple((name, column[i]) for name, column in columns.items()) for i in range(len(labels))
+    )
+    return Axis(key, shown, sets, ((),) * len(labels))
+
+
+def _range(spec: Mapping[str, Any]) -> list[Any]:
+    if "from" not in spec or "to" not in spec or ("step" in spec) == ("steps" in spec):
+        raise ValueError("a range needs from, to, and either step or steps")
+    low, high = parse_rational(spec["from"]), parse_rational(spec["to"])
+    if high < low:
+        raise ValueError(f"the range from {spec['from']} to {spec['to']} is empty")
+    if "step" in spec:
+        step = parse_rational(spec["step"])
+        if step <= 0 or spec.get("log"):
+            raise ValueError("step must be greater than 0, and a logarithmic range needs steps")
+        count = int((high - low) / step) + 1
+    else:
+        steps = spec["steps"]
+        if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+            raise ValueError("steps is how many values: a whole number of 1 or more")
+        count = steps
+        step = (high - low) / (count - 1) if count > 1 else Fraction(0)
+    if count > _MOST_VALUES:
+        raise ValueError(f"has {count} values; at most {_MOST_VALUES} are allowed")
+    if not spec.get("log"):
+        return [as_written(low + k * step) for k in range(count)]
+    if low <= 0:
+        raise ValueError("a logarithmic range must start above 0")
+    if count == 1:
+        return [as_written(low)]
+    growth = math.log(high / low) / (count - 1)
+    # Six digits: rates stay short fractions, so that clocks have a common tick.
+    inner = [float(f"{float(low) * math.exp(growth * k):.6g}") for k in range(1, count - 1)]
+    return [as_written(low), *inner, as_written(high)]
+
+
+def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
+    """Return offsets over the whole beat period of two clocks, in equal steps."""
+    parts = key.split(".")
+    other = str(spec["beat_with"])
+    if len(parts) != 3 or parts[0] != "blocks" or parts[2] != "offset_s":
+        raise ValueError("beat_with belongs to an axis blocks.BLOCK.offset_s")
+    periods = []
+    for name in (parts[1], other):
+        block = scene.blocks.get(name)
+        clock = None if block is None else block.cls.clock_of(block.parameters)
+        if clock is None:
+            clocked = [
+                known
+                for known, item in scene.blocks.items()
+                if item.cls.clock_of(item.parameters) is not None
+            ]
+            raise ValueError(f"{name!r} is no block with a clock{did_you_mean(name, clocked)}")
+        periods.append(clock.period_s)
+    steps = spec.get("steps", 32)
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise ValueError("steps is how many phases: a whole number of 1 or more")
+    return [as_written(beat_period_s(*periods) * k / steps) for k in range(steps)]
+
+
+def beat_period_s(first: Fraction, second: Fraction) -> Fraction:
+    """Return the time after which two periods are in step again: their least common multiple."""
+    return Fraction(
+        math.lcm(first.numerator, second.numerator),
+        math.gcd(first.denominator, second.denominator),
+    )

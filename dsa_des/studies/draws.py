@@ -1,0 +1,135 @@
+"""Random draws of a study: each value is a function of (seed, key, replica) and of nothing else.
+
+The same replica has the same draws in every cell of a study, so cells compare on common random
+numbers. Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millihertz: clocks stay
+exact.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+from dsa_des.randomness import key_of
+from dsa_des.types import IntArray
+
+KINDS = ("uniform", "normal", "choice", "latin_hypercube")
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How one value of the scene is drawn.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of the scene.
+    kind : {"uniform", "normal", "choice"}
+    values : tuple
+        Lowest and highest; mean and standard deviation; or what to choose from.
+    stratified : bool
+        Whether replicas share the range out among themselves (Latin hypercube).
+    """
+
+    key: str
+    kind: str
+    values: tuple[Any, ...]
+    stratified: bool = False
+
+    def value(self, seed: int, replica: int, batch: int) -> Any:
+        """Return the value of one replica.
+
+        Parameters
+        ----------
+        seed : int
+            The study's.
+        replica : int
+        batch : int
+            How many consecutive replicas a Latin hypercube covers together.
+        """
+        u = _uniform(seed, self.key, replica)
+        if self.stratified:
+            block, place = divmod(replica, batch)
+            u = (int(_strata(seed, self.key, block, batch)[place]) + u) / batch
+        if self.kind == "choice":
+            return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
+        low, high = self.values
+        if self.kind == "normal":
+            return exact(self.key, low + high * NormalDist().inv_cdf(max(u, 2.0**-54)))
+        return exact(self.key, low + (high - low) * u)
+
+
+def exact(key: str, value: float) -> float | Fraction:
+    """Return a drawn value so that clocks stay exact: whole nanoseconds, whole millihertz."""
+    for ending, unit in (("_s", 10**9), ("_hz", 1000)):
+        if key.endswith(ending) and not key.endswith("deg_s"):
+            return Fraction(round(value * unit), unit)
+    return value
+
+
+def as_text(value: Any) -> str:
+    """Return a value the way ``--set`` takes it."""
+    if isinstance(value, Fraction):
+        decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")
+        return decimal if Fraction(decimal) == value else f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def replica_seed(seed: int, replica: int) -> int:
+    """Return the seed of one replica's run: the same in every cell."""
+    return key_of(seed, "study replica", replica) >> 1
+
+
+def _uniform(seed: int, key: str, replica: int) -> float:
+    return (key_of(seed, "study draw", key, replica) >> 11) * 2.0**-53
+
+
+@lru_cache(maxsize=64)
+def _strata(seed: int, key: str, block: int, batch: int) -> IntArray:
+    generator = np.random.Generator(np.random.Philox(key_of(seed, "study strata", key, block)))
+    return np.asarray(generator.permutation(batch), dtype=np.int64)
+
+
+def parse_draw(key: str, table: Any) -> Draw:
+    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong and what is allowed.
+    """
+    form = "must be one of {uniform = [low, high]}, {normal = [mean, standard deviation]}, " \
+        "{choice = [...]}, {latin_hypercube = [low, high]}"  # fmt: skip
+    if not isinstance(table, dict) or len(table) != 1:
+        raise ValueError(form)
+    ((kind, values),) = table.items()
+    if kind not in KINDS or not isinstance(values, list | dict):
+        raise ValueError(form)
+    if kind == "latin_hypercube" and isinstance(values, dict):
+        inner = parse_draw(key, values)
+        return Draw(key, inner.kind, inner.values, stratified=True)
+    if kind == "choice":
+        if not values:
+            raise ValueError("choice is empty: give at least one value")
+        return Draw(key, kind, tuple(values))
+    low, high = _two_numbers(kind, values)
+    if kind == "normal":
+        if high < 0:
+            raise ValueError(f"normal: the standard deviation is {high}: it must be 0 or more")
+        return Draw(key, kind, (low, high))
+    if high < low:
+        raise ValueError(f"{kind}: the range [{low}, {high}] is empty; the lower bound comes first")
+    return Draw(key, "uniform", (low, high), stratified=kind == "latin_hypercube")
+
+
+def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
+    if len(values) != 2 or any(
+        isinstance(value, bool) or not isinstance(value, int | float) for value in values
+    ):
+        raise ValueError(f"{kind} takes two numbers")
+    return float(values[0]), float(values[1])

@@ -1,0 +1,226 @@
+"""What a study measures: metrics, found by the entry-point group ``dsa_des.metrics``.
+
+A metric reads the recorded tables of a *group* of replicas at once: every table has one more
+column, ``replica``, with the number of the replica each row belongs to. It is written over arrays,
+so ten thousand replicas cost little more than one.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from dsa_des.component import Parameters
+from dsa_des.entry_points import registered
+from dsa_des.errors import did_you_mean
+from dsa_des.message import Columns, Text
+from dsa_des.registry import UnknownType, import_named
+from dsa_des.replicas import Recorded, Replica, scene_of
+from dsa_des.scene import Scene
+from dsa_des.types import FloatArray
+
+METRICS = "dsa_des.metrics"
+
+_T = TypeVar("_T")
+
+#: Kinds of results: a number with a mean; an event that happens or not; a share of trials.
+NUMBER, EVENT, SHARE = "number", "event", "share"
+#: What is put behind the name of a share for the column of its trials.
+TRIALS = ".trials"
+
+
+@dataclass(frozen=True)
+class Result:
+    """One column of a study's results.
+
+    Parameters
+    ----------
+    name : str
+        With its unit, for example ``declaration_time_s.radar``.
+    kind : {"number", "event", "share"}
+        A number may be NaN (no value in this run); an event is 0 or 1; a share has a second
+        column ``NAME.trials``, and is NaN without trials.
+    meaning : str
+    """
+
+    name: str
+    kind: str
+    meaning: str
+
+
+class Group:
+    """What replicas of one scene recorded, table by table.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without the changes of single replicas.
+    replicas : sequence of Replica
+    recorded : sequence of Recorded
+        One per replica.
+    wanted : mapping
+        Tables and columns that are there.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        replicas: Sequence[Replica],
+        recorded: Sequence[Recorded],
+        wanted: Mapping[str, Any],
+    ) -> None:
+        self.scene = scene
+        self.replicas = replicas
+        self.duration_s: FloatArray = np.array([run.duration_s for run in recorded])
+        #: Table name → columns, with ``replica``; rows are in order of replica and time.
+        self.tables: dict[str, Columns] = {
+            table: _together(table, wanted[table], recorded) for table in sorted(wanted)
+        }
+
+        self._known: dict[Any, Any] = {}
+
+    def __len__(self) -> int:
+        return len(self.replicas)
+
+    def once(self, key: Any, make: Callable[[], _T]) -> _T:
+        """Return what `make` returns, made once per group and key: metrics may share work."""
+        if key not in self._known:
+            self._known[key] = make()
+        found: _T = self._known[key]
+        return found
+
+    @cached_property
+    def scenes(self) -> list[Scene]:
+        """The scene of every replica with its changes."""
+        return [scene_of(self.scene, replica) for replica in self.replicas]
+
+
+def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:
+    parts: list[Columns] = [run.tables.get(table, {}) for run in recorded]
+    full = [number for number, part in enumerate(parts) if part and len(part["tick"])]
+    counts = [len(parts[number]["tick"]) for number in full]
+    joined: Columns = {"replica": np.repeat(np.array(full, dtype=np.int64), counts)}
+    for name in columns:
+        pieces: list[Any] = [parts[number][name] for number in full]
+        if not pieces:
+            text = any(isinstance(part.get(name), Text) for part in parts)
+            none = np.empty(0, dtype=np.int64)
+            joined[name] = Text(none, ()) if text or name == "block" else np.empty(0)
+        elif isinstance(pieces[0], Text):
+            joined[name] = _text(pieces)
+        else:
+            joined[name] = np.concatenate(pieces)
+    return joined
+
+
+def _text(pieces: Sequence[Text]) -> Text:
+    names: dict[str, int] = {}
+    lookups: dict[tuple[str, ...], Any] = {}
+    codes = []
+    for piece in pieces:
+        if piece.names not in lookups:
+            known = [names.setdefault(name, len(names)) for name in piece.names]
+            lookups[piece.names] = np.array([*known, -1], dtype=np.int64)
+        codes.append(lookups[piece.names][piece.codes])
+    return Text(np.concatenate(codes), tuple(names))
+
+
+class Metric:
+    """Something that is measured of every run of a study. Subclass it and register the subclass.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Validated values of the metric's table in the study.
+    scene : Scene
+        One scene of the study; wires and block names are those of all.
+
+    Raises
+    ------
+    ValueError
+        If the scene lacks what the metric needs.
+    """
+
+    #: Model of the metric's own keys in the study.
+    Parameters: ClassVar[type[Parameters]] = Parameters
+    #: Recorded tables it reads, and which of their columns.
+    tables: Mapping[str, tuple[str, ...]] = {}
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        self.p = parameters
+        self.scene = scene
+
+    def results(self) -> list[Result]:
+        """Return the columns this metric gives."""
+        raise NotImplementedError
+
+    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+        """Return result name → values, shape (replicas,); NaN where a run has no value."""
+        raise NotImplementedError
+
+    def expected(self, scene: Scene) -> Mapping[str, float]:
+        """Return the analytic answer for a scene, for results that have one."""
+        return {}
+
+
+def find_metric(name: str) -> type[Metric]:
+    """Return a registered metric, or that of ``module:Class``.
+
+    Raises
+    ------
+    ValueError
+        If there is none of this name, or it cannot be loaded.
+    """
+    if ":" in name:
+        try:
+            found = import_named(name)
+        except UnknownType as error:
+            raise ValueError(str(error)) from None
+    else:
+        point = registered(METRICS).get(name)
+        if point is None:
+            hint = did_you_mean(name, registered(METRICS))
+            raise ValueError(f"unknown metric{hint} (or module:Class)")
+        try:
+            found = point.load()
+        except Exception as error:
+            raise ValueError(f"cannot be imported from {point.value}: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Metric)):
+        raise ValueError(f"{name} is not a dsa_des.studies.metric.Metric")
+    return found
+
+
+def recorded_by(scene: Scene, table: str) -> list[str]:
+    """Return the blocks of a scene whose outputs record rows of a table, sorted by name."""
+    return [
+        name
+        for name, cls in sorted(scene.classes.items())
+        if any(table in output.message.recorded for output in cls.outputs.values())
+    ]
+
+
+def check_tables(metric: type[Metric], scene: Scene) -> None:
+    """Raise ValueError unless some block of the scene records each table the metric reads."""
+    for table in metric.tables:
+        if not recorded_by(scene, table):
+            known = {
+                name
+                for cls in scene.classes.values()
+                for output in cls.outputs.values()
+                for name in output.message.recorded
+            }
+            raise ValueError(
+                f"needs a block whose output records {table!r}; this scene's blocks record "
+                f"{', '.join(sorted(known)) or 'nothing'}"
+            )
+
+
+def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
+    """Return which columns of which tables metrics need, sorted; ``tick`` always."""
+    wanted: dict[str, set[str]] = {}
+    for metric in metrics:
+        for table, columns in metric.tables.items():
+            wanted.setdefault(table, {"tick"}).update(columns)
+    return {table: tuple(sorted(columns)) for table, columns in sorted(wanted.items())}

@@ -1,0 +1,225 @@
+"""A checked study: cells, replicas, and the order in which they are run.
+
+A *cell* is one combination of axis values; its replicas differ by seed and random draws. Runs are
+numbered cell by cell and cut into chunks whose size knows nothing of workers, so that what a chunk
+gives never depends on who ran it.
+"""
+
+import itertools
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from dsa_des.errors import Problem, SceneError
+from dsa_des.overrides import apply_swap, set_value
+from dsa_des.replicas import Replica
+from dsa_des.scene import Scene, check_scene
+from dsa_des.scene_file import SceneFile
+from dsa_des.studies.axes import Axis
+from dsa_des.studies.draws import Draw, as_text, replica_seed
+from dsa_des.studies.metric import Metric, find_metric
+
+
+@dataclass(frozen=True)
+class MetricSpec:
+    """A metric as a study names it: its registered name and its own keys."""
+
+    name: str
+    keys: Mapping[str, Any] = field(default_factory=dict)
+
+    def build(self, scene: Scene) -> Metric:
+        """Return the metric for a scene.
+
+        Raises
+        ------
+        ValueError, pydantic.ValidationError
+            If the name or a key is unknown, or the scene lacks what it needs.
+        """
+        from dsa_des.studies.metric import check_tables
+
+        cls = find_metric(self.name)
+        check_tables(cls, scene)
+        return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+
+
+@dataclass(frozen=True)
+class StopWhen:
+    """When a cell has enough replicas: half-width of a result's confidence interval."""
+
+    metric: str
+    half_width: float
+    batch: int
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Some consecutive runs: for each cell, a range of replicas."""
+
+    name: str
+    runs: tuple[tuple[int, int, int], ...]
+
+    def __len__(self) -> int:
+        return sum(end - start for _, start, end in self.runs)
+
+
+@dataclass
+class Study:
+    """A study that can be run.
+
+    Parameters
+    ----------
+    path, scene_path : Path
+    title : str
+    seed : int
+    replicas : int
+        Per cell; with `stop_when` the most.
+    axes, draws, metrics : tuple
+    sets : tuple of (key, value)
+        Set in every cell.
+    swaps : tuple of (block, type)
+        Made in every cell.
+    over : tuple of str
+        Columns of axes that are a sample (of encounters): statistics are taken over them.
+    baseline : (column, label) or None
+        With which value of which axis the others are compared.
+    stop_when : StopWhen or None
+    confidence : float
+    interval : {"t", "bootstrap"}
+    figures : tuple of dict
+    runs_per_chunk : int
+    base : SceneFile
+        The scene's tables.
+    tables : dict
+        The study's own tables, with paths that do not depend on where it stands.
+    """
+
+    path: Path
+    scene_path: Path
+    title: str
+    seed: int
+    replicas: int
+    axes: tuple[Axis, ...]
+    draws: tuple[Draw, ...]
+    metrics: tuple[MetricSpec, ...]
+    sets: tuple[tuple[str, Any], ...]
+    swaps: tuple[tuple[str, str], ...]
+    over: tuple[str, ...]
+    baseline: tuple[str, Any] | None
+    stop_when: StopWhen | None
+    confidence: float
+    interval: str
+    figures: tuple[dict[str, Any], ...]
+    runs_per_chunk: int
+    base: SceneFile
+    tables: dict[str, Any]
+
+    @cached_property
+    def cells(self) -> list[tuple[int, ...]]:
+        """Index of each axis's value, cell by cell; the last axis runs fastest."""
+        return list(itertools.product(*(range(len(axis.labels)) for axis in self.axes)))
+
+    @property
+    def batch(self) -> int:
+        """How many replicas of a cell are run before the results are looked at."""
+        return self.stop_when.batch if self.stop_when else self.replicas
+
+    def labels(self, cell: int) -> dict[str, Any]:
+        """Return column → value of every axis at a cell."""
+        indices = self.cells[cell]
+        return {a.column: a.labels[i] for a, i in zip(self.axes, indices, strict=True)}
+
+    def changes(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
+        """Return the swaps and the values that make a cell's scene of the base scene."""
+        swaps, sets = list(self.swaps), list(self.sets)
+        for axis, index in zip(self.axes, self.cells[cell], strict=True):
+            swaps += axis.swaps[index]
+            sets += axis.sets[index]
+        return swaps, sets
+
+    def scene(self, cell: int) -> Scene:
+        """Return the checked scene of a cell.
+
+        Raises
+        ------
+        SceneError
+            With every problem found.
+        """
+        return changed_scene(self.base, *self.changes(cell), str(self.path))
+
+    def replica(self, number: int) -> Replica:
+        """Return the seed and the drawn values of a replica; they are the same in all cells."""
+        return Replica(
+            replica_seed(self.seed, number),
+            {draw.key: draw.value(self.seed, number, self.batch) for draw in self.draws},
+        )
+
+    def command(self, cell: int, number: int) -> str:
+        """Return the command that runs one replica of a cell again."""
+        swaps, sets = self.changes(cell)
+        replica = self.replica(number)
+        words = ["dsa-des", "run", str(self.scene_path), "--seed", str(replica.seed)]
+        for block, name in swaps:
+            words += ["--swap", f"{block}={name}"]
+        for key, value in [*sets, *replica.changes.items()]:
+            words += ["--set", f"{key}={set_text(value)}"]
+        return shlex.join(words)
+
+    def chunks(self, round_number: int, cells: Sequence[int]) -> Iterator[Chunk]:
+        """Return the chunks of one round: a batch of replicas of each of the given cells."""
+        start = round_number * self.batch
+        end = min(start + self.batch, self.replicas)
+        runs: list[tuple[int, int, int]] = []
+        room, number = self.runs_per_chunk, 0
+        for cell in cells:
+            first = start
+            while first < end:
+                last = min(end, first + room)
+                runs.append((cell, first, last))
+                room -= last - first
+                first = last
+                if room == 0:
+                    yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
+                    runs, room, number = [], self.runs_per_chunk, number + 1
+        if runs:
+            yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
+
+
+def set_text(value: Any) -> str:
+    """Return a value the way ``--set`` takes it; a path of the study's own as it was found."""
+    folder = getattr(value, "folder", None)
+    if folder is not None and (folder / value).is_file():
+        return str(folder / value)
+    if isinstance(value, list | dict):
+        from dsa_des.toml_text import inline
+
+        return inline(value)
+    return as_text(value)
+
+
+def changed_scene(
+    base: SceneFile,
+    swaps: Sequence[tuple[str, str]],
+    sets: Sequence[tuple[str, Any]],
+    source: str,
+) -> Scene:
+    """Return the checked scene that swaps and values make of a scene's tables.
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    """
+    file = SceneFile(base.path, deepcopy(base.data), dict(base.sources))
+    problems: list[Problem] = []
+    for block, name in swaps:
+        found, _ = apply_swap(file, f"{block}={name}")
+        problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
+    for key, value in sets:
+        problems += set_value(file, key, deepcopy(value), source)
+    if problems:
+        raise SceneError(problems)
+    return check_scene(file)

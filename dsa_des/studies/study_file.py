@@ -1,0 +1,324 @@
+"""From a study file to a study that can be run, every problem reported before anything runs."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsa_des.component import SourcedText
+from dsa_des.entry_points import registered
+from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.overrides import apply_set
+from dsa_des.parameter_errors import explain
+from dsa_des.scene import Scene
+from dsa_des.scene_file import Key, SceneFile, read_scene_file
+from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
+from dsa_des.studies.draws import Draw, parse_draw
+from dsa_des.studies.metric import METRICS, find_metric
+from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
+from dsa_des.studies.study_checks import check_cells
+from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
+
+KEYS = (
+    "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
+    "figures", "stop_when", "compare", "over", "confidence", "interval", "runs_per_chunk",
+)  # fmt: skip
+FIGURES = {
+    "axis": ("metric", "axis", "lines"),
+    "heat": ("metric", "x", "y"),
+    "polar": ("metric", "axis"),
+    "run": ("cell", "replica"),
+}
+_MOST_RUNS = 100_000_000
+
+
+def read_study(
+    path: Path | str,
+    swaps: Iterable[tuple[str, list[str]]] = (),
+    sets: Iterable[str] = (),
+) -> Study:
+    """Read and check a study.
+
+    Parameters
+    ----------
+    path : path of the TOML file
+    swaps : iterable of (block, types)
+        Further swap axes.
+    sets : iterable of str
+        Changes of the study itself, as ``key=value``.
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    """
+    reader = _Reader(read_scene_file(path))
+    for assignment in sets:
+        reader.problems += apply_set(reader.file, assignment)
+    return reader.study(swaps)
+
+
+def study_again(path: Path, tables: dict[str, Any]) -> Study:
+    """Return a study from the tables of one that was read before (`Study.tables`).
+
+    Raises
+    ------
+    SceneError
+        If they no longer fit the scene.
+    """
+    return _Reader(SceneFile(path, tables)).study(())
+
+
+def study_of_scene(
+    scene: Path, replicas: int, metrics: Iterable[str], swaps: Iterable[tuple[str, list[str]]] = ()
+) -> Study:
+    """Return a study of a scene as it is: some replicas, and the named metrics."""
+    data = {
+        "title": scene.stem,
+        "scene": SourcedText.of(str(scene.resolve()), scene.parent),
+        "replicas": replicas,
+        "metrics": list(metrics),
+    }
+    return _Reader(SceneFile(scene, data)).study(swaps)
+
+
+class _Reader:
+    def __init__(self, file: SceneFile) -> None:
+        self.file = file
+        self.data = file.data
+        self.problems: list[Problem] = []
+
+    def add(self, key: Key, message: str, *value: Any) -> None:
+        self.problems.append(self.file.problem(key, message, *value))
+
+    def study(self, swaps: Iterable[tuple[str, list[str]]]) -> Study:
+        for key in self.data:
+            if key not in KEYS:
+                self.add((key,), f"unknown key of a study{did_you_mean(key, KEYS)}")
+        seed = self.whole("seed", 0, low=0)
+        replicas = self.whole("replicas", 1, low=1)
+        confidence = self.number("confidence", 0.95, 0.5, 1.0)
+        interval = self.data.get("interval", "t")
+        if interval not in ("t", "bootstrap"):
+            self.add(("interval",), "must be 't' or 'bootstrap'", interval)
+        base, scene = self.scene()
+        self.stop_if_wrong()
+        assert base is not None and scene is not None
+        axes = self.axes(scene, swaps)
+        draws = self.draws(base)
+        specs = self.metric_specs()
+        self.stop_if_wrong()
+        stop_when = self.stop_when(replicas)
+        runs = replicas
+        for axis in axes:
+            runs *= len(axis.labels)
+        if runs > _MOST_RUNS:
+            self.add(("axes",), f"make {runs:,} runs; at most {_MOST_RUNS:,} are allowed")
+        study = Study(
+            path=Path(self.file.path),
+            scene_path=Path(base.path),
+            title=str(self.data.get("title", Path(self.file.path).stem)),
+            seed=seed,
+            replicas=replicas,
+            axes=axes,
+            draws=draws,
+            metrics=specs,
+            sets=self.sets(),
+            swaps=self.swaps(),
+            over=self.over(axes),
+            baseline=self.baseline(axes),
+            stop_when=stop_when,
+            confidence=confidence,
+            interval=interval,
+            figures=self.figures(axes),
+            runs_per_chunk=self.whole("runs_per_chunk", max(1, min(256, -(-runs // 32))), low=1),
+            base=base,
+            tables=resolved(self.data, swaps),
+        )
+        self.stop_if_wrong()
+        check_cells(study, self.file)
+        return study
+
+    def stop_if_wrong(self) -> None:
+        if self.problems:
+            raise SceneError(self.problems)
+
+    # -- plain values ----------------------------------------------------------------------
+
+    def whole(self, key: str, default: int, *, low: int) -> int:
+        value = self.data.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < low:
+            self.add((key,), f"must be a whole number of {low} or more", value)
+            return max(default, low)
+        return value
+
+    def number(self, key: str, default: float, low: float, high: float) -> float:
+        value = self.data.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low < value < high:
+            self.add((key,), f"must be a number between {low} and {high}", value)
+            return default
+        return float(value)
+
+    def table(self, key: str) -> dict[str, Any]:
+        value = self.data.get(key, {})
+        if not isinstance(value, dict):
+            self.add((key,), "must be a table", value)
+            return {}
+        return value
+
+    def sets(self) -> tuple[tuple[str, Any], ...]:
+        flat = flat_values(self.table("set"))
+        return tuple(flat.items())
+
+    def swaps(self) -> tuple[tuple[str, str], ...]:
+        return tuple((block, str(name)) for block, name in self.table("swap").items())
+
+    # -- the base scene --------------------------------------------------------------------
+
+    def scene(self) -> tuple[SceneFile | None, Scene | None]:
+        name = self.data.get("scene")
+        if not isinstance(name, str):
+            self.add(("scene",), "is required: the TOML file of the scene that is studied")
+            return None, None
+        path = Path(str(name)).expanduser()
+        if not path.is_absolute():
+            path = getattr(name, "folder", Path()) / path
+        try:
+            base = read_scene_file(path)
+            return base, changed_scene(base, self.swaps(), self.sets(), str(self.file.path))
+        except SceneError as error:
+            self.problems += error.problems
+            return None, None
+
+    # -- axes and draws --------------------------------------------------------------------
+
+    def axes(self, scene: Scene, swaps: Iterable[tuple[str, list[str]]]) -> tuple[Axis, ...]:
+        found: list[Axis] = []
+        specs = flatten_axes(self.table("axes")) | {f"swap.{b}": types for b, types in swaps}
+        for key, spec in specs.items():
+            try:
+                found.append(parse_axis(key, spec, scene))
+            except ValueError as error:
+                self.add(("axes", key), str(error))
+        return tuple(found)
+
+    def draws(self, base: SceneFile) -> tuple[Draw, ...]:
+        found = []
+        for key, spec in flat_draws(self.table("draws")).items():
+            try:
+                found.append(parse_draw(key, spec))
+            except ValueError as error:
+                self.add(("draws", key), str(error))
+        return tuple(found)
+
+    def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
+        """Return the column of the axis that `name` means."""
+        columns = [axis.column for axis in axes]
+        wanted = str(name).removeprefix("blocks.")
+        if wanted in columns:
+            return wanted
+        hint = did_you_mean(wanted, columns)
+        self.add(key, f"the study has no such axis{hint}", str(name))
+        return None
+
+    def over(self, axes: tuple[Axis, ...]) -> tuple[str, ...]:
+        if "over" not in self.data:
+            return tuple(axis.column for axis in axes if axis.files)
+        names = self.data["over"]
+        names = names if isinstance(names, list) else [names]
+        return tuple(c for n in names if (c := self.column(("over",), n, axes)) is not None)
+
+    def baseline(self, axes: tuple[Axis, ...]) -> tuple[str, Any] | None:
+        table = self.data.get("compare")
+        if table is None:
+            first = next((axis for axis in axes if axis.key.startswith("swap.")), None)
+            return None if first is None else (first.column, first.labels[0])
+        if not isinstance(table, dict) or set(table) != {"axis", "baseline"}:
+            self.add(("compare",), "must be a table {axis = KEY, baseline = VALUE}")
+            return None
+        column = self.column(("compare", "axis"), table["axis"], axes)
+        if column is None:
+            return None
+        axis = next(axis for axis in axes if axis.column == column)
+        if table["baseline"] not in axis.labels:
+            shown = ", ".join(map(str, axis.labels[:12]))
+            message = f"is no value of that axis; allowed: {shown}"
+            self.add(("compare", "baseline"), message, table["baseline"])
+            return None
+        return column, axis.labels[axis.labels.index(table["baseline"])]
+
+    # -- metrics ---------------------------------------------------------------------------
+
+    def metric_specs(self) -> tuple[MetricSpec, ...]:
+        items = self.data.get("metrics")
+        if not isinstance(items, list) or not items:
+            shown = ", ".join(registered(METRICS))
+            self.add(("metrics",), f"is required: a list of metrics; there are {shown}")
+            return ()
+        found: list[MetricSpec] = []
+        for number, item in enumerate(items):
+            key: Key = ("metrics", number)
+            table = {"metric": item} if isinstance(item, str) else item
+            if not isinstance(table, dict) or not isinstance(table.get("metric"), str):
+                self.add(key, "must be the name of a metric, or a table {metric = NAME, ...}", item)
+                continue
+            keys = {name: value for name, value in table.items() if name != "metric"}
+            name = str(table["metric"])
+            try:
+                cls = find_metric(name)
+                cls.Parameters.model_validate(keys)
+            except ValidationError as error:
+                self.problems += explain(self.file, key, f"metric {name}", cls.Parameters, error)
+                continue
+            except ValueError as error:
+                self.add(key, str(error), name)
+                continue
+            found.append(MetricSpec(name, keys))
+        return tuple(found)
+
+    def stop_when(self, replicas: int) -> StopWhen | None:
+        table = self.data.get("stop_when")
+        if table is None:
+            return None
+        known = {"metric", "half_width", "batch"}
+        if not isinstance(table, dict) or not {"metric", "half_width"} <= set(table) <= known:
+            self.add(("stop_when",), "must be {metric = RESULT, half_width = NUMBER, batch = N}")
+            return None
+        width, batch = table["half_width"], table.get("batch", max(10, -(-replicas // 20)))
+        if isinstance(width, bool) or not isinstance(width, int | float) or width <= 0:
+            self.add(("stop_when", "half_width"), "must be a number above 0", width)
+            return None
+        if isinstance(batch, bool) or not isinstance(batch, int) or batch < 2:
+            self.add(("stop_when", "batch"), "must be a whole number of 2 or more", batch)
+            return None
+        return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
+
+    # -- figures ---------------------------------------------------------------------------
+
+    def figures(self, axes: tuple[Axis, ...]) -> tuple[dict[str, Any], ...]:
+        items = self.data.get("figures", [])
+        if not isinstance(items, list):
+            self.add(("figures",), "must be a list of tables ([[figures]])")
+            return ()
+        found: list[dict[str, Any]] = []
+        for number, item in enumerate(items):
+            key: Key = ("figures", number)
+            kind = item.get("kind", "axis") if isinstance(item, dict) else None
+            if kind not in FIGURES:
+                self.add(key, f"kind must be one of {', '.join(sorted(FIGURES))}")
+                continue
+            figure = {"kind": str(kind)}
+            for name, value in item.items():
+                allowed = ("kind", "title", *FIGURES[kind])
+                if name not in allowed:
+                    hint = did_you_mean(name, allowed)
+                    self.add((*key, name), f"unknown key of a {kind} figure{hint}")
+                elif name in ("axis", "lines", "x", "y"):
+                    figure[name] = self.column((*key, name), value, axes) or ""
+                elif name != "kind":
+                    figure[name] = value
+            if kind != "run" and "metric" not in figure:
+                self.add(key, "needs a metric: the name of a result")
+            found.append(figure)
+        return tuple(found)

@@ -1,0 +1,171 @@
+"""From the rows of a study to its tables: one line per cell and result, and paired differences.
+
+Where a study runs over a sample of encounters (`over`), the encounters are the independent units
+and a cell of the summary joins all of them; otherwise the replicas are.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
+from dsa_des.studies.statistics import Difference, Estimate, difference, mean, share
+from dsa_des.types import AnyArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+@dataclass(frozen=True)
+class Line:
+    """One result at one place of the summary's axes."""
+
+    at: tuple[Any, ...]
+    result: Result
+    estimate: Estimate
+    missing: int
+    expected: float | None
+
+
+class Rows:
+    """The rows of a study as columns, and how they fall into places and units.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Rows in order of cell and replica.
+    axes : sequence of str
+        Columns of all axes.
+    over : sequence of str
+        Those that are a sample.
+    """
+
+    def __init__(self, table: "pa.Table", axes: Sequence[str], over: Sequence[str]) -> None:
+        good = np.asarray(table["error"].is_null())
+        self.failed = int(len(good) - good.sum())
+        self.names = set(table.column_names)
+        self._table = table.filter(good) if self.failed else table
+        self.axes = [name for name in axes if name not in over]
+        self.over = list(over)
+        #: What rows share that belong to the same place, and to the same independent unit.
+        self.places = self._codes(self.axes)
+        self.units = self._codes(self.over if self.over else ["replica"])
+
+    def column(self, name: str) -> AnyArray:
+        """Return a column; missing numbers are NaN."""
+        values: AnyArray = self._table[name].to_numpy(zero_copy_only=False)
+        return values
+
+    def _codes(self, names: Sequence[str]) -> IntArray:
+        codes = np.zeros(self._table.num_rows, dtype=np.int64)
+        for name in names:
+            _, code = np.unique(self.column(name), return_inverse=True)
+            codes = codes * (int(code.max(initial=0)) + 1) + code
+        return codes
+
+    def each_place(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
+        """Return the axis values and the rows of every place, in order of first occurrence."""
+        codes, first = np.unique(self.places, return_index=True)
+        for code in codes[np.argsort(first)].tolist():
+            rows = np.flatnonzero(self.places == code)
+            at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
+            yield at, rows
+
+    def by_unit(self, name: str, rows: IntArray) -> tuple[IntArray, FloatArray]:
+        """Return the units in some rows and each one's mean value (over its replicas)."""
+        values = self.column(name)[rows].astype(float)
+        known = ~np.isnan(values)
+        units, place = np.unique(self.units[rows], return_inverse=True)
+        total = np.bincount(place[known], weights=values[known], minlength=len(units))
+        many = np.bincount(place[known], minlength=len(units))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return units, np.where(many > 0, total / many, np.nan)
+
+    def estimate(
+        self, result: Result, rows: IntArray, confidence: float, method: str
+    ) -> tuple[Estimate, int]:
+        """Return the estimate of a result over some rows, and how many rows have no value."""
+        values = self.column(result.name)[rows].astype(float)
+        missing = int(np.isnan(values).sum())
+        if result.kind not in (EVENT, SHARE):
+            _, of_units = self.by_unit(result.name, rows)
+            return mean(of_units, confidence, method), missing
+        trials = np.ones(len(rows))
+        if result.kind == SHARE:
+            trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))
+        trials = np.where(np.isnan(values), 0.0, trials)
+        units, place = np.unique(self.units[rows], return_inverse=True)
+        won = np.bincount(place, weights=np.nan_to_num(values) * trials, minlength=len(units))
+        tried = np.bincount(place, weights=trials, minlength=len(units))
+        return share(won.astype(float), tried.astype(float), confidence), missing
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def summarise(
+    rows: Rows,
+    results: Sequence[Result],
+    confidence: float,
+    method: str,
+    expected: dict[tuple[str, tuple[Any, ...]], float],
+) -> list[Line]:
+    """Return one line per place and result.
+
+    Parameters
+    ----------
+    expected : dict
+        (Result name, place) → analytic answer, where there is one.
+    """
+    lines = []
+    for at, chosen in rows.each_place():
+        for result in results:
+            estimate, missing = rows.estimate(result, chosen, confidence, method)
+            lines.append(Line(at, result, estimate, missing, expected.get((result.name, at))))
+    return lines
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A result at one value of the compared axis, less the same at the baseline."""
+
+    at: tuple[Any, ...]
+    value: Any
+    baseline: Any
+    result: Result
+    difference: Difference
+
+
+def compare_axis(
+    rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float, method: str
+) -> list[Compared]:
+    """Return the paired differences of every value of an axis against one of them.
+
+    Rows are paired that share the unit and the values of all other axes.
+    """
+    place = rows.axes.index(axis)
+    by_place = dict(rows.each_place())
+    found = []
+    for at, chosen in by_place.items():
+        base = (*at[:place], baseline, *at[place + 1 :])
+        if at[place] == baseline or base not in by_place:
+            continue
+        for result in results:
+            first, second = paired(rows, result.name, by_place[base], chosen)[1:]
+            others = (*at[:place], *at[place + 1 :])
+            change = difference(first, second, confidence, method)
+            found.append(Compared(others, at[place], baseline, result, change))
+    return found
+
+
+def paired(
+    rows: Rows, name: str, first: IntArray, second: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the units that both sets of rows have, and the values of each in both."""
+    one, of_one = rows.by_unit(name, first)
+    two, of_two = rows.by_unit(name, second)
+    units, here, there = np.intersect1d(one, two, return_indices=True)
+    return units, of_one[here], of_two[there]

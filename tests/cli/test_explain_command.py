@@ -1,0 +1,51 @@
+"""`dsa-des explain --measure`, and the messages of what effects' parameters may not be."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dsa_des.cli import main
+from dsa_des.commands.explain import measured_shares
+from dsa_des.scene import load_scene
+
+SCENE = Path(__file__).parent.parent.parent / "configs" / "first_light.toml"
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+
+
+def test_measuring_shows_a_share_for_every_effect_that_calculates() -> None:
+    sets = [
+        "blocks.radar.beam_sweep=true",
+        "blocks.radar.mount_azimuth_deg=5",
+        "weather.rain_rate_mm_h=5",
+    ]
+    shares = measured_shares(load_scene(SCENE, sets=sets))
+    for effect in ("beam sweep", "mounting", "rain"):
+        assert 0 < shares["radar", effect] < 1
+    # The method of Pd is a choice: there is nothing to time.
+    assert ("radar", "exact Pd") not in shares
+    result = call("explain", SCENE, "--measure", "--duration", 20)
+    assert result.exit_code == 0
+    assert "share" in result.stdout and "%" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("weather.rain_rate_mm_h=-1", "rain_rate_mm_h = -1: must be greater than or equal to 0"),
+        ("weather.visibility_km=0", "visibility_km = 0: must be greater than 0"),
+        ("blocks.radar.false_alarm_probability=1.5", "= 1.5: must be less than 1"),
+        ("blocks.radar.polarisation=horizontl", "did you mean 'horizontal'?"),
+        ("blocks.radar.beam_sweep=maybe", "must be true or false"),
+        ("terrain.height_m=2000", "must be below the ownship, which is at 1000 m"),
+    ],
+)
+def test_bad_weather_and_parameters_are_named(change: str, words: str) -> None:
+    for command in ("check", "explain"):
+        result = call(command, SCENE, "--set", change)
+        assert result.exit_code == 2
+        assert words in " ".join(result.stderr.split())
+        assert change.split("=")[0].rsplit(".", 1)[-1] in result.stderr

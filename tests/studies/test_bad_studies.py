@@ -1,0 +1,109 @@
+"""What is wrong with a study is said before anything runs, all of it, with the nearest name."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from dsa_des.cli import main
+
+
+def refused(*words: str) -> str:
+    result = CliRunner().invoke(main, ["study", *words])
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    assert not Path("studies").exists()
+    return " ".join(result.output.split())
+
+
+def changed(old: str, new: str) -> None:
+    text = Path("study.toml").read_text()
+    assert old in text
+    Path("study.toml").write_text(text.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "blocks.radar.scan_rate_hz = [1, 5]",
+            "blocks.radar.scan_rate = [1, 5]",
+            "study.toml: blocks.radar.scan_rate: unknown parameter of fragile:Fragile; "
+            "did you mean 'scan_rate_hz'?",
+        ),
+        (
+            "blocks.radar.scan_rate_hz = [1, 5]",
+            "blocks.rader.scan_rate_hz = [1, 5]",
+            "the scene has no block 'rader'; did you mean 'radar'?",
+        ),
+        ("[1, 5]", "[]", "axes.blocks.radar.scan_rate_hz: is empty"),
+        ("[1, 5]", "{ from = 5, to = 1, step = 1 }", "the range from 5 to 1 is empty"),
+        ("[1, 5]", "{ from = 1, to = 5 }", "a range needs from, to, and either step or steps"),
+        ("[1, 5]", "{ from = 0, to = 5, steps = 3, log = true }", "must start above 0"),
+        ("[1, 5]", "[1, 1]", "holds 1 more than once"),
+        ("[1, 5]", "[1, -5]", "blocks.radar.scan_rate_hz = -5: must be greater than 0"),
+        ("replicas = 24", "replicas = 0", "replicas = 0: must be a whole number of 1 or more"),
+        ("replicas = 24", "replcas = 24", "unknown key of a study; did you mean 'replicas'?"),
+        ('"first_detection", ', '"first_detecton", ', "did you mean 'first_detection'?"),
+        ('"small.toml"', '"smal.toml"', "did you mean"),
+        ("uniform = [0, 0.2]", "uniform = [0.2, 0]", "the range [0.2, 0.0] is empty"),
+        ("uniform = [0, 0.2]", "unifrom = [0, 0.2]", "must be one of {uniform = [low, high]}"),
+        ('metric = "first_detection_range_m.radar"', 'metric = "first_detection_range_m.rada"',
+         "did you mean 'first_detection_range_m.radar'?"),
+        ('title = "small study"', 'stop_when = {metric = "nothing", half_width = 1}',
+         "stop_when.metric = 'nothing': no metric of the study gives it"),
+        ("[axes]", '[axes]\nswap.radra = ["radar.threshold"]', "did you mean 'radar'?"),
+        ("[axes]", '[axes]\nblocks.traffic.file = {files = "nowhere/*.daa"}', "no file matches"),
+    ],
+)  # fmt: skip
+def test_one_problem_is_named(small: Path, old: str, new: str, message: str) -> None:
+    changed(old, new)
+    assert message in refused("study.toml")
+
+
+def test_a_metric_needs_its_port(small: Path) -> None:
+    scene = Path("small.toml").read_text()
+    scene = scene.replace(', "radar -> fusion"', "").replace(',\n         "ir -> fusion", '
+                                                             '"fusion -> tracker"', "")  # fmt: skip
+    cut = scene.index("[blocks.fusion]")
+    Path("small.toml").write_text(scene[:cut])
+    output = refused("study.toml")
+    assert "metrics[1] = 'fused_share': needs a block whose output records 'fused'" in output
+    assert "this scene's blocks record detections, scans" in output
+    assert "metrics[3] = 'track_updates'" in output  # all problems at once
+
+
+def test_a_swap_that_takes_a_metrics_port_away_is_noticed(small: Path) -> None:
+    changed("[axes]", '[axes]\nswap.fusion = ["fusion.pick_best", "fusion.none"]')
+    assert "unknown block type" in refused("study.toml")
+
+
+def test_all_problems_come_at_once(small: Path) -> None:
+    changed("[1, 5]", "[]")
+    changed("uniform = [0, 0.2]", "uniform = [0]")
+    output = refused("study.toml")
+    assert "2 problems" in output and "is empty" in output and "uniform takes two" in output
+
+
+def test_a_scheduler_that_does_not_answer(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("dsa_des.studies.executors._CONNECT_TIMEOUT_S", 0.3)
+    words = ("study.toml", "--executor", "dask", "--scheduler", "tcp://127.0.0.1:9")
+    assert "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there" in refused(*words)
+
+
+def test_dask_must_be_there(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    words = ("study.toml", "--executor", "dask", "--scheduler", "tcp://127.0.0.1:9")
+    assert "pip install 'dsa-des[dask]'" in refused(*words)
+    assert "needs --scheduler" in refused("study.toml", "--executor", "dask")
+
+
+def test_folders_that_hold_something_else(small: Path) -> None:
+    Path("full").mkdir()
+    Path("full/precious.txt").write_text("mine")
+    assert "holds something other than a study" in refused("study.toml", "--out", "full")
+    assert "is not the folder of a study" in refused("show", "full")
+    assert "give STUDY.toml" in refused()
+    assert "there is no studies/study-NNN to continue" in refused("study.toml", "--resume")
+    assert "must be 1 or more" in refused("study.toml", "--workers", "0")

@@ -1,0 +1,253 @@
+"""Nothing finished is lost or doubled when workers or the study itself are killed for real."""
+
+import os
+import resource
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from dsa_des.commands.study import finish, run_into
+from dsa_des.studies.executors import Dask
+from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.runner import Stopped, run_study
+from dsa_des.studies.statistics import wilson
+from dsa_des.studies.study_file import read_study
+
+
+@pytest.fixture(autouse=True)
+def _no_figures(small: Path) -> None:
+    """Without figures a process starts and ends much sooner."""
+    text = Path("study.toml").read_text()
+    Path("study.toml").write_text(text[: text.index("[[figures]]")])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Everything in a study's folder, by name."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+def undisturbed(name: str = "alone") -> dict[str, bytes]:
+    study = read_study("study.toml")
+    finish(study, run_into(study, Path(name), 1, False), quiet=True)
+    return contents(Path(name))
+
+
+def dsa_des(*words: str) -> subprocess.Popen[bytes]:
+    code = "from dsa_des.cli import main; main()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
+
+
+def flawed(flaw: str) -> None:
+    """Let the radar of the first replicas have a flaw."""
+    text = Path("study.toml").read_text()
+    Path("study.toml").write_text(f'{text}\n[set]\nblocks.radar.flaw = "{flaw}"\n')
+
+
+def test_a_killed_study_continues_to_the_same_bytes(small: Path) -> None:
+    whole = undisturbed()
+    process = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--quiet")
+    parts = Path("killed/parts")
+    deadline = time.monotonic() + 30
+    while len(list(parts.glob("*.parquet"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    before = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
+    (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # as a kill leaves it
+    again = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--resume")
+    again.communicate()
+    assert again.returncode == 0
+    assert contents(Path("killed")) == whole
+    after = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
+    assert before.items() <= after.items()  # what was finished is not run again
+
+
+def test_a_killed_worker_changes_nothing(small: Path) -> None:
+    flag = small / "died"
+    flawed(f"die once {flag}")
+    flag.touch()
+    whole = undisturbed()
+    flag.unlink()
+    study = read_study("study.toml")
+    finish(study, run_into(study, Path("pool"), 2, False), quiet=True)
+    assert flag.exists()
+    assert contents(Path("pool")) == whole
+
+
+def test_runs_that_kill_their_worker_are_recorded_as_failed(small: Path) -> None:
+    text = Path("study.toml").read_text().replace("replicas = 24", "replicas = 6")
+    text = (
+        text.replace("runs_per_chunk = 8", "runs_per_chunk = 6")
+        .replace("[1, 5]", "[5]")
+        .replace("seed = 3", "seed = 1")
+    )
+    extra = '"blocks.ir.flaw" = { choice = ["die", "none"] }\n"blocks.traffic'
+    Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
+    study = read_study("study.toml")
+    dying = {k for k in range(6) if study.replica(k).changes["blocks.ir.flaw"] == "die"}
+    assert 0 < len(dying) < 6
+    folder = run_into(study, Path("deadly"), 2, False)
+    rows = folder.results().to_pylist()
+    assert {row["replica"] for row in rows if row["error"]} == dying
+    assert all("died" in row["error"] for row in rows if row["error"])
+
+
+def test_a_poisoned_run_does_not_stop_the_study(small: Path) -> None:
+    text = Path("study.toml").read_text()
+    extra = '"blocks.ir.flaw" = { choice = ["none", "none", "none", "raise"] }\n"blocks.traffic'
+    Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
+    study = read_study("study.toml")
+    folder = run_into(study, Path("poisoned"), 1, False)
+    rows = folder.results().to_pylist()
+    bad = [row for row in rows if row["error"]]
+    assert len(rows) == 48 and 0 < len(bad) < 24
+    for row in bad:
+        assert "ir (fragile:Fragile) failed at t = 0.000 s" in row["error"]
+        assert row["first_detection_range_m.radar"] is None
+    words = shlex.split(bad[0]["command"])
+    assert words[:2] == ["dsa-des", "run"]
+    again = dsa_des(*words[1:], "--out", "again")
+    _, stderr = again.communicate()
+    assert again.returncode == 1 and b"poisoned" in stderr
+    assert all(row["command"] is None for row in rows if not row["error"])
+
+
+def test_a_full_disk_leaves_a_resumable_folder(small: Path) -> None:
+    whole = undisturbed()
+    limit = len(whole["parts/part-000-000003.parquet"]) - 1  # the parts differ in size
+    code = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}));"
+        "from dsa_des.cli import main; main()"
+    )
+    words = ["study", "study.toml", "--workers", "1", "--out", "full", "--quiet"]
+    process = subprocess.run(
+        [sys.executable, "-B", "-c", code, *words], capture_output=True, text=True, check=False
+    )
+    assert process.returncode == 1, process.stderr
+    assert "results cannot be written: File too large" in process.stderr
+    assert "--resume" in process.stderr and "Traceback" not in process.stderr
+    done = sorted(path.name for path in Path("full/parts").iterdir())
+    assert all(name.endswith(".parquet") and not name.startswith(".") for name in done)
+    study = read_study("study.toml")
+    finish(study, run_into(study, Path("full"), 1, True), quiet=True)
+    assert contents(Path("full")) == whole
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != limit
+
+
+def test_ctrl_c_leaves_a_resumable_folder(small: Path) -> None:
+    whole = undisturbed()
+    process = dsa_des("study", "study.toml", "--workers", "2", "--out", "stopped", "--quiet")
+    parts = Path("stopped/parts")
+    deadline = time.monotonic() + 30
+    while not list(parts.glob("*.parquet")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=30)
+    if process.returncode == 0:
+        pytest.skip("the study was done before it could be interrupted")
+    assert process.returncode == 130
+    assert b"continue with" in stderr and b"Traceback" not in stderr
+    study = read_study("study.toml")
+    finish(study, run_into(study, Path("stopped"), 1, True), quiet=True)
+    assert contents(Path("stopped")) == whole
+
+
+def test_a_part_that_cannot_be_read_is_run_again(small: Path) -> None:
+    whole = undisturbed()
+    (Path("alone/parts") / "part-000-000002.parquet").write_bytes(b"torn")
+    study = read_study("study.toml")
+    finish(study, run_into(study, Path("alone"), 1, True), quiet=True)
+    assert contents(Path("alone")) == whole
+
+
+def test_no_results_of_another_study_are_mixed_in(small: Path) -> None:
+    undisturbed()
+    text = Path("study.toml").read_text().replace("seed = 3", "seed = 4")
+    Path("study.toml").write_text(text)
+    folder = StudyFolder(Path("alone"))
+    with pytest.raises(Exception, match="another study"):
+        folder.open(read_study("study.toml"), resume=True)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    flag = small / "died"
+    flawed(f"die once {flag}")
+    flag.touch()
+    whole = undisturbed()
+    flag.unlink()
+    study = read_study("study.toml")
+    folder = StudyFolder(Path("dask"))
+    folder.open(study, resume=False)
+    old = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = str(small)
+    try:
+        with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster:
+            executor = Dask(cluster.scheduler_address)
+            run_study(study, folder, executor)
+            executor.close()
+    finally:
+        os.environ.pop("PYTHONPATH")
+        if old is not None:
+            os.environ["PYTHONPATH"] = old
+    assert flag.exists()
+    finish(study, folder, quiet=True)
+    assert contents(Path("dask")) == whole
+
+
+def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = read_study("study.toml")
+    folder = StudyFolder(Path("broken"))
+    folder.open(study, resume=False)
+
+    def full(path: object, content: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("dsa_des.studies.folder._write", full)
+    from dsa_des.studies.executors import Serial
+
+    with pytest.raises(Stopped, match="No space left"):
+        run_study(study, folder, Serial())
+    assert not list(folder.parts.iterdir())
+
+
+def test_all_runs_open_in_one_line(small: Path) -> None:
+    undisturbed()
+    table = pq.read_table("alone/parts")
+    assert table.num_rows == 48 and "radar.scan_rate_hz" in table.column_names
+
+
+def test_a_cell_stops_when_its_interval_is_narrow_enough(small: Path) -> None:
+    text = Path("study.toml").read_text()
+    stop = 'stop_when = {metric = "detected.radar", half_width = 0.2, batch = 6}\n[axes]'
+    Path("study.toml").write_text(text.replace("[axes]", stop))
+    study = read_study("study.toml")
+    rows = run_into(study, Path("stops"), 1, False).results().to_pylist()
+    for cell in (0, 1):
+        mine = [row["detected.radar"] for row in rows if row["cell"] == cell]
+        assert len(mine) in (6, 12, 18, 24)
+        assert half_width(mine) <= 0.2 or len(mine) == 24
+        assert len(mine) == 6 or half_width(mine[:-6]) > 0.2
+    resumed = run_into(study, Path("stops"), 1, True).results().to_pylist()
+    assert resumed == rows
+
+
+def half_width(values: list[float]) -> float:
+    low, high = wilson(sum(values), len(values), 0.95)
+    return (high - low) / 2
