@@ -15,6 +15,7 @@ from pydantic import Field
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
+from components.geometry.ladder import ATTITUDE, EARTH
 from components.geometry.rung_planning import Rung, pick_rung
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
@@ -69,6 +70,7 @@ class Transform(Component):
     lockstep = True
     rewindable = True
     effects = (NavigationErrors(),)
+    ladders = (EARTH, ATTITUDE)
     #: The type's own model of the Earth.
     earth: ClassVar[str]
 

@@ -32,10 +32,13 @@ class CameraParameters(SensorParameters):
         description="'auto' would pick a cheaper `silhouette` by its error; no bound is proven, so "
         "it stays, and `explain` says so.",
     )
-    silhouette: Literal["exact", "thesis", "convex_hull", "aspect_table"] = Field(
+    silhouette: Literal[
+        "exact", "thesis", "convex_hull", "aspect_table", "sampled_table", "mesh"
+    ] = Field(
         default="exact",
-        description="How the area follows from the target's attitude; 'aspect_table' takes each "
-        "aircraft's silhouette_table.",
+        description="How the area follows from the target's attitude: sum of the three bodies, "
+        "thesis eq. 9-13, union of the bodies, each aircraft's silhouette_table, a table sampled "
+        "from the union, or a mesh of the bodies (slow).",
     )
     rate: Literal["exact", "thesis"] = Field(
         default="exact",
@@ -116,15 +119,20 @@ class Camera(Sensor):
         """Return the area that shows in each cell, m²."""
         raise TypeError(f"{type(self).__name__} has no area(cells)")
 
+    def shown_area(self, cells: Cells) -> FloatArray:
+        """Return the area that shows in each cell with what the scene's effects add to it, m²."""
+        area = self.area(cells)
+        for added in self._areas:
+            area = area + added(cells)
+        return area
+
     def contrast(self, cells: Cells) -> FloatArray:
         """Return the contrast gain P of each cell."""
         raise TypeError(f"{type(self).__name__} has no contrast(cells)")
 
     def look(self, cells: Cells) -> Look:
         """Compare every target's signature with the threshold."""
-        area = self.area(cells)
-        for added in self._areas:
-            area = area + added(cells)
+        area = self.shown_area(cells)
         pixels = pixels_covered(
             area,
             cells.range_m,

@@ -124,7 +124,7 @@ class SwerlingRadar(LinkBudgetRadar):
         cnr = self.clutter_cnr(cells)
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
-        for model, chosen in self._detection_models(cells):
+        for model, chosen in self.models_in_use(cells):
             pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
         detected = echo & (cells.draws(self._draws) < pd)
@@ -134,7 +134,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
         if self.p.fluctuation == "probability" or self._models is steady:
             return super().snr(cells)
-        rcs = self._mean_rcs_m2(cells)
+        rcs = self.mean_rcs_m2(cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
             target, scan = keys[chosen], cells.scan[chosen]
@@ -179,7 +179,7 @@ class SwerlingRadar(LinkBudgetRadar):
             return None
         return _steepest_pd(self.p.pulses, self.p.false_alarm_probability)
 
-    def _detection_models(self, cells: Cells) -> list[tuple[int, Any]]:
+    def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
         if self.p.fluctuation == "sampled":
             return [(0, slice(None))]

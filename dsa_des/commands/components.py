@@ -15,6 +15,7 @@ from rich.table import Table
 from dsa_des.component import Component
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError
+from dsa_des.ladder import Ladder
 from dsa_des.registry import UnknownType, find
 
 _UNITS = {
@@ -85,6 +86,21 @@ def _describe(console: Console, name: str, cls: type[Component]) -> None:
         table.add_column(heading)
     for row in parameter_rows(cls.Parameters):
         table.add_row(*row)
+    console.print(table, highlight=False, markup=False)
+    for ladder in cls.ladders:
+        _describe_ladder(console, ladder)
+
+
+def _describe_ladder(console: Console, ladder: Ladder) -> None:
+    units = ", ".join(f"{quantity.name} ({quantity.unit})" for quantity in ladder.quantities)
+    console.print(f"\nladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
+                  highlight=False)  # fmt: skip
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("  rung", "type", "what it is"):
+        table.add_column(heading)
+    for rung in ladder.rungs:
+        reference = " (reference)" if rung.name == ladder.reference else ""
+        table.add_row(f"  {rung.name}{reference}", rung.type_name or "as it is", rung.what)
     console.print(table, highlight=False, markup=False)
 
 

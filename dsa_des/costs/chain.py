@@ -1,0 +1,185 @@
+"""Combinations of rungs over all blocks: what the whole chain costs and how much it finds.
+
+All ladders multiplied are too many, and most are pointless: a rung that another one of its own
+ladder beats on both axes has no place in a good chain. So only rungs on their ladder's front are
+combined, with the scene's own.
+"""
+
+import itertools
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dsa_des.costs.front import on_front
+from dsa_des.costs.output import png_figure
+from dsa_des.costs.study import Compare, RungCost
+from dsa_des.costs.variants import Choice, Variants
+from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.ladder import Unavailable
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import Scene
+from dsa_des.simulation import Simulation
+
+MOST = 200
+_REPEATS = 7
+
+Group = list[RungCost]
+
+
+@dataclass
+class ChainStudy:
+    """Rows of the whole chain, and how its combinations were picked."""
+
+    rows: list[dict[str, Any]]
+    picked: str
+
+
+def run_chain(variants: Variants, costs: Sequence[RungCost], compare: Compare) -> ChainStudy:
+    """Run combinations of rungs and compare what they find with the references together.
+
+    The error is the share of detections gained or lost. Every combination is run seven times,
+    interleaved, without recording; its cost is the shortest of them.
+    """
+    groups = [
+        list(group) for _, group in itertools.groupby(costs, key=lambda c: (c.block, c.ladder.name))
+    ]
+    chosen = [
+        [c for c in group if not c.unavailable and (c.pareto or c.in_scene)] for group in groups
+    ]
+    chosen = [group for group in chosen if group]
+    whole = _count(chosen)
+    while _count(chosen) > MOST:
+        widest = max(chosen, key=len)
+        widest.remove(_most_expendable(widest))
+    combinations = list(itertools.product(*chosen))
+    best = [next(c for c in group if c.rung == c.reference) for group in groups]
+    reference_scene = variants.with_rungs(_choices(best))
+    reference = _recorded(reference_scene)
+    rows: list[dict[str, Any]] = []
+    scenes: list[Scene] = []
+    for combination in combinations:
+        try:
+            scene = variants.with_rungs(_choices(combination))
+            effect = compare(reference, _recorded(scene))
+        except (Unavailable, SceneError, BlockFailure):
+            continue
+        changed = effect.get("detections_gained", 0) + effect.get("detections_lost", 0)
+        error = changed / max(effect.get("detections_reference", 0), 1)
+        scenes.append(scene)
+        rows.append(_row(combination, error, effect))
+    times = _timed(scenes)
+    for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
+        row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_target_scans(scene), 1)
+    points = [(row["cpu_us_per_target_scan"], row["error_p95"]) for row in rows]
+    for row, front in zip(rows, on_front(points), strict=True):
+        row["pareto"] = front
+    picked = (
+        f"whole chain: {len(rows)} combinations of the rungs on their own ladder's front and the "
+        f"scene's own, of {_count(groups)} in all"
+    )
+    if whole > MOST:
+        picked += f"; of {whole} such combinations, ladders were thinned to at most {MOST}"
+    return ChainStudy(rows, picked)
+
+
+def _count(groups: Sequence[Sequence[RungCost]]) -> int:
+    count = 1
+    for group in groups:
+        count *= len(group)
+    return count
+
+
+def _most_expendable(group: Group) -> RungCost:
+    """Return the rung between the cheapest and the reference that is nearest in cost to another."""
+    inner = [c for c in group if c.rung != c.reference and not c.in_scene]
+    inner = inner or [c for c in group if c.rung != c.reference]
+    ordered = sorted(group, key=lambda c: c.cpu_us_per_target_scan)
+
+    def gap(cost: RungCost) -> float:
+        place = ordered.index(cost)
+        beside = [ordered[i] for i in (place - 1, place + 1) if 0 <= i < len(ordered)]
+        mine = cost.cpu_us_per_target_scan
+        return min(abs(other.cpu_us_per_target_scan / mine - 1.0) for other in beside)
+
+    return min(inner, key=gap)
+
+
+def _choices(combination: Sequence[RungCost]) -> list[Choice]:
+    return [Choice(c.block, c.ladder, c.ladder.rung(c.rung)) for c in combination]
+
+
+def _recorded(scene: Scene) -> dict[str, Any]:
+    sink = MemorySink()
+    Simulation(scene, recorder=Recorder([sink])).run()
+    return sink.tables()
+
+
+def _timed(scenes: Sequence[Scene]) -> list[float]:
+    best = [float("inf")] * len(scenes)
+    for _ in range(_REPEATS):
+        for place, scene in enumerate(scenes):
+            simulation = Simulation(scene)
+            started = time.process_time()
+            simulation.run()
+            best[place] = min(best[place], time.process_time() - started)
+    return best
+
+
+def _target_scans(scene: Scene) -> int:
+    """Return scans of all clocks times targets."""
+    simulation = Simulation(scene)
+    width = max(component.width for component in simulation.components.values())
+    scans = 0
+    for node in simulation.nodes.values():
+        if node.clock is not None:
+            scans += len(node.clock.between(0, simulation.end_tick)[0])
+    return scans * width
+
+
+def _row(combination: Sequence[RungCost], error: float, effect: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "block": "whole chain",
+        "ladder": "chain",
+        "rung": ", ".join(f"{c.block} {c.rung}" for c in combination),
+        "reference": ", ".join(f"{c.block} {c.reference}" for c in combination),
+        "in_scene": all(c.in_scene for c in combination),
+        "error_quantity": "detections that differ",
+        "error_unit": "share",
+        "error_p95": error,
+        "effect": effect,
+    }
+
+
+def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw the share of detections that differ against the cost of the whole chain."""
+    best = sorted(
+        (row for row in rows if row["pareto"]), key=lambda row: row["cpu_us_per_target_scan"]
+    )
+    key_in = 0.2 + 0.13 * len(best)
+    height_in = 4.6 + key_in
+    with png_figure(path, 7.5, height_in) as figure:
+        axes = figure.add_subplot()
+        errors = [row["error_p95"] for row in rows]
+        floor = 0.5 * min([e for e in errors if e > 0.0], default=1e-3)
+        for front, colour, size in ((False, "#999999", 12), (True, "#D55E00", 36)):
+            chosen = [row for row in rows if row["pareto"] is front]
+            axes.scatter(
+                [row["cpu_us_per_target_scan"] for row in chosen],
+                [max(row["error_p95"], floor) for row in chosen],
+                s=size, color=colour, zorder=3 if front else 2,
+                label="front" if front else "other combinations",
+            )  # fmt: skip
+        for number, row in enumerate(best, start=1):
+            at = (row["cpu_us_per_target_scan"], max(row["error_p95"], floor))
+            axes.annotate(str(number), at, xytext=(5, 4), textcoords="offset points", fontsize=8)
+        key = "\n".join(f"{number}: {row['rung']}" for number, row in enumerate(best, start=1))
+        figure.text(0.02, 0.1 / height_in, key, fontsize=6.5, va="bottom")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_title(f"{title}: the whole chain")
+        axes.set_xlabel("CPU time of the run, µs per target-scan")
+        axes.set_ylabel("share of detections gained or lost")
+        axes.legend(fontsize=8)
+        figure.subplots_adjust(bottom=(key_in + 0.6) / height_in, left=0.11, right=0.97, top=0.93)

@@ -1,0 +1,213 @@
+"""The results of a cost study as a table on the terminal, a Parquet file and a figure."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from dsa_des.costs.study import RungCost
+
+_EFFECT_COLUMNS = (
+    ("first seen, m", "first_detection_range_change_m", "+,.0f"),
+    ("s", "first_detection_time_change_s", "+.2f"),
+    ("gained", "detections_gained", "d"),
+    ("lost", "detections_lost", "d"),
+    ("fused", "fused_share", ".1%"),
+)
+_NO_ERROR = "-"
+
+
+def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as Parquet; nested tables become columns with a prefix, lists become text."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    flat = [_flattened(row) for row in rows]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), path)
+
+
+def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, Mapping):
+            found.update(_flattened(value, f"{prefix}{name}_"))
+        else:
+            found[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
+    return found
+
+
+def print_costs(
+    costs: Sequence[RungCost], chain: Sequence[Mapping[str, Any]], notes: Sequence[str]
+) -> None:
+    """Print one table per ladder."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(width=None if Console().is_terminal else 150)
+    for (block, ladder_name), group in groupby(costs, key=lambda c: (c.block, c.ladder.name)):
+        rungs = list(group)
+        unit = rungs[0].ladder.quantities[0]
+        console.print(
+            f"\n[bold]{block}[/bold], {ladder_name}: errors in {unit.name}, {unit.unit}, against "
+            f"{rungs[0].reference}",
+            highlight=False,
+        )
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        table.add_column("rung", no_wrap=True)
+        for heading in ("us/target-scan", "mean", "p95", "max",
+                        *(heading for heading, _, _ in _EFFECT_COLUMNS)):  # fmt: skip
+            table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column("")
+        for cost in rungs:
+            table.add_row(*_cells(cost))
+        console.print(table, highlight=False, markup=False)
+    if chain:
+        _print_chain(console, chain)
+    for note in notes:
+        console.print(f"note: {note}", highlight=False, markup=False)
+
+
+def _cells(cost: RungCost) -> list[str]:
+    name = cost.rung + (" (scene)" if cost.in_scene else "")
+    if cost.unavailable:
+        missing = f"not available: {cost.unavailable}"
+        return [name, *[_NO_ERROR] * (4 + len(_EFFECT_COLUMNS)), missing]
+    errors = [cost.error.mean, cost.error.p95, cost.error.maximum]
+    effects = [
+        _NO_ERROR if (value := cost.effect.get(key)) is None else format(value, form)
+        for _, key, form in _EFFECT_COLUMNS
+    ]
+    return [
+        name,
+        f"{cost.cpu_us_per_target_scan:.3g} ± {cost.cpu_spread_us:.1g}",
+        *(_NO_ERROR if math.isnan(error) else f"{error:.3g}" for error in errors),
+        *effects,
+        "; ".join(_remarks(cost)),
+    ]
+
+
+def _remarks(cost: RungCost) -> list[str]:
+    remarks = ["front"] if cost.pareto else []
+    if cost.cheapest_inside:
+        remarks.append("cheapest inside the budget")
+    elif cost.inside_budget:
+        remarks.append("inside the budget")
+    if cost.rung == cost.reference:
+        remarks.append(f"own error {cost.error_note}" if cost.errors else cost.error_note)
+    missed = cost.effect.get("never_detected")
+    if missed:
+        remarks.append(f"never sees {', '.join(missed)}")
+    return remarks
+
+
+def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]]) -> None:
+    from rich.table import Table
+
+    console.print("\n[bold]whole chain[/bold], the front", highlight=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("us/target-scan", "detections that differ", "first seen, m", "rungs"):
+        table.add_column(heading, justify="left" if heading == "rungs" else "right")
+    for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"])):
+        if row["pareto"]:
+            first = row["effect"].get("first_detection_range_change_m")
+            table.add_row(
+                f"{row['cpu_us_per_target_scan']:.3g}",
+                f"{row['error_p95']:.2%}",
+                _NO_ERROR if first is None else f"{first:+,.0f}",
+                row["rung"],
+            )
+    console.print(table, highlight=False, markup=False)
+
+
+def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
+    """Draw error against cost, one panel per ladder, the front as a line and rungs by name."""
+    panels = [
+        [cost for cost in group if not cost.unavailable]
+        for _, group in groupby(costs, key=lambda c: (c.block, c.ladder.name))
+    ]
+    # A block that saw no target says nothing of its rungs.
+    panels = [rungs for rungs in panels if any(cost.error.count for cost in rungs)]
+    columns = min(3, max(1, len(panels)))
+    rows = max(1, math.ceil(len(panels) / columns))
+    with png_figure(path, 4.3 * columns, 3.5 * rows + 0.5) as figure:
+        figure.suptitle(f"{title}: what each model costs and what it gets wrong")
+        for number, rungs in enumerate(panels):
+            _draw_panel(figure.add_subplot(rows, columns, number + 1), rungs)
+        figure.tight_layout()
+
+
+@contextmanager
+def png_figure(path: Path, width_in: float, height_in: float) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG when the block is done."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), dpi=110)
+    FigureCanvasAgg(figure)
+    yield figure
+    figure.savefig(path, metadata={"Software": None})
+
+
+def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
+    first, quantity = rungs[0], rungs[0].ladder.quantities[0]
+    others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
+    known = [error for error in others if error > 0.0]
+    # Errors of rounding, of 0 and unknown ones stand on the floor, open, with their number: on a
+    # true scale they would press all others together, and a log axis has no zero.
+    floor = 0.1 * min(known) if known else 1e-3
+    points, labels = [], []
+    for cost in sorted(rungs, key=lambda c: c.cpu_us_per_target_scan):
+        error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
+        on_floor = not error > floor
+        if on_floor:
+            label += ": error unknown" if math.isnan(error) else f": {error:.0e} {quantity.unit}"
+        at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
+        colour = "#D55E00" if cost.pareto else "#777777"
+        axes.errorbar(
+            *at, xerr=cost.cpu_spread_us, fmt="o", color=colour, capsize=2, zorder=3,
+            markerfacecolor="white" if on_floor else colour,
+        )  # fmt: skip
+        labels.append((label, at, colour))
+        points.append((at, cost.pareto))
+    front = [at for at, pareto in points if pareto]
+    axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))
+    axes.set_ylim(*_wide([y for (_, y), _ in points]))
+    axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
+    axes.set_title(f"{first.block}: {first.ladder.name}, against {first.reference}", fontsize=9)
+    axes.set_xlabel("CPU time of the block, µs per target-scan", fontsize=8)
+    axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
+    axes.tick_params(which="both", labelsize=7)
+    axes.minorticks_off()
+    _put_labels(axes, labels)
+
+
+def _put_labels(axes: Any, labels: Sequence[tuple[str, tuple[float, float], str]]) -> None:
+    """Write each label beside its point, moved down or up until it covers no other one."""
+    high, wide = 11.0, 5.2  # of a line and of a letter, in pixels
+    put: list[tuple[float, float, float]] = []
+    for label, at, colour in sorted(labels, key=lambda item: -item[1][1]):
+        x, y = axes.transData.transform(at)
+
+        def free(drop: float, x: float = x, y: float = y, width: float = wide * len(label)) -> bool:
+            return all(
+                abs(y - drop - other_y) >= high or x + width < other_x or other_end < x
+                for other_x, other_end, other_y in put
+            )
+
+        drop = next((d for d in (4.0, 15.0, -8.0, 26.0, -19.0, 37.0) if free(d)), 4.0)
+        put.append((x, x + wide * len(label), y - drop))
+        axes.annotate(
+            label, at, xytext=(9, -drop), textcoords="offset pixels", fontsize=7, color=colour
+        )
+
+
+def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
+    """Return limits of a log axis: some room on both sides, whole decades inside."""
+    low, high = math.log10(min(values)), math.log10(max(values))
+    return 10.0 ** (math.floor(low) - 0.2), 10.0 ** max(high + right, math.floor(low) + 1.2)

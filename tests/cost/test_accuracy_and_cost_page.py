@@ -1,0 +1,56 @@
+"""docs/accuracy-and-cost.md holds what is computed: its errors, which no machine changes."""
+
+import re
+
+import pytest
+
+from components.cost_page import DOCS, main
+from components.geometry.ladder import EARTH
+from components.optical.ladder import VISIBLE
+from dsa_des.commands.cost import comparison
+from dsa_des.costs.study import climb
+from dsa_des.costs.variants import Variants
+
+PAGE = (DOCS / "accuracy-and-cost.md").read_text(encoding="utf-8")
+
+
+def test_the_first_five_lines_answer():
+    lines = [line for line in PAGE.splitlines() if line][1:6]
+    for word, line in zip(("35 GHz", "Geometry", "Radar", "Camera", "Fusion"), lines, strict=True):
+        assert word in line
+
+
+def test_its_figures_are_there():
+    for name in re.findall(r"\]\((images/[^)]+)\)", PAGE):
+        assert (DOCS / name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("block", "ladder", "skip"), [("transform", EARTH, {"ellipsoid"}), ("eo", VISIBLE, {"union"})]
+)
+def test_errors_and_effects_are_those_that_are_computed(block, ladder, skip):
+    quick = {rung.name for rung in ladder.rungs} - {"mesh", "geodesic", "aspect_table"}
+    small = type(ladder)(**{**vars(ladder), "rungs": tuple(
+        rung for rung in ladder.rungs if rung.name in quick)})  # fmt: skip
+    variants = Variants(str(DOCS.parent / "configs" / "first_light.toml"))
+    scene = PAGE[PAGE.index("## The thesis's scene") : PAGE.index("## A flown encounter")]
+    for cost in climb(variants, block, small, repeats=1, compare=comparison()):
+        if cost.rung in skip:
+            continue
+        row = next(
+            line.replace("**", "").replace(" (scene)", "")
+            for line in scene[scene.index(f"**{block}, {ladder.name}**") :].splitlines()
+            if line.replace("**", "").startswith(f"| {cost.rung} ")
+        )
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        for text, value in zip(
+            cells[2:5], (cost.error.mean, cost.error.p95, cost.error.maximum), strict=True
+        ):
+            assert float(text) == pytest.approx(value, rel=0.06)
+        assert int(cells[7]) == cost.effect["detections_gained"]
+        assert int(cells[8]) == cost.effect["detections_lost"]
+
+
+def test_it_refuses_what_it_cannot_read(tmp_path):
+    with pytest.raises(SystemExit):
+        main(["--encounters", str(tmp_path)])

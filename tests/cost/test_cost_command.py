@@ -1,0 +1,185 @@
+"""`dsa-des cost` from the outside, and its errors against independent calculations."""
+
+import json
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pyarrow.parquet as pq
+import pymap3d
+import pytest
+from click.testing import CliRunner
+
+from components.geometry.ladder import EARTH
+from components.radar.ladder import DETECTION
+from dsa_des.cli import main
+from dsa_des.costs.replay import run_rung
+from dsa_des.costs.study import climb
+from dsa_des.costs.variants import Choice, Variants
+from dsa_des.ladder import Unavailable
+
+SCENE = Path(__file__).parents[2] / "configs" / "first_light.toml"
+SHORT = (str(SCENE), "--duration", "60", "--repeats", "1")
+
+
+def call(*arguments):
+    return CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def variants():
+    return Variants(str(SCENE), duration_s=40)
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    out = tmp_path_factory.mktemp("cost") / "out"
+    done = call(
+        "cost", *SHORT, "--block", "transform", "--budget", "0.1mrad", "--json", "--out", out
+    )
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout), out
+
+
+def test_rows_and_files(rows):
+    found, out = rows
+    assert [r["rung"] for r in found] == [
+        "flat_earth", "local_radii", "geodesic", "ellipsoid", "small_angle", "exact"]  # fmt: skip
+    for row in found:
+        assert row["block"] == "transform" and row["error_unit"] == "mrad"
+        assert row["cpu_us_per_target_scan"] > 0.0
+        assert row["error_p95"] <= row["error_max"]
+    earth = {r["rung"]: r for r in found[:4]}
+    assert {r["reference"] for r in found[:4]} == {"ellipsoid"}
+    assert earth["ellipsoid"]["in_scene"] and earth["ellipsoid"]["pareto"]
+    assert not earth["geodesic"]["pareto"]  # dearer than the exact one, and wrong
+    assert earth["ellipsoid"]["inside_budget"] and earth["ellipsoid"]["cheapest_inside"]
+    assert not earth["flat_earth"]["inside_budget"]
+    assert (out / "cost.png").read_bytes().startswith(b"\x89PNG")
+    table = pq.read_table(out / "cost.parquet").to_pylist()
+    assert [r["rung"] for r in table] == [r["rung"] for r in found]
+    assert table[0]["errors_range_p95"] == found[0]["errors"]["range"]["p95"]
+
+
+def test_the_reference_shows_its_own_error(rows):
+    for row in rows[0]:
+        if row["rung"] == row["reference"]:
+            assert row["error_is"] == "own" and row["error_note"].startswith("measured")
+            # Rounding: 1e-9 mrad is 4 m on the way to the moon.
+            assert 0.0 < row["error_max"] < 1e-9
+
+
+def test_geometry_errors_are_those_of_an_independent_library(variants):
+    costs = {c.rung: c for c in climb(variants, "transform", EARTH, repeats=1)}
+    run = run_rung(variants.scene, "transform")
+    azimuth, elevation, distance = [], [], []
+    flat = []
+    for wake in run.wakes:
+        s = wake["states"]
+        own = [v[:, np.newaxis] for v in (s.own_lat_deg, s.own_lon_deg, s.own_alt_m)]
+        az, el, rng = pymap3d.geodetic2aer(s.lat_deg, s.lon_deg, s.alt_m, *own)
+        azimuth.append(np.radians(az))
+        elevation.append(np.radians(el))
+        distance.append(rng)
+        east = (s.lon_deg - own[1]) * 111_195.0 * np.cos(np.radians(own[0]))
+        north, up = (s.lat_deg - own[0]) * 111_195.0, s.alt_m - own[2]
+        flat.append((np.arctan2(east, north), np.arctan2(up, np.hypot(east, north)),
+                     np.sqrt(east**2 + north**2 + up**2)))  # fmt: skip
+    errors = costs["flat_earth"].errors
+    # The ownship flies level to the north, so its body axes are those of its horizon.
+    bearing = np.abs(np.remainder(flat[0][0] - azimuth[0] + np.pi, 2 * np.pi) - np.pi) * 1e3
+    climb_ = np.abs(flat[0][1] - elevation[0]) * 1e3
+    apart = np.abs(flat[0][2] - distance[0])
+    for name, mine in (("azimuth", bearing), ("elevation", climb_), ("range", apart)):
+        assert errors[name].mean == pytest.approx(float(mine.mean()), rel=0.01)
+        assert errors[name].p95 == pytest.approx(float(np.percentile(mine, 95)), rel=0.01)
+        assert errors[name].maximum == pytest.approx(float(mine.max()), rel=0.01)
+
+
+def test_detection_errors_are_those_of_an_independent_calculation(variants):
+    costs = {c.rung: c for c in climb(variants, "radar", DETECTION, repeats=1)}
+    threshold_run = run_rung(
+        variants.with_rungs([Choice("radar", DETECTION, DETECTION.rung("threshold"))]), "radar"
+    )
+    block = threshold_run.fresh()
+    worst = []
+    for wake in threshold_run.wakes:
+        targets, rows = wake.held("targets")
+        cells, _ = block.cells(targets, rows, wake)
+        snr = block.snr(cells)
+        pd = np.array([float(mpmath.mpf("0.05") ** (1 / (1 + mpmath.mpf(float(x))))) for x in snr])
+        says = np.where(10 * np.log10(snr) >= block.threshold_db, 1.0, 0.0)
+        worst.append(np.abs(says - pd))
+    worst = np.concatenate(worst)
+    error = costs["threshold"].error
+    assert error.mean == pytest.approx(float(worst.mean()), rel=0.01)
+    assert error.p95 == pytest.approx(float(np.percentile(worst, 95)), rel=0.01)
+    assert costs["exact"].error.maximum < 1e-14
+    assert 0 < costs["table"].error.maximum < 1e-6
+    assert costs["gram_charlier"].error.maximum < 0.03
+
+
+def test_a_rung_changes_its_block_only(variants):
+    choice = Choice("radar", DETECTION, DETECTION.rung("threshold"))
+    changed = variants.with_rungs([choice]).resolved()["blocks"]
+    stated = variants.scene.resolved()["blocks"]
+    assert changed.pop("radar")["type"] == "radar.threshold"
+    assert stated.pop("radar")["type"] == "radar.swerling"
+    assert changed == stated
+
+
+def test_what_a_scene_cannot_have_is_said(tmp_path):
+    short = ("--duration", "4", "--repeats", "1")
+    done = call("cost", SCENE, *short, "--block", "eo", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    said = " ".join(done.output.split())
+    assert "not available: eo.silhouette_table of target" in said
+    boundary = Variants(
+        str(SCENE), swaps=["radar=radar.range_boundary"], sets=["blocks.radar.range_km=5"]
+    )
+    with pytest.raises(Unavailable, match="power_w"):
+        climb(boundary, "radar", DETECTION, repeats=1)
+
+
+def test_accuracy_of_the_scene_is_the_budget_and_chooses_no_rung():
+    loose = Variants(
+        str(SCENE), sets=["accuracy.angle_deg=0.1", "accuracy.range_m=100"], duration_s=20
+    )
+    costs = {c.rung: c for c in climb(loose, "transform", EARTH, repeats=1)}
+    assert costs["flat_earth"].inside_budget  # 0.1 deg is 1.7 mrad
+    assert costs["ellipsoid"].error.maximum < 1e-9
+    cheapest = [c for c in costs.values() if c.cheapest_inside]
+    assert len(cheapest) == 1 and cheapest[0].inside_budget
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((SCENE, "--block", "radr"), "did you mean 'radar'"),
+        ((SCENE, "--against", "elipsoid"), "did you mean 'ellipsoid'"),
+        ((SCENE, "--budget", "3furlongs"), "unknown unit furlongs"),
+        ((SCENE, "--block", "gate"), "declares no ladder"),
+        ((), "SCENE is missing"),
+        (("--map", "geometrie"), "did you mean 'geometry'"),
+    ],
+)
+def test_wrong_calls_are_refused_and_leave_nothing(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("cost", *arguments)
+    assert done.exit_code == 2
+    assert said in done.stderr and "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_chain_is_combined_of_what_is_on_the_fronts(tmp_path):
+    out = tmp_path / "out"
+    done = call("cost", str(SCENE), "--duration", "10", "--repeats", "1", "--block", "transform",
+                "--all", "--json", "--out", out)  # fmt: skip
+    assert done.exit_code == 0, done.output
+    chain = [r for r in json.loads(done.stdout) if r["ladder"] == "chain"]
+    best = [r for r in chain if r["rung"] == "transform ellipsoid, transform exact"]
+    assert len(best) == 1 and best[0]["error_p95"] == 0.0
+    assert any(r["pareto"] for r in chain)
+    assert not math.isnan(chain[0]["cpu_us_per_target_scan"])
+    assert (out / "chain.png").exists() and (out / "chain.parquet").exists()
