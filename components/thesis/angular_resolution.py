@@ -6,7 +6,7 @@ import numpy as np
 
 from components.thesis.made import Made, Picture
 from components.thesis.map_axes import draw_map, ray, reported_places
-from components.thesis.plotting import panels
+from components.thesis.plotting import legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
@@ -44,8 +44,8 @@ def make() -> Made:
                          label="reported by radar")  # fmt: skip
                 one.set_title(f"Radar detection: azimuth resolution {step:g}°", loc="left")
                 one.set(xlim=(-4.2, 4.2), ylim=(-0.4, 5.0))
-                one.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3)
             axes[1].set_ylabel("")
+            legend_below(axes[0])
 
     data = {
         "resolution_deg": np.concatenate([np.full(len(v["scan"]), k) for k, v in seen.items()]),

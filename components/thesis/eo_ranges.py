@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from components.optical.silhouette import visible_area
 from components.optical.signature import detection_range
+from components.optical.silhouette import visible_area
 from components.thesis.made import Made, Picture
 from components.thesis.plotting import BLUE, GREY, ORANGE, SKY, panels
 from components.thesis.project_files import aircraft, eo_camera
@@ -47,7 +47,9 @@ def make() -> Made:
     """Return the five ranges by the thesis's equations and by the exact projection."""
     camera = eo_camera()
     p = camera.p
-    settings = f"a = {p.static_weight:g}, threshold {p.threshold:g}, P = 1, b = {p.dynamic_weight:g}"  # noqa: E501
+    settings = (
+        f"a = {p.static_weight:g}, threshold {p.threshold:g}, P = 1, b = {p.dynamic_weight:g}"
+    )
     rows = []
     printed_rungs = [range_km(case, camera, "thesis") for case in CASES]
     exact = [range_km(case, camera, "exact") for case in CASES]
@@ -63,8 +65,9 @@ def make() -> Made:
                         None, _LITERATURE))  # fmt: skip
     for case, ours in zip(CASES, exact, strict=True):
         needed = (float(case.literature_km) / ours) ** 2
-        rows.append(Row(f"contrast P that gives the literature, {case.geometry}, {case.intruder}",
-                        needed, "", "Range goes with the square root of P: ±10 % in P are ±5 %."))  # fmt: skip
+        name = f"contrast P that gives the literature, {case.geometry}, {case.intruder}"
+        why = "Range goes with the square root of P: ±10 % in P are ±5 %."
+        rows.append(Row(name, needed, "", why))
     abeam = CASES[2]
     rate = 100.0 / (1000.0 * range_km(abeam, camera, "exact"))
     moved = range_km(abeam, camera, "exact", dynamic=rate)
@@ -72,7 +75,7 @@ def make() -> Made:
                     "How little b matters: the line of sight turns at 0.016 rad/s."))  # fmt: skip
 
     def draw(path: Path) -> None:
-        names = [f"{case.geometry}\n{case.intruder}" for case in CASES]
+        names = [f"{case.geometry.replace(' ', chr(10))}\n{case.intruder}" for case in CASES]
         place = np.arange(float(len(CASES)))
         bars: list[tuple[str, str, Any]] = [
             ("literature (flight tests)", GREY, [float(case.literature_km) for case in CASES]),

@@ -6,7 +6,7 @@ import numpy as np
 
 from components.thesis.made import Made, Picture
 from components.thesis.map_axes import draw_map, mark
-from components.thesis.plotting import panels
+from components.thesis.plotting import legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
@@ -37,12 +37,13 @@ def make() -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 3, sharey=True, width_in=9.0, height_in=3.9) as axes:
+        with panels(path, 1, 3, sharey=True, width_in=9.0, height_in=3.6) as axes:
             for one, name in zip(axes, EDGES, strict=True):
                 draw_map(one, done, fields_of_view=(name,))
-                mark(one, done, seen[name], markersize=3.5, label=f"detected by {name}")
+                mark(one, done, seen[name], markersize=3.5, label="detected")
                 one.set_title(f"{name}: ±{EDGES[name][0]}°", loc="left")
-                one.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
+                one.set(xlim=(-6.4, 6.4), ylim=(-4.4, 6.4))
+            legend_below(axes[0])
             for one in axes[1:]:
                 one.set_ylabel("")
 

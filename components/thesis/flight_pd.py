@@ -12,7 +12,7 @@ from components.radar.required_snr import required_snr
 from components.thesis.made import Made, Picture
 from components.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.thesis.project_files import radar
-from components.thesis.radar_range import CLASSES, LARGE_DIFFERS, pd_at
+from components.thesis.radar_range import CLASSES, LARGE_DIFFERS, ROUNDED, pd_at, rounding
 from components.thesis.row import Row
 
 
@@ -37,16 +37,17 @@ def make() -> Made:
     configured = probabilities(budget.bandwidth_hz)
     fitted = probabilities(fitted_hz)
     rows = []
-    for (name, (_, km, text)), ours in zip(CLASSES.items(), configured, strict=True):
+    for (name, (dbsm, km, text)), ours in zip(CLASSES.items(), configured, strict=True):
         why = (
             "The bandwidth follows from this value (sensors/oasys.toml)."
             if name == "small"
             else "Swerling I with the bandwidth of the small class."
         )
-        rows.append(Row(f"Pd of the {name} class at {km} km", ours, "", why, text, 0.0006,
+        rows.append(Row(f"Pd of the {name} class at {km:.2f} km", ours, "", f"{why} {ROUNDED}", text,
+                        rounding(sensor, dbsm, km),
                         LARGE_DIFFERS if name == "large" else ""))  # fmt: skip
     for (name, (_, km, text)), ours in zip(CLASSES.items(), fitted, strict=True):
-        rows.append(Row(f"the same by one least-squares bandwidth, {name} at {km} km", ours, "",
+        rows.append(Row(f"the same by one least-squares bandwidth, {name} at {km:.2f} km", ours, "",
                         f"One bandwidth, {fitted_hz:.0f} Hz, fitted to all three values; the "
                         "residuals are reported and not used.", text, None,
                         "the three printed values contradict one another (errata 17)",
@@ -63,13 +64,20 @@ def make() -> Made:
         place = np.arange(3.0)
         with panels(path) as (axes,):
             axes.bar(place - 0.27, printed, 0.25, color=GREY, label="thesis")
-            axes.bar(place, configured, 0.25, color=BLUE,
-                     label=f"ours, {budget.bandwidth_hz:.0f} Hz (small class)")
+            axes.bar(
+                place,
+                configured,
+                0.25,
+                color=BLUE,
+                label=f"ours, {budget.bandwidth_hz:.0f} Hz (small class)",
+            )
             axes.bar(place + 0.27, fitted, 0.25, color=ORANGE,
                      label=f"least squares, {fitted_hz:.0f} Hz")  # fmt: skip
             for bars in axes.containers:
                 axes.bar_label(bars, fmt="%.4f", fontsize=8)
-            names = [f"{name}, {dbsm} dBsm\nat {km} km" for name, (dbsm, km, _) in CLASSES.items()]
+            names = [
+                f"{name}, {dbsm} dBsm\nat {km:.2f} km" for name, (dbsm, km, _) in CLASSES.items()
+            ]
             axes.set_xticks(place, names)
             axes.set_xlabel("RCS class and its average detection range in the flight tests")
             axes.set_ylabel("probability of detection Pd [1]")
@@ -95,7 +103,7 @@ def _what_large_would_need(pfa: float, budget: LinkBudget) -> list[Row]:
     there = float(budget.snr(1000.0 * km, 1.0))
     why = "Where our curve has 0.8668 (errata 17)."
     return [
-        Row("range at which the large class has Pd 0.8668", range_m / 1000.0, "km", why, f"{km}",
+        Row("range at which the large class has Pd 0.8668", range_m / 1000.0, "km", why, f"{km:.2f}",
             None, LARGE_DIFFERS),
         Row("RCS that has Pd 0.8668 at 9.75 km", 10.0 * math.log10(needed / there), "dBsm", why,
             f"{dbsm}", None, LARGE_DIFFERS),

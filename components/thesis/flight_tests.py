@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from components.thesis.made import Made, Picture
-from components.thesis.plotting import BLUE, GREY, ORANGE, panels
+from components.thesis.plotting import BLUE, GREY, ORANGE, legend_below, panels
 from components.thesis.project_files import read_csv
 from components.thesis.radar_range import CLASSES
 from components.thesis.row import Row
@@ -51,14 +51,15 @@ def make() -> Made:
                 one.hist(first, bins, color=BLUE, alpha=0.55, label="simulated: first detection")
                 one.hist(held, bins, color=ORANGE, alpha=0.55,
                          label="simulated: every scan detects from here on")  # fmt: skip
-                height = one.get_ylim()[1] * 0.93
+                one.set_ylim(top=1.25 * one.get_ylim()[1])
+                height = one.get_ylim()[1] * 0.91
                 one.plot(flown[name], np.full(len(flown[name]), height), "k|", markersize=11,
                          markeredgewidth=1.5, label="flight tests, Table 4.2")  # fmt: skip
                 one.axvline(flown[name].mean(), color=GREY, linestyle=":",
                             label="their average")  # fmt: skip
                 one.set_ylabel(f"flights of {REPLICAS}\nper 0.5 km")
                 one.set_title(f"class {name}, {CLASSES[name][0]} dBsm", loc="left")
-            axes[0].legend(loc="upper left")
+            legend_below(axes[0], 2)
             axes[-1].set_xlabel("range [km]")
             axes[-1].set_xlim(0, 15.5)
 

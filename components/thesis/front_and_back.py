@@ -41,8 +41,8 @@ def make() -> Made:
             axes.plot(heading_deg, together, color=GREEN, label="sum (eq. 21)")
             axes.set_xlabel("relative heading ψ_rel [deg]: 0 flies away, 180 comes towards us")
             axes.set_ylabel("contribution to the signature [m²]")
-            axes.set(xlim=(0, 360), ylim=(0, 1.7), xticks=range(0, 361, 45))
-            axes.legend(loc="lower right")
+            axes.set(xlim=(0, 360), ylim=(0, 1.8), xticks=range(0, 361, 45))
+            axes.legend(loc="upper center", ncols=3)
 
     data = {"heading_deg": heading_deg, "back_m2": back, "front_m2": front, "sum_m2": together}
     caption = "Shape of the contribution of the front and back sphere to the static signature."

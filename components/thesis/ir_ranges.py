@@ -49,8 +49,8 @@ def refined() -> Made:
                 "factor of about 0.8, so P or a was lowered without saying so (errata 23c)")
         )  # fmt: skip
     fighter = ranges["small_fighter"][90] / before["small_fighter"][90]
-    rows.append(Row("abeam range, refined over first, small fighter", float(fighter), "",
-                    "Its errors are printed without a sign: no ratio follows from them."))  # fmt: skip
+    why = "Its errors are printed without a sign: no ratio follows from them."
+    rows.append(Row("abeam range, refined over first, small fighter", float(fighter), "", why))
     return Made(rows, [_picture("fig_4_13", ranges, "Table 4.6", before)],
                 {"fig_4_13": _columns(ranges)})  # fmt: skip
 

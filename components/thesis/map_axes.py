@@ -28,8 +28,10 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
         reach = run.simulation.components[name].stated_reach  # type: ignore[attr-defined]
         outline = outline_of(flights.start_yaw_rad, reach)
         if outline.closed:
-            shape = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15, "zorder": 0.5}
-            axes.add_patch(Polygon(outline.corners_km, **shape, label=f"field of view: {name}"))
+            shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
+            axes.add_patch(
+                Polygon(outline.corners_km, **shape, zorder=0.5, label=f"field of view of {name}")
+            )
     for number, track in enumerate(flights.targets):
         label = "intruder" if number == 0 else None
         axes.plot(track.east_km, track.north_km, color=GREY, linewidth=1.0, label=label)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from components.thesis.made import Made, Picture
-from components.thesis.plotting import BLUE, GREY, ORANGE, panels
+from components.thesis.plotting import BLUE, GREY, ORANGE, legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
@@ -50,20 +50,32 @@ def make() -> Made:
                  ("elevation error\n[deg]", elevation))  # fmt: skip
         with panels(path, 3, 1, sharex=True, height_in=5.4) as axes:
             for one, (label, values) in zip(axes, shown, strict=True):
-                one.plot(time_s[alone], values[alone], "o", markersize=3, color=ORANGE,
-                         label="radar alone")
+                one.plot(
+                    time_s[alone],
+                    values[alone],
+                    "o",
+                    markersize=3,
+                    color=ORANGE,
+                    label="radar alone",
+                )
                 one.plot(time_s[with_eo], values[with_eo], "s", markersize=3, color=BLUE,
                          label="radar and EO")  # fmt: skip
                 one.axvline(time_s[with_eo].max(), color=GREY, linestyle=":", linewidth=1.0)
                 one.set_ylabel(label)
+                one.margins(y=0.12)
             axes[0].set_title(
                 f"EO sees the intruder up to {joins_km:.2f} km (dotted); it then flies ahead",
                 loc="left",
             )
-            axes[0].legend(loc="upper right", ncols=2)
+            legend_below(axes[0])
             axes[-1].set_xlabel("time [s]")
-            far = axes[-1].secondary_xaxis(-0.42, functions=(
-                lambda t: np.interp(t, time_s, range_km), lambda r: np.interp(r, range_km, time_s)))
+            far = axes[-1].secondary_xaxis(
+                -0.42,
+                functions=(
+                    lambda t: np.interp(t, time_s, range_km),
+                    lambda r: np.interp(r, range_km, time_s),
+                ),
+            )
             far.set_xlabel("range [km]")  # fmt: skip
 
     data = {

@@ -1,6 +1,7 @@
 """Fig. 4.2: the probability of detection over SNR, exact, by table and by the thesis's series."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ MODELS = {"Swerling I": "swerling1", "Swerling V": "swerling5"}
 def make() -> Made:
     """Return Pd of a fluctuating and a steady target for OASys's pulses and false alarms."""
     sensor = radar()
-    detector = {
+    detector: dict[str, Any] = {
         "pulses": sensor.pulses,
         "false_alarm_probability": sensor.false_alarm_probability,
     }

@@ -14,6 +14,12 @@ BLUE, ORANGE, RED, GREEN, PINK, SKY = (colour for colour, _, _ in STYLES)
 GREY = "#777777"
 
 
+def legend_below(axes: Any, columns: int = 4) -> None:
+    """Put the legend of one of a figure's axes below all of them."""
+    handles, labels = axes.get_legend_handles_labels()
+    axes.figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
 @contextmanager
 def panels(
     path: Path,

@@ -1,6 +1,7 @@
 """Figs 4.3 to 4.5: SNR and probability of detection over range, for the three RCS classes."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,18 @@ from components.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.thesis.project_files import radar
 from components.thesis.row import Row
 
-#: Class → RCS in dBsm (Table 4.1), average detection range in km and Pd there (§4.1.3).
+NAUTICAL_MILE_KM = 1.852
+
+#: Class → RCS in dBsm (Table 4.1), average detection range in km and Pd there (§4.1.3). The ranges
+#: are those of the flight tests in 0.1 nautical miles, printed as 6.91, 7.31 and 9.75 km.
 CLASSES = {
-    "small": (1.76, 6.91, "0.9114"),
-    "medium": (3.01, 7.31, "0.9170"),
-    "large": (6.99, 9.75, "0.8668"),
+    "small": (1.76, 22.4 / 6.0 * NAUTICAL_MILE_KM, "0.9114"),
+    "medium": (3.01, 35.5 / 9.0 * NAUTICAL_MILE_KM, "0.9170"),
+    "large": (6.99, 57.9 / 11.0 * NAUTICAL_MILE_KM, "0.8668"),
 }
 FIGURES = {"small": "fig_4_3", "medium": "fig_4_4", "large": "fig_4_5"}
+
+ROUNDED = "The last digits of both ranges and both Pd are allowed for."
 
 #: Why the large class differs (errata 17).
 LARGE_DIFFERS = (
@@ -55,6 +61,16 @@ def pd_at(
     )
 
 
+def rounding(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> float:
+    """Return by how much a printed Pd may differ since numbers are rounded.
+
+    Two ranges, to 0.01 km, and two Pd, to 0.0001: the row's own and those of the calibration.
+    """
+    budget = sensor.link_budget()
+    near, far = (pd_at(sensor, budget, rcs_dbsm, range_km + step) for step in (-0.005, 0.005))
+    return abs(near - far) + 1e-4
+
+
 def _over_range(name: str) -> Made:
     rcs_dbsm, average_km, printed = CLASSES[name]
     sensor = radar()
@@ -62,7 +78,10 @@ def _over_range(name: str) -> Made:
     range_km = np.linspace(1.0, 15.0, 281)
     snr = np.asarray(budget.snr(1000.0 * range_km, dbsm_to_m2(rcs_dbsm)))
     snr_db = 10.0 * np.log10(snr)
-    detector = {"false_alarm_probability": sensor.false_alarm_probability, "pulses": sensor.pulses}
+    detector: dict[str, Any] = {
+        "false_alarm_probability": sensor.false_alarm_probability,
+        "pulses": sensor.pulses,
+    }
     fluctuating = np.asarray(detection_probability(snr, model="swerling1", **detector))
     steady = np.asarray(detection_probability(snr, model="swerling5", **detector))
     at_average = pd_at(sensor, budget, rcs_dbsm, average_km)
@@ -70,10 +89,9 @@ def _over_range(name: str) -> Made:
     for_09 = float(detection_range(budget, dbsm_to_m2(rcs_dbsm), pd=0.9, **detector)) / 1000.0
     source = "Swerling I with sensors/oasys.toml, whose bandwidth follows from the small class."
     rows = [
-        # The medium average is 7.31 km in the text and 7.304 km unrounded: 0.0005 in Pd.
-        Row(f"Pd at {average_km} km", at_average, "", source, printed, 0.0006,
-            LARGE_DIFFERS if name == "large" else ""),
-        Row(f"SNR at {average_km} km", 10.0 * np.log10(snr_there), "dB", source),
+        Row(f"Pd at {average_km:.2f} km", at_average, "", f"{source} {ROUNDED}", printed,
+            rounding(sensor, rcs_dbsm, average_km), LARGE_DIFFERS if name == "large" else ""),
+        Row(f"SNR at {average_km:.2f} km", 10.0 * np.log10(snr_there), "dB", source),
         Row("range of Pd 0.9", for_09, "km", source),
     ]  # fmt: skip
 
@@ -84,7 +102,7 @@ def _over_range(name: str) -> Made:
             lower.plot(range_km, fluctuating, color=BLUE, label="Pd, Swerling I")
             lower.plot(range_km, steady, "--", color=ORANGE, label="Pd, Swerling V")
             lower.plot([average_km], [float(printed)], "kx", markersize=7,
-                       label=f"thesis: {printed} at {average_km} km")  # fmt: skip
+                       label=f"thesis: {printed} at {average_km:.2f} km")  # fmt: skip
             lower.set_ylabel("probability of detection Pd [1]")
             lower.set_xlabel("range [km]")
             lower.set(xlim=(1, 15), ylim=(0, 1.03))

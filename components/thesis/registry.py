@@ -37,7 +37,9 @@ class Item:
 
 ITEMS = (
     Item("fig-3.11", "Front and back sphere over relative heading", "front_and_back:make"),
-    Item("fig-4.2", "Pd of Swerling I and V over SNR, with the truncated table", "pd_over_snr:make"),
+    Item(
+        "fig-4.2", "Pd of Swerling I and V over SNR, with the truncated table", "pd_over_snr:make"
+    ),
     Item("sec-4.1.1", "Range at which OASys detects 5 m²", "specified_range:make"),
     Item("fig-4.3", "SNR and Pd over range, small target (1.76 dBsm)", "radar_range:small"),
     Item("fig-4.4", "SNR and Pd over range, medium target (3.01 dBsm)", "radar_range:medium"),

@@ -6,12 +6,12 @@ import numpy as np
 
 from components.thesis.made import Made, Picture
 from components.thesis.map_axes import draw_map, mark
-from components.thesis.plotting import panels
+from components.thesis.plotting import legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
 #: Scan rates of the two panels, Hz.
-RATES_HZ = ("1", "0.2")
+RATES_HZ = ("0.5", "0.1")
 STEPS, INTRUDERS, SENSORS = 1800, 4, 3
 
 
@@ -48,8 +48,8 @@ def make() -> Made:
                 draw_map(one, runs[rate])
                 mark(one, runs[rate], seen[rate], markersize=3.5, label="detected by radar")
                 one.set_title(f"Radar detection: scan rate {rate} Hz", loc="left")
-                one.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=3)
             axes[1].set_ylabel("")
+            legend_below(axes[0])
 
     data = {
         "scan_rate_hz": [rate for rate, rows in seen.items() for _ in rows["time_s"]],

@@ -77,5 +77,3 @@ def run(loaded: Scene) -> SceneRun:
 def monte_carlo(loaded: Scene, replicas: int) -> list[SceneRun]:
     """Run a scene with the seeds 0, 1, ...; the draws of each run are its own."""
     return [run(replace(loaded, seed=seed)) for seed in range(replicas)]
-
-

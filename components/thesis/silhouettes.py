@@ -24,8 +24,8 @@ TABLE_4_3 = {
     "boeing_787": (("1.3", "3.4"), ("7.6", "14.2"), ("2.1", "8.2")),
 }
 _BECAUSE = (
-    "the thesis's FlightGear images are not to be had: ours is the error against the exact union "
-    "of the model's own three bodies, and says what adding the areas costs"
+    "its FlightGear images are not to be had: our reference is the exact union of the model's "
+    "own bodies"
 )
 _CAPTION = (
     "Signature of the {} over half turns about the three axes, as a share of its maximum: the "

@@ -8,14 +8,14 @@ from components.radar.link_budget import detection_range
 from components.radar.rcs import dbsm_to_m2
 from components.radar.swerling import SwerlingParameters
 from components.thesis.made import Made, Picture
-from components.thesis.plotting import BLUE, GREEN, GREY, ORANGE, panels
+from components.thesis.plotting import BLUE, GREEN, GREY, ORANGE, legend_below, panels
 from components.thesis.project_files import radar
-from components.thesis.radar_range import pd_at
+from components.thesis.radar_range import NAUTICAL_MILE_KM, pd_at
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
 RCS_DBSM = 10.0 * float(np.log10(5.0))
-STATUTE_KM, NAUTICAL_KM = 3.5 * 1.609344, 3.5 * 1.852
+STATUTE_KM, NAUTICAL_KM = 3.5 * 1.609344, 3.5 * NAUTICAL_MILE_KM
 
 
 def make() -> Made:
@@ -72,7 +72,7 @@ def make() -> Made:
             axes.set_xlabel("range [km]")
             axes.set_ylabel("Pd of 5 m², Swerling I [1]")
             axes.set(xlim=(2, 15), ylim=(0, 1.03))
-            axes.legend(loc="upper right")
+            legend_below(axes, 2)
 
     data = {"range_km": range_km, **{f"pd, {name}": pd for name, pd in curves.items()}}
     caption = "Detection of a target of 5 m² by three calibrations of the OASys radar."

@@ -6,7 +6,7 @@ import numpy as np
 
 from components.thesis.made import Made, Picture
 from components.thesis.map_axes import draw_map, mark, true_places
-from components.thesis.plotting import BLUE, GREEN, RED, panels
+from components.thesis.plotting import BLUE, GREEN, RED, legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
@@ -41,7 +41,7 @@ def make() -> Made:
                 label = f"detected by {name.replace('+', ' and ')}"
                 mark(axes, done, fused[name], marker=marker, color=colour, label=label)
             axes.set(xlim=(-5.4, 5.4), ylim=(-0.4, 6.2))
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=3)
+            legend_below(axes, 3)
 
     east, north = zip(*(true_places(done, rows) for rows in fused.values()), strict=True)
     data = {

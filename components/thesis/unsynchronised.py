@@ -6,7 +6,7 @@ import numpy as np
 
 from components.thesis.made import Made, Picture
 from components.thesis.map_axes import draw_map, mark
-from components.thesis.plotting import BLUE, GREEN, RED, panels
+from components.thesis.plotting import BLUE, GREEN, RED, legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
@@ -32,16 +32,24 @@ def make() -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, height_in=4.2) as (axes,):
-            draw_map(axes, done)
-            for name, (marker, colour, size) in _MARKS.items():
+        with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (places, times):
+            draw_map(places, done, fields_of_view=("ir",))
+            for height, (name, (marker, colour, size)) in enumerate(_MARKS.items()):
                 label = f"{name.replace('+', ' and ')}{' fused' if '+' in name else ' alone'}"
-                mark(axes, done, fused[name], marker=marker, color=colour, markersize=size,
-                     label=label)  # fmt: skip
-            axes.set_aspect("auto")
-            axes.set(xlim=(-1.7, 1.7), ylim=(-0.2, 3.2))
-            axes.set_title("Radar/IR detection: radar at 5 Hz, IR at 2 Hz", loc="left")
-            axes.legend(loc="lower right", ncols=1)
+                style = {"marker": marker, "color": colour, "markersize": size}
+                first = {key: column[fused[name]["time_s"] < 10.0]
+                         for key, column in fused[name].items()}  # fmt: skip
+                mark(places, done, first, **style, label=label)
+                times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
+                           fillstyle="none", linestyle="none")  # fmt: skip
+            places.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
+            places.set_title("Radar/IR detection, first 10 s", loc="left")
+            times.set_yticks(range(len(_MARKS)), ["radar alone", "IR alone", "fused"])
+            times.set_xticks(range(11))
+            times.set(xlim=(-0.3, 10.3), ylim=(-0.5, len(_MARKS) - 0.5))
+            times.set_title("radar scan rate 5 Hz, IR scan rate 2 Hz", loc="left")
+            times.set_xlabel("time [s]")
+            legend_below(places, 5)
 
     data = {
         "sensors": [name for name, rows in fused.items() for _ in rows["time_s"]],
