@@ -43,9 +43,10 @@ def make() -> Made:
             if name == "small"
             else "Swerling I with the bandwidth of the small class."
         )
-        rows.append(Row(f"Pd of the {name} class at {km:.2f} km", ours, "", f"{why} {ROUNDED}", text,
-                        rounding(sensor, dbsm, km),
-                        LARGE_DIFFERS if name == "large" else ""))  # fmt: skip
+        because = LARGE_DIFFERS if name == "large" else ""
+        quantity = f"Pd of the {name} class at {km:.2f} km"
+        allowed = rounding(sensor, dbsm, km)
+        rows.append(Row(quantity, ours, "", f"{why} {ROUNDED}", text, allowed, because))
     for (name, (_, km, text)), ours in zip(CLASSES.items(), fitted, strict=True):
         rows.append(Row(f"the same by one least-squares bandwidth, {name} at {km:.2f} km", ours, "",
                         f"One bandwidth, {fitted_hz:.0f} Hz, fitted to all three values; the "
@@ -103,8 +104,8 @@ def _what_large_would_need(pfa: float, budget: LinkBudget) -> list[Row]:
     there = float(budget.snr(1000.0 * km, 1.0))
     why = "Where our curve has 0.8668 (errata 17)."
     return [
-        Row("range at which the large class has Pd 0.8668", range_m / 1000.0, "km", why, f"{km:.2f}",
-            None, LARGE_DIFFERS),
+        Row("range at which the large class has Pd 0.8668", range_m / 1000.0, "km", why,
+            f"{km:.2f}", None, LARGE_DIFFERS),
         Row("RCS that has Pd 0.8668 at 9.75 km", 10.0 * math.log10(needed / there), "dBsm", why,
             f"{dbsm}", None, LARGE_DIFFERS),
     ]  # fmt: skip

@@ -30,7 +30,12 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
         if outline.closed:
             shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
             axes.add_patch(
-                Polygon(outline.corners_km, **shape, zorder=0.5, label=f"field of view of {name}")
+                Polygon(
+                    outline.corners_km,
+                    **shape,
+                    zorder=0.5,
+                    label="field of view" + (f" of {name}" if len(fields_of_view) > 1 else ""),
+                )
             )
     for number, track in enumerate(flights.targets):
         label = "intruder" if number == 0 else None

@@ -62,7 +62,7 @@ ITEMS = (
     Item("fig-4.20", "One intruder through two fields of view", "two_fields_of_view:make"),
     Item("fig-4.21", "Influence of the scan rate, and the timed scene", "scan_rate:make"),
     Item("fig-4.22", "Unsynchronised scans of radar and IR", "unsynchronised:make"),
-    # Item("table-2.4", "The systems of the literature", "systems:make"),
+    Item("table-2.4", "The systems of the literature", "systems:make"),
 )
 
 _KINDS = {"figure": "fig", "tab": "table", "section": "sec", "§": "sec", "equation": "eq"}

@@ -10,7 +10,7 @@ from components.thesis.plotting import BLUE, GREEN, RED, legend_below, panels
 from components.thesis.row import Row
 from components.thesis.scene_run import run, scene
 
-_MARKS = {"radar": ("o", GREEN, 4.0), "ir": ("^", BLUE, 6.0), "radar+ir": ("s", RED, 6.0)}
+_MARKS = {"radar": ("o", GREEN, 3.0), "ir": ("^", BLUE, 5.0), "radar+ir": ("s", RED, 5.0)}
 
 
 def make() -> Made:
@@ -33,7 +33,7 @@ def make() -> Made:
 
     def draw(path: Path) -> None:
         with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (places, times):
-            draw_map(places, done, fields_of_view=("ir",))
+            draw_map(places, done)
             for height, (name, (marker, colour, size)) in enumerate(_MARKS.items()):
                 label = f"{name.replace('+', ' and ')}{' fused' if '+' in name else ' alone'}"
                 style = {"marker": marker, "color": colour, "markersize": size}
@@ -42,7 +42,7 @@ def make() -> Made:
                 mark(places, done, first, **style, label=label)
                 times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
                            fillstyle="none", linestyle="none")  # fmt: skip
-            places.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
+            places.set(xlim=(-1.8, 1.8), ylim=(-0.2, 2.9))
             places.set_title("Radar/IR detection, first 10 s", loc="left")
             times.set_yticks(range(len(_MARKS)), ["radar alone", "IR alone", "fused"])
             times.set_xticks(range(11))
