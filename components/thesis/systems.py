@@ -66,7 +66,7 @@ def make() -> Made:
             axes.set_yticks(ticks, names, fontsize=8)
             axes.set_xlabel("range of the first detection [km]")
             axes.set_ylabel("system (configs/systems)")
-            axes.set_xlim(0, 19)
+            axes.set_xlim(0, 20)
 
     data = {
         "system": [name for name, found in first.items() for _ in found],
