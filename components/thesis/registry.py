@@ -82,23 +82,24 @@ def chosen(names: Iterable[str]) -> list[Item]:
     wanted: set[str] = set()
     problems = []
     for name in names:
-        item = _find(name)
-        if item is None:
+        found = _find(name)
+        if len(found) == 1:
+            wanted.add(found[0])
+        elif found:
+            problems.append(f"ITEM {name!r}: there are several; say {' or '.join(found)}")
+        else:
             hint = did_you_mean(name.lower(), [item.name for item in ITEMS])
             problems.append(f"ITEM {name!r}: there is no such item{hint}")
-        else:
-            wanted.add(item.name)
     if problems:
         raise UsageError("\n  ".join(problems))
     return [item for item in ITEMS if not wanted or item.name in wanted]
 
 
-def _find(name: str) -> Item | None:
+def _find(name: str) -> list[str]:
+    """Return the names of the items that a name may mean."""
     kind, number = _parts(name)
-    found = [item for item in ITEMS if _parts(item.name)[1] == number]
-    if kind:
-        found = [item for item in found if _parts(item.name)[0] == kind]
-    return found[0] if len(found) == 1 else None
+    parts = {item.name: _parts(item.name) for item in ITEMS}
+    return [full for full, (k, n) in parts.items() if n == number and kind in ("", k)]
 
 
 def _parts(name: str) -> tuple[str, str]:

@@ -84,7 +84,7 @@ def test_items_come_in_the_order_of_the_thesis_and_once():
         "fig-4.5",
     ]
     assert chosen([]) == list(ITEMS)
-    with pytest.raises(UsageError):
+    with pytest.raises(UsageError, match=r"there are several; say fig-4.3 or table-4.3"):
         chosen(["4.3"])  # a figure and a table have this number
 
 

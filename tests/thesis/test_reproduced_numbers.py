@@ -1,4 +1,4 @@
-"""The rows of `dsa-des reproduce` against numbers worked out by hand from the thesis's equations."""
+"""The rows of `dsa-des reproduce` against numbers worked out by hand from the equations."""
 
 import math
 
