@@ -54,7 +54,7 @@ class Cells:
     ----------
     targets : RelativeTargets
     rows : (scans,)
-        Message row of each scan.
+        Message row of each scan; kept as ``message_rows``.
     wanted : (scans, targets) of bool
     scans : (scans,)
         Scan numbers.
@@ -71,6 +71,7 @@ class Cells:
         scan_ticks: IntArray | None = None,
     ) -> None:
         self._targets = targets
+        self.message_rows = rows
         self.roster = targets.roster
         place = np.flatnonzero(wanted)
         width = max(1, wanted.shape[1])
@@ -181,9 +182,9 @@ class Sensor(Component):
         if held is None:
             return None
         targets, rows = held
-        rows, reason = self._decide(targets, rows)
+        cells, reason = self.cells(targets, rows, wake)
+        rows = cells.message_rows
         wanted = reason == EVALUATE
-        cells = Cells(targets, rows, wanted, wake.scans, wake.ticks)
         look = self.look(cells)
         for judge in self._judgements:
             look = judge(cells, look)
@@ -213,6 +214,21 @@ class Sensor(Component):
         for report in self._reporting:
             detections = report(detections, targets, rows)
         return detections
+
+    def cells(
+        self, targets: RelativeTargets, rows: IntArray, wake: Wake
+    ) -> tuple[Cells, ReasonArray]:
+        """Return the cells that need our physics, and the reason for every (scan, target).
+
+        Parameters
+        ----------
+        targets : RelativeTargets
+        rows : (scans,)
+            Message row of each scan.
+        wake : Wake
+        """
+        rows, reason = self._decide(targets, rows)
+        return Cells(targets, rows, reason == EVALUATE, wake.scans, wake.ticks), reason
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""

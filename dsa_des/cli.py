@@ -1,4 +1,4 @@
-"""The command line: ``dsa-des run``, ``check``, ``graph``, ``components``.
+"""The command line: ``dsa-des run``, ``check``, ``graph``, ``explain``, ``cost``, ``components``.
 
 This file declares commands and nothing else; it imports click only, so that ``--help`` is instant.
 Exit codes: 0 done, 1 a block failed while it ran, 2 the scene or the call is wrong.
@@ -14,7 +14,9 @@ from dsa_des.command_plugins import PluginGroup
 from dsa_des.plain_errors import plain_errors
 
 
-def _scene_options(command: Callable[..., None]) -> Callable[..., None]:
+def _scene_options(
+    command: Callable[..., None], scene_required: bool = True
+) -> Callable[..., None]:
     for option in (
         click.option("--duration", metavar="S", help="Length of the run in seconds."),
         click.option("--seed", type=int, help="Seed of all random draws."),
@@ -32,10 +34,14 @@ def _scene_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar="KEY=VALUE",
             help="Change one value, e.g. blocks.radar.scan_rate_hz=2.",
         ),
-        click.argument("scene", metavar="SCENE"),
+        click.argument("scene", metavar="SCENE", required=scene_required),
     ):
         command = option(command)
     return command
+
+
+def _optional_scene_options(command: Callable[..., None]) -> Callable[..., None]:
+    return _scene_options(command, scene_required=False)
 
 
 _everything_option = click.option(
@@ -101,6 +107,28 @@ def explain(**options: Any) -> None:
     from dsa_des.commands.explain import explain_scene
 
     explain_scene(**options)
+
+
+@main.command()
+@_optional_scene_options
+@click.option("--block", metavar="NAME", help="Climb only this block's ladders.")
+@click.option("--against", metavar="RUNG", help="Another reference than the ladder's own.")
+@click.option("--repeats", type=click.IntRange(min=1), default=10, show_default=True,
+              help="How often each rung is timed; every time counts the best of three.")
+@click.option("--budget", "budgets", multiple=True, metavar="ERROR",
+              help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m².")
+@click.option("--all", "whole_chain", is_flag=True,
+              help="Combine the rungs of all blocks and draw the front of the whole chain.")
+@click.option("--map", "map_name", metavar="LADDER",
+              help="Draw maps of the rungs' errors: geometry; needs no SCENE.")
+@click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-cost-NNN].")
+@click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON only.")
+@plain_errors
+def cost(**options: Any) -> None:
+    """Run SCENE with each model of its blocks in turn: what accuracy costs, and what it buys."""
+    from dsa_des.commands.cost import cost_of_accuracy
+
+    cost_of_accuracy(**options)
 
 
 @main.command()

@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 
 from dsa_des.clock import ClockSpec, parse_rational
 from dsa_des.effects import Effect
+from dsa_des.ladder import Ladder
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.randomness import Stream, Streams
@@ -181,6 +182,8 @@ class Component:
     clocked: ClassVar[Literal["own", "demand"]] = "own"
     #: Physics that is built only when the scene calls for it (`dsa_des.effects`).
     effects: ClassVar[tuple[Effect, ...]] = ()
+    #: Models that can fill this block, from crude to exact (`dsa_des.ladder`).
+    ladders: ClassVar[tuple[Ladder, ...]] = ()
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name

@@ -4,6 +4,7 @@ They are found by the entry-point group ``dsa_des.reports``; each is a class wit
 `Report`, called without arguments.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -24,6 +25,9 @@ class Report(Protocol):
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
         """Print the summary on a ``rich.console.Console``."""
+
+    def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what changed from one run's recorded tables to another's."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw figures from the Parquet tables in `folder` into it and return their paths."""

@@ -146,6 +146,37 @@ def load_scene(
     SceneError
         With every problem found.
     """
+    scene_file, problems, dropped = open_scene(
+        path, sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
+    )
+    scene = check_scene(scene_file, problems)
+    scene.dropped = dropped
+    return scene
+
+
+def open_scene(
+    path: Path | str,
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+    duration_s: object = None,
+) -> tuple[SceneFile, list[Problem], list[str]]:
+    """Read and override a scene without checking it.
+
+    Returns
+    -------
+    SceneFile
+    list of Problem
+        What is wrong with the overrides.
+    list of str
+        Dotted keys of parameters that a swap dropped.
+
+    Raises
+    ------
+    SceneError
+        If a file cannot be read.
+    """
     scene_file = read_scene_file(path)
     problems: list[Problem] = []
     dropped: list[str] = []
@@ -159,9 +190,7 @@ def load_scene(
         _override(scene_file, "seed", seed)
     if duration_s is not None:
         _override(scene_file, "duration_s", duration_s)
-    scene = check_scene(scene_file, problems)
-    scene.dropped = dropped
-    return scene
+    return scene_file, problems, dropped
 
 
 def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) -> Scene:

@@ -1,5 +1,6 @@
 """The report of a detect-and-sense run: summary, terminal tables and two figures."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,12 @@ class DetectAndSenseReport:
         from components.display.terminal import show
 
         show(console, summary)
+
+    def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what changed from one run's recorded tables to another's."""
+        from components.display.change import compare_runs
+
+        return compare_runs(reference, other)
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw ``plan.png`` and ``timeline.png`` into a run's folder.

@@ -1,17 +1,19 @@
 """Pick-best fusion: radar gives range, optics give the angles (``fusion.pick_best``, §3.6)."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from components.fusion.coincidence import latest_in_gate, same_instant
 from components.fusion.false_alarms import pass_false_alarms
-from components.messages import Detections, FusedDetections, SensorOffer
+from components.fusion.fusion_block import Fusion
+from components.fusion.ladder import FUSION
+from components.messages import FusedDetections
 from components.true_entries import true_entries
-from dsa_des.component import Component, NonNegativeRational, Parameters
-from dsa_des.ports import Input, Output
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.component import NonNegativeRational, Parameters
+from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
 
@@ -25,7 +27,7 @@ class PickBestParameters(Parameters):
     )
 
 
-class PickBest(Component):
+class PickBest(Fusion):
     """Puts together, per target, the best of what the sensors report.
 
     Range comes from a sensor that measures it, angles from one that does not (an optical one)
@@ -34,32 +36,12 @@ class PickBest(Component):
     targets detected then. False alarms pass through alone: only a target ties detections together.
     """
 
-    inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
-    outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     Parameters = PickBestParameters
-    windowed = True
+    ladders = (FUSION,)
 
-    def setup(self) -> None:
-        """Rank the sensors."""
-        offers = {
-            producer.block: producer.offer
-            if isinstance(producer.offer, SensorOffer)
-            else SensorOffer(False, 0.0)
-            for producer in self.context.producers
-        }
-        self.sensors = tuple(sorted(offers, key=lambda n: (not offers[n].measures_range, n)))
-        best_angles = sorted(
-            offers, key=lambda n: (offers[n].measures_range, offers[n].resolution_rad, n)
-        )
-        #: Least preferred first, so that better ones overwrite.
-        self._by_angles = [self.sensors.index(name) for name in reversed(best_angles)]
-        self._by_range = [
-            self.sensors.index(name)
-            for name in reversed(best_angles)
-            if offers[name].measures_range
-        ]
-        self._gate_ticks = int(self.p.coincidence_s * self.context.ticks_per_s)
-        self._recent: dict[str, Arrivals] = {}
+    def window_s(self) -> Any:
+        """Return ``coincidence_s``."""
+        return self.p.coincidence_s
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Fuse the detections of every instant."""
@@ -75,94 +57,21 @@ class PickBest(Component):
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
         union = np.unique(np.concatenate(keys))
         row, target = np.divmod(union, width)
-        if self._gate_ticks:
-            arrivals = self._with_recent(arrivals)
+        if self.gate_ticks:
+            arrivals = self.with_recent(arrivals)
             entries = {
-                name: latest_in_gate(new, wake.ticks[row], target, self._gate_ticks)
+                name: latest_in_gate(new, wake.ticks[row], target, self.gate_ticks)
                 for name, new in arrivals.items()
             }
         else:
             entries = {
                 name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
             }
-        fused = self._combine(wake.ticks, row, target, arrivals, entries)
-        return pass_false_alarms(fused, reported, [self.sensors[i] for i in self._by_range])
-
-    def _with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
-        """Return new and recent rows of every sensor, and keep what the next run may need."""
-        for name, new in arrivals.items():
-            old = self._recent.get(name)
-            if old is not None:
-                message = Detections.concatenate([old.message, new.message])
-                new = Arrivals(name, np.concatenate([old.tick, new.tick]), message)
-            self._recent[name] = new
-        latest = max(int(new.tick[-1]) for new in arrivals.values())
-        together = dict(self._recent)
-        for name, seen in together.items():
-            keep = slice(int(np.searchsorted(seen.tick, latest - self._gate_ticks)), len(seen.tick))
-            self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
-        return dict(sorted(together.items()))
-
-    def _combine(
-        self,
-        ticks: IntArray,
-        row: IntArray,
-        target: IntArray,
-        arrivals: dict[str, Arrivals],
-        entries: dict[str, IntArray],
-    ) -> FusedDetections:
-        count = len(row)
-        contributors = np.zeros(count, dtype=np.int64)
-        angle_source = np.full(count, -1, dtype=np.int64)
-        range_source = np.full(count, -1, dtype=np.int64)
-        values = {
-            name: np.full(count, np.nan)
-            for name in (
-                "azimuth_rad",
-                "elevation_rad",
-                "range_m",
-                "true_azimuth_rad",
-                "true_elevation_rad",
-                "true_range_m",
-            )
-        }
-        for index in self._by_angles:
-            name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                contributors[found] |= 1 << index
-                angle_source[found] = index
-                for column in ("azimuth_rad", "elevation_rad"):
-                    _copy(values, column, found, arrivals[name], entries[name])
-                    _copy(values, f"true_{column}", found, arrivals[name], entries[name])
-                _copy(values, "true_range_m", found, arrivals[name], entries[name])
-        for index in self._by_range:
-            name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                range_source[found] = index
-                _copy(values, "range_m", found, arrivals[name], entries[name])
-        return FusedDetections(
-            tick=ticks,
-            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
-            target=target,
-            contributors=contributors,
-            angle_source=angle_source,
-            range_source=range_source,
-            roster=next(iter(arrivals.values())).message.roster,
-            sensors=self.sensors,
-            **values,
-        )
-
+        fused = self.combine(wake.ticks, row, target, arrivals, entries)
+        return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
 
 def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
     row = np.searchsorted(ticks, new.tick)
     offsets = new.message.offsets
     return np.repeat(row, np.diff(offsets)) * width + new.message.target
-
-
-def _copy(
-    values: dict[str, FloatArray], column: str, at: IntArray, new: Arrivals, entry: IntArray
-) -> None:
-    values[column][at] = getattr(new.message, column)[entry[at]]

@@ -14,6 +14,7 @@ from pydantic import Field
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi
 from components.geometry.attitude import sensor_angles
+from components.geometry.ladder import ATTITUDE, EARTH
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
 from components.target_messages import RelativeTargets, TrafficStates
@@ -42,6 +43,7 @@ class Transform(Component):
     Parameters = TransformParameters
     windowed = True
     effects = (NavigationErrors(),)
+    ladders = (EARTH, ATTITUDE)
     line_of_sight: ClassVar[Callable[..., tuple[Any, Any, Any]]]
 
     def setup(self) -> None:

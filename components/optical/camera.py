@@ -27,10 +27,13 @@ class CameraParameters(SensorParameters):
     threshold: float = Field(default=1.0, description="Signature needed for a detection (eq. 19).")
     static_weight: float = Field(default=0.3, ge=0, description="Weight a of eq. 18, per pixel.")
     dynamic_weight: float = Field(default=0.0, ge=0, description="Weight b of eq. 18, s/rad.")
-    silhouette: Literal["exact", "thesis", "convex_hull", "aspect_table"] = Field(
+    silhouette: Literal[
+        "exact", "thesis", "convex_hull", "aspect_table", "sampled_table", "mesh"
+    ] = Field(
         default="exact",
-        description="How the area follows from the target's attitude; 'aspect_table' takes each "
-        "aircraft's silhouette_table.",
+        description="How the area follows from the target's attitude: sum of the three bodies, "
+        "thesis eq. 9-13, union of the bodies, each aircraft's silhouette_table, a table sampled "
+        "from the union, or a mesh of the bodies (slow).",
     )
     rate: Literal["exact", "thesis"] = Field(
         default="exact",
@@ -98,15 +101,20 @@ class Camera(Sensor):
         """Return the area that shows in each cell, m²."""
         raise TypeError(f"{type(self).__name__} has no area(cells)")
 
+    def shown_area(self, cells: Cells) -> FloatArray:
+        """Return the area that shows in each cell with what the scene's effects add to it, m²."""
+        area = self.area(cells)
+        for added in self._areas:
+            area = area + added(cells)
+        return area
+
     def contrast(self, cells: Cells) -> FloatArray:
         """Return the contrast gain P of each cell."""
         raise TypeError(f"{type(self).__name__} has no contrast(cells)")
 
     def look(self, cells: Cells) -> Look:
         """Compare every target's signature with the threshold."""
-        area = self.area(cells)
-        for added in self._areas:
-            area = area + added(cells)
+        area = self.shown_area(cells)
         pixels = pixels_covered(
             area,
             cells.range_m,

@@ -4,10 +4,10 @@ from typing import Literal
 
 from pydantic import Field
 
+from components.optical.area_of_cells import area_of_cells
 from components.optical.background import Background
 from components.optical.camera import Camera, CameraParameters
-from components.optical.silhouette import visible_area
-from components.optical.tabulated_area import tabulated_area
+from components.optical.ladder import VISIBLE
 from components.sensor import Cells
 from dsa_des.types import FloatArray
 
@@ -49,21 +49,11 @@ class ElectroOptical(Camera):
     Parameters = ElectroOpticalParameters
     areas, contrasts = "eo", "contrast"
     effects = (Background(), *Camera.effects)
+    ladders = (VISIBLE,)
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the silhouette of sphere, cylinder and plane (eq. 9-13, errata 9), m²."""
-        if self.p.silhouette == "aspect_table":
-            return tabulated_area(cells, "eo.silhouette_table")
-        return visible_area(
-            cells.relative_heading_rad,
-            cells.target_pitch_rad,
-            cells.target_roll_rad,
-            cells.elevation_rad,
-            front_m2=cells.of_target(cells.roster.column("eo.front_m2")),
-            side_m2=cells.of_target(cells.roster.column("eo.side_m2")),
-            horizontal_m2=cells.of_target(cells.roster.column("eo.horizontal_m2")),
-            model=self.p.silhouette,
-        )
+        return area_of_cells(cells, "eo", self.p.silhouette)
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's own contrast gain, before background and weather."""

@@ -41,7 +41,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         not areas
         or not rosters
         or adding
-        or camera.p.silhouette == "aspect_table"
+        or camera.p.silhouette in ("aspect_table", "sampled_table", "mesh")
         or camera.p.threshold <= 0
     ):
         return math.inf

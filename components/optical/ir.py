@@ -1,12 +1,11 @@
 """The infrared camera (``optical.ir``, thesis §3.5.3)."""
 
-import numpy as np
 from pydantic import Field
 
+from components.optical.area_of_cells import area_of_cells
 from components.optical.camera import Camera, CameraParameters
-from components.optical.infrared_area import infrared_area
+from components.optical.ladder import INFRARED
 from components.optical.plume import Plume
-from components.optical.tabulated_area import tabulated_area
 from components.sensor import Cells
 from dsa_des.types import FloatArray
 
@@ -27,23 +26,11 @@ class Infrared(Camera):
     Parameters = InfraredParameters
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), *Camera.effects)
+    ladders = (INFRARED,)
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the warm silhouette with its own back (eq. 20-21, errata 12), m²."""
-        if self.p.silhouette == "aspect_table":
-            return tabulated_area(cells, "ir.silhouette_table")
-        area = infrared_area(
-            cells.relative_heading_rad,
-            cells.target_pitch_rad,
-            cells.target_roll_rad,
-            cells.elevation_rad,
-            front_m2=cells.of_target(cells.roster.column("ir.front_m2")),
-            back_m2=cells.of_target(cells.roster.column("ir.back_m2")),
-            side_m2=cells.of_target(cells.roster.column("ir.side_m2")),
-            horizontal_m2=cells.of_target(cells.roster.column("ir.horizontal_m2")),
-            model=self.p.silhouette,
-        )
-        return np.asarray(area)
+        return area_of_cells(cells, "ir", self.p.silhouette)
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's contrast gain for IR."""

@@ -73,6 +73,9 @@ class LinkBudgetParameters(RadarParameters):
     polarisation: Literal["horizontal", "vertical", "circular"] = Field(
         default="circular", description="Polarisation of the wave; rain attenuates each unlike."
     )
+    aspect_rcs: bool = Field(
+        default=True, description="Whether an aircraft's rcs_table is used; else its rcs_dbsm."
+    )
     pulses: int = Field(default=1, ge=1, description="Pulses integrated non-coherently.")
 
     @model_validator(mode="after")

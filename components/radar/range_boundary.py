@@ -4,6 +4,7 @@ import numpy as np
 from pydantic import Field
 
 from components.radar.beam_effects import BeamSweep
+from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
@@ -28,6 +29,7 @@ class RangeBoundary(Radar):
 
     Parameters = RangeBoundaryParameters
     effects = (BlindRange(), BeamSweep())
+    ladders = (DETECTION,)
 
     def look(self, cells: Cells) -> Look:
         """Detect every cell: the gate has kept those out of range away."""

@@ -48,7 +48,9 @@ class AspectRcs(Effect):
     acts_on = "mean RCS"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask every target for an ``rcs_table``."""
+        """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
+        if not block.p.aspect_rcs:
+            return Verdict(False, "aspect_rcs is false")
         if not known_targets(block.context):
             return Verdict(True, _UNKNOWN)
         found = [(name, craft) for name, craft in _crafts(block.context) if craft.rcs_table]

@@ -92,7 +92,7 @@ class SwerlingRadar(LinkBudgetRadar):
         cnr = self.clutter_cnr(cells)
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
-        for model, chosen in self._detection_models(cells):
+        for model, chosen in self.models_in_use(cells):
             pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
         detected = echo & (cells.draws(self._draws) < pd)
@@ -102,7 +102,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
         if self.p.fluctuation == "probability" or self._models is steady:
             return super().snr(cells)
-        rcs = self._mean_rcs_m2(cells)
+        rcs = self.mean_rcs_m2(cells)
         keys = cells.roster.keys[cells.target]
         for model, chosen in self._models(cells):
             target, scan = keys[chosen], cells.scan[chosen]
@@ -158,7 +158,7 @@ class SwerlingRadar(LinkBudgetRadar):
         # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
         return 1.01 * steepest
 
-    def _detection_models(self, cells: Cells) -> list[tuple[int, Any]]:
+    def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
         if self.p.fluctuation == "sampled":
             return [(0, slice(None))]

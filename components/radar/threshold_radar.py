@@ -14,6 +14,7 @@ from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.clutter_effects import GroundClutter
 from components.radar.false_alarm_effects import FalseAlarms
+from components.radar.ladder import DETECTION, RCS
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
@@ -48,12 +49,15 @@ class LinkBudgetRadar(Radar):
         BeamSweep(),
     )
 
+    ladders = (DETECTION, RCS)
+
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.budget = parameters.link_budget()
         # Until the scene's effects are known, all that the parameters and targets call for.
         self._echo_budget = self.budget
-        self._mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
+        #: Each cell's mean RCS, m².
+        self.mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
         self._clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
         self._roster: Roster | None = None
 
@@ -61,7 +65,7 @@ class LinkBudgetRadar(Radar):
         """Take what the scene's effects do to the SNR, and leave out what it does not call for."""
         super().setup()
         self._echo_budget = self._without_blind_range()
-        (self._mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
+        (self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
         (self._clutter_rcs_m2,) = self.built("clutter") or [None]
 
     def _without_blind_range(self) -> Any:
@@ -89,7 +93,7 @@ class LinkBudgetRadar(Radar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.echo_snr(cells, self._mean_rcs_m2(cells))
+        return self.echo_snr(cells, self.mean_rcs_m2(cells))
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""

@@ -237,7 +237,7 @@ def test_haze_takes_its_share_of_the_daylight_contrast_once(scene):
         ('background = "sun"', "blocks.eo.background"),
         ("sun_elevation_deg = 0", "blocks.eo.sun_elevation_deg"),
         ("ground_reflectance = 0", "blocks.eo.ground_reflectance"),
-        ('silhouette = "mesh"', "blocks.eo.silhouette"),
+        ('silhouette = "photo"', "blocks.eo.silhouette"),
     ],
 )
 def test_bad_parameters_are_problems_of_the_scene(scene, eo, key):

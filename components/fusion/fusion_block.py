@@ -1,0 +1,133 @@
+"""What fusion blocks have in common: who is ranked best, what is remembered, how rows are built."""
+
+from typing import Any
+
+import numpy as np
+
+from components.messages import Detections, FusedDetections, SensorOffer
+from dsa_des.component import Component
+from dsa_des.ports import Input, Output
+from dsa_des.types import FloatArray, IntArray
+from dsa_des.wake import Arrivals
+
+
+class Fusion(Component):
+    """Puts detections together; subclasses say which belong together.
+
+    Range comes from a sensor that measures it, angles from one that does not (an optical one)
+    where there is one; among equals the finest angular resolution wins, then the name. What is
+    missing is taken from what there is.
+    """
+
+    inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
+    outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
+    windowed = True
+
+    def setup(self) -> None:
+        """Rank the sensors."""
+        offers = {
+            producer.block: producer.offer
+            if isinstance(producer.offer, SensorOffer)
+            else SensorOffer(False, 0.0)
+            for producer in self.context.producers
+        }
+        self.sensors = tuple(sorted(offers, key=lambda n: (not offers[n].measures_range, n)))
+        best_angles = sorted(
+            offers, key=lambda n: (offers[n].measures_range, offers[n].resolution_rad, n)
+        )
+        #: Least preferred first, so that better ones overwrite.
+        self.by_angles = [self.sensors.index(name) for name in reversed(best_angles)]
+        self.by_range = [
+            self.sensors.index(name)
+            for name in reversed(best_angles)
+            if offers[name].measures_range
+        ]
+        self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
+        self._recent: dict[str, Arrivals] = {}
+
+    def window_s(self) -> Any:
+        """Return how old a detection may be and still be put together with a new one, s."""
+        raise TypeError(f"{type(self).__name__} states no window")
+
+    def with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
+        """Return new and recent rows of every sensor, and keep what the next run may need."""
+        for name, new in arrivals.items():
+            old = self._recent.get(name)
+            if old is not None:
+                message = Detections.concatenate([old.message, new.message])
+                new = Arrivals(name, np.concatenate([old.tick, new.tick]), message)
+            self._recent[name] = new
+        latest = max(int(new.tick[-1]) for new in arrivals.values())
+        together = dict(self._recent)
+        for name, seen in together.items():
+            keep = slice(int(np.searchsorted(seen.tick, latest - self.gate_ticks)), len(seen.tick))
+            self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
+        return dict(sorted(together.items()))
+
+    def combine(
+        self,
+        ticks: IntArray,
+        row: IntArray,
+        target: IntArray,
+        arrivals: dict[str, Arrivals],
+        entries: dict[str, IntArray],
+    ) -> FusedDetections:
+        """Build the fused rows from the best of what belongs together.
+
+        Parameters
+        ----------
+        ticks : (rows,)
+        row, target : (entries,)
+            Row and target of each fused detection, ascending in row.
+        arrivals : dict of Arrivals
+        entries : dict of (entries,)
+            By sensor: which of its detections belongs to each, -1 for none.
+        """
+        count = len(row)
+        contributors = np.zeros(count, dtype=np.int64)
+        angle_source = np.full(count, -1, dtype=np.int64)
+        range_source = np.full(count, -1, dtype=np.int64)
+        values = {
+            name: np.full(count, np.nan)
+            for name in (
+                "azimuth_rad",
+                "elevation_rad",
+                "range_m",
+                "true_azimuth_rad",
+                "true_elevation_rad",
+                "true_range_m",
+            )
+        }
+        for index in self.by_angles:
+            name = self.sensors[index]
+            if name in entries:
+                found = np.flatnonzero(entries[name] >= 0)
+                contributors[found] |= 1 << index
+                angle_source[found] = index
+                for column in ("azimuth_rad", "elevation_rad"):
+                    _copy(values, column, found, arrivals[name], entries[name])
+                    _copy(values, f"true_{column}", found, arrivals[name], entries[name])
+                _copy(values, "true_range_m", found, arrivals[name], entries[name])
+        for index in self.by_range:
+            name = self.sensors[index]
+            if name in entries:
+                found = np.flatnonzero(entries[name] >= 0)
+                range_source[found] = index
+                _copy(values, "range_m", found, arrivals[name], entries[name])
+        return FusedDetections(
+            tick=ticks,
+            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
+            target=target,
+            contributors=contributors,
+            angle_source=angle_source,
+            range_source=range_source,
+            roster=next(iter(arrivals.values())).message.roster,
+            sensors=self.sensors,
+            **values,
+        )
+
+
+def _copy(
+    values: dict[str, FloatArray], column: str, at: IntArray, new: Arrivals, entry: IntArray
+) -> None:
+    values[column][at] = getattr(new.message, column)[entry[at]]

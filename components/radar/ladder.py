@@ -1,0 +1,132 @@
+"""The ladders of radars: how an echo becomes a detection, and how large the target's RCS is."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.known_targets import known_targets
+from components.ladder_values import over_cells
+from components.sensor import Cells
+from dsa_des.component import Component
+from dsa_des.ladder import Ladder, Quantity, Rung, Unavailable
+from dsa_des.types import AnyArray, FloatArray, IntArray
+from dsa_des.wake import Wake
+
+_PD = Quantity("detection_probability", "Pd", tolerance="detection_probability")
+
+
+def _pd_of(radar: Any, cells: Cells) -> FloatArray:
+    """Return the probability with which a radar detects each cell; 0 or 1 if it does not draw."""
+    look = radar.look(cells)
+    if "detection_probability" in look.extras:
+        echo: FloatArray = np.where(
+            radar.snr(cells) > 0.0, look.extras["detection_probability"], 0.0
+        )
+        return echo
+    return np.where(look.detected, 1.0, 0.0)
+
+
+def measure_pd(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the probability of detection at every (scan, target)."""
+    radar: Any = block
+    # What is too far away to be looked at is detected with probability 0.
+    found: dict[str, AnyArray] = dict(
+        over_cells(
+            radar, wake, lambda cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0
+        )
+    )
+    return found
+
+
+def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the errors of Pd at the SNR in use against sums at 40 digits (needs mpmath)."""
+    from components.numerics.high_precision import detection_error
+
+    radar: Any = block
+    if not hasattr(radar, "models_in_use"):
+        raise Unavailable("a boundary or threshold decides: it states no probability")
+    if radar.built("clutter"):
+        raise Unavailable("ground clutter: no evaluation at more digits")
+    at: dict[str, FloatArray] = {}
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        model = np.empty(len(cells))
+        for number, chosen in radar.models_in_use(cells):
+            model[chosen] = number
+        return {"snr": radar.snr(cells), "model": model, "pd": _pd_of(radar, cells)}
+
+    at = over_cells(radar, wake, values)
+    errors = [
+        detection_error(
+            at["pd"][row, target],
+            at["snr"][row, target],
+            radar.p.pulses,
+            radar.p.false_alarm_probability,
+            int(at["model"][row, target]),
+        )
+        for row, target in cells.tolist()
+        if at["snr"][row, target] > 0.0
+    ]
+    return {_PD.name: np.array(errors)}
+
+
+def measure_rcs(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the mean RCS and the probability of detection at every (scan, target)."""
+    radar: Any = block
+
+    def values(cells: Cells) -> dict[str, FloatArray]:
+        return {"rcs": radar.mean_rcs_m2(cells), _PD.name: _pd_of(radar, cells)}
+
+    found: dict[str, AnyArray] = dict(over_cells(radar, wake, values))
+    return found
+
+
+def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the boundary: where the calibration knows Pd, else the radar's own limit."""
+    if block["type"] == "radar.range_boundary":
+        return {}
+    if block.get("calibrate"):
+        return {"range_km": block["calibrate"]["range_km"]}
+    if block.get("range_km"):
+        return {"range_km": block["range_km"]}
+    raise Unavailable("needs calibrate.range_km or range_km to put the boundary at")
+
+
+def _tables(block: Component) -> str:
+    rosters = known_targets(block.context)
+    if rosters and not any(craft.rcs_table for roster in rosters for craft in roster.aircraft):
+        return "no target has an rcs_table"
+    return ""
+
+
+DETECTION = Ladder(
+    "detection",
+    (
+        Rung("range_boundary", "all inside the calibrated range (section 2.2.2)",
+             "radar.range_boundary", _boundary),
+        Rung("threshold", "mean SNR against a threshold", "radar.threshold"),
+        Rung("gram_charlier", "thesis eq. 26-31 at a sampled RCS", "radar.swerling",
+             {"detection": "gram_charlier"}, {"fluctuation": "sampled"}),
+        Rung("table", "Pd looked up, error below 1e-6", "radar.swerling",
+             {"detection": "table"}),
+        Rung("exact", "Pd to 12 digits", "radar.swerling", {"detection": "exact"}),
+    ),
+    "exact",
+    (_PD,),
+    measure_pd,
+    pd_truth,
+    clears=("model",),
+)  # fmt: skip
+
+RCS = Ladder(
+    "rcs",
+    (
+        Rung("constant", "one mean RCS per aircraft", parameters={"aspect_rcs": False}),
+        Rung("aspect", "the aircraft's table over aspect", parameters={"aspect_rcs": True}),
+    ),
+    "aspect",
+    (Quantity("rcs", "m²"), _PD),
+    measure_rcs,
+    applies=_tables,
+)

@@ -1,0 +1,169 @@
+"""``dsa-des cost``: what each model of each block costs, what it gets wrong, and what it changes."""
+
+import importlib
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from dsa_des.costs.front import parse_budgets
+from dsa_des.costs.output import draw_costs, print_costs, write_table
+from dsa_des.costs.study import Compare, RungCost, applies, climb
+from dsa_des.costs.variants import Variants
+from dsa_des.entry_points import registered
+from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.ladder import Ladder, Unavailable
+from dsa_des.registry import UnknownType, find
+from dsa_des.reports import load_reports
+from dsa_des.run_folder import check_target, new_folder_name, write_json, writing
+from dsa_des.run_folder import RUN_JSON
+
+#: Ladders of one block of a scene, those that change something in it.
+Climbs = list[tuple[str, Ladder]]
+
+
+def cost_of_accuracy(
+    scene: str | None,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    block: str | None,
+    against: str | None,
+    repeats: int,
+    budgets: tuple[str, ...],
+    whole_chain: bool,
+    map_name: str | None,
+    out: str | None,
+    as_json: bool,
+) -> None:
+    """Climb the ladders of a scene's blocks, write tables and figures, and print the rows."""
+    if map_name is not None:
+        _draw_maps(map_name, out)
+        return
+    if scene is None:
+        raise UsageError("SCENE is missing: only --map needs none")
+    variants = Variants(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    for key in variants.dropped:
+        click.echo(f"note: the swap dropped {key}", err=True)
+    climbs, notes = _climbs(variants, block, against)
+    limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
+    target = Path(out) if out else new_folder_name(Path("runs"), f"{variants.scene.path.stem}-cost")
+    check_target(target)
+    compare = comparison()
+    costs: list[RungCost] = []
+    for name, ladder in climbs:
+        _say(f"{name}: {ladder.name} ...", as_json)
+        try:
+            costs += climb(variants, name, ladder, against=against, repeats=repeats,
+                           budgets=limits, compare=compare)  # fmt: skip
+        except Unavailable as error:
+            notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
+    chain: list[dict[str, Any]] = []
+    with writing(target) as folder:
+        rows = [cost.row() for cost in costs]
+        write_table(folder / "cost.parquet", rows)
+        draw_costs(folder / "cost.png", variants.scene.title, costs)
+        if whole_chain:
+            from dsa_des.costs.chain import draw_chain, run_chain
+
+            _say("whole chain ...", as_json)
+            found = run_chain(variants, costs, compare)
+            chain = found.rows
+            notes.append(found.picked)
+            write_table(folder / "chain.parquet", chain)
+            draw_chain(folder / "chain.png", variants.scene.title, chain)
+        content: dict[str, Any] = {"rows": rows, "notes": notes}
+        if whole_chain:
+            content["chain"] = chain
+        write_json(folder / RUN_JSON, {"title": variants.scene.title, "cost": content})
+    if as_json:
+        click.echo(json.dumps(rows + chain, indent=2, ensure_ascii=False))
+    else:
+        print_costs(costs, chain, notes)
+        click.echo(f"\n{target}: {', '.join(sorted(path.name for path in target.iterdir()))}")
+
+
+def _say(text: str, silent: bool) -> None:
+    if not silent and sys.stderr.isatty():
+        click.echo(text, err=True)
+
+
+def _climbs(
+    variants: Variants, block: str | None, against: str | None
+) -> tuple[Climbs, list[str]]:
+    """Return the ladders to climb, and notes on those that change nothing in this scene."""
+    blocks = variants.scene.blocks
+    if block is not None and block not in blocks:
+        raise UsageError(f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}")
+    names = list(blocks) if block is None else [block]
+    declared = [(name, ladder) for name in names for ladder in blocks[name].cls.ladders]
+    if not declared:
+        who = "no block of this scene declares" if block is None else f"{block} declares no"
+        raise UsageError(f"{who} ladder; dsa-des components TYPE shows them")
+    if against is not None:
+        rungs = {rung.name for _, ladder in declared for rung in ladder.rungs}
+        if against not in rungs:
+            raise UsageError(
+                f"--against {against}: no ladder here has such a rung{did_you_mean(against, rungs)}"
+            )
+        declared = [
+            (name, ladder)
+            for name, ladder in declared
+            if against in {rung.name for rung in ladder.rungs}
+        ]
+    climbs, notes = [], []
+    for name, ladder in declared:
+        why = applies(variants, name, ladder)
+        if why:
+            notes.append(f"{name}, {ladder.name}: not climbed, {why}")
+        else:
+            climbs.append((name, ladder))
+    return climbs, notes
+
+
+def comparison() -> Compare:
+    """Return what tells runs apart: the sections of all registered reports together."""
+    reports = [report for report in load_reports() if hasattr(report, "compare")]
+
+    def compare(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for report in reports:
+            found.update(report.compare(reference, other))
+        return found
+
+    return compare
+
+
+def _draw_maps(name: str, out: str | None) -> None:
+    """Draw the maps that the ladders of the types ``NAME.*`` (or of one type) name."""
+    functions = _map_functions()
+    if name not in functions:
+        raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")
+    module_name, _, function_name = functions[name].partition(":")
+    try:
+        draw: Any = getattr(importlib.import_module(module_name), function_name)
+    except (ImportError, AttributeError) as error:
+        raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
+    target = Path(out) if out else new_folder_name(Path("runs"), f"map-{name}")
+    with writing(target) as folder:
+        paths = [Path(path).name for path in draw(folder)]
+        write_json(folder / RUN_JSON, {"map": name, "files": paths})
+    click.echo(f"{target}: {', '.join(paths)}")
+
+
+def _map_functions() -> dict[str, str]:
+    """Return the map function of each family of block types, ``geometry`` for ``geometry.*``."""
+    found: dict[str, str] = {}
+    for type_name in registered():
+        try:
+            ladders = find(type_name).ladders
+        except UnknownType:  # somebody's broken plug-in
+            continue
+        for ladder in ladders:
+            if ladder.map_function:
+                found.setdefault(type_name.partition(".")[0], ladder.map_function)
+    return found

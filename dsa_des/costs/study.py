@@ -1,0 +1,239 @@
+"""Climbing one ladder of one block: cost, error and effect of every rung."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dsa_des.costs.differences import Spread, Values, errors_against, own_errors, values_of
+from dsa_des.costs.front import allowed_error, on_front
+from dsa_des.costs.replay import RungRun, median_and_spread, run_rung, time_interleaved
+from dsa_des.costs.variants import Choice, Variants
+from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.ladder import Ladder, Unavailable
+from dsa_des.simulation import Simulation
+
+#: Compares the recorded tables of the reference's run and of a rung's run.
+Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
+
+
+@dataclass
+class RungCost:
+    """What one rung costs and what it gets wrong.
+
+    Parameters
+    ----------
+    block, ladder, rung, reference : str
+    in_scene : bool
+        Whether the scene itself uses this rung.
+    unavailable : str
+        Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
+    cpu_us_per_target_scan, cpu_spread_us : float
+        Median over the repeats, and half the distance between the quartiles.
+    repeats : int
+    errors : dict of Spread
+        By quantity, against the reference; of the reference itself, its own error where that could
+        be measured.
+    error_note : str
+        Of the reference: how its own error was measured, or why it was not.
+    effect : dict
+        What changed in what the run found, against the reference's run.
+    pareto, inside_budget, cheapest_inside : bool
+        `inside_budget` is None when there is no budget.
+    """
+
+    block: str
+    ladder: Ladder
+    rung: str
+    reference: str
+    in_scene: bool = False
+    unavailable: str = ""
+    cpu_us_per_target_scan: float = math.nan
+    cpu_spread_us: float = math.nan
+    repeats: int = 0
+    errors: dict[str, Spread] = field(default_factory=dict)
+    error_note: str = ""
+    effect: dict[str, Any] = field(default_factory=dict)
+    pareto: bool = False
+    inside_budget: bool | None = None
+    cheapest_inside: bool = False
+
+    @property
+    def error(self) -> Spread:
+        """Error in the ladder's first quantity; NaN where unknown."""
+        unknown = Spread(math.nan, math.nan, math.nan, 0)
+        return self.errors.get(self.ladder.quantities[0].name, unknown)
+
+    def row(self) -> dict[str, Any]:
+        """Return the row that ``--json`` prints."""
+        first = self.ladder.quantities[0]
+        row: dict[str, Any] = {
+            "block": self.block,
+            "ladder": self.ladder.name,
+            "rung": self.rung,
+            "reference": self.reference,
+            "in_scene": self.in_scene,
+            "unavailable": self.unavailable or None,
+            "cpu_us_per_target_scan": _number(self.cpu_us_per_target_scan),
+            "cpu_spread_us": _number(self.cpu_spread_us),
+            "repeats": self.repeats,
+            "error_quantity": first.name,
+            "error_unit": first.unit,
+            "error_mean": _number(self.error.mean),
+            "error_p95": _number(self.error.p95),
+            "error_max": _number(self.error.maximum),
+            "error_is": "own" if self.rung == self.reference else "added",
+            "error_note": self.error_note or None,
+            "pareto": self.pareto,
+            "inside_budget": self.inside_budget,
+            "cheapest_inside": self.cheapest_inside,
+            "effect": self.effect,
+            "errors": {
+                quantity.name: {
+                    "unit": quantity.unit,
+                    "mean": _number(spread.mean),
+                    "p95": _number(spread.p95),
+                    "max": _number(spread.maximum),
+                    "target_scans": spread.count,
+                }
+                for quantity in self.ladder.quantities
+                if (spread := self.errors.get(quantity.name)) is not None
+            },
+        }
+        return row
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def applies(variants: Variants, block: str, ladder: Ladder) -> str:
+    """Return why a ladder changes nothing in this scene; empty when it may."""
+    if ladder.applies is None:
+        return ""
+    return ladder.applies(Simulation(variants.scene).components[block])
+
+
+def climb(
+    variants: Variants,
+    block: str,
+    ladder: Ladder,
+    *,
+    against: str | None = None,
+    repeats: int = 20,
+    budgets: Mapping[str, float] | None = None,
+    compare: Compare | None = None,
+) -> list[RungCost]:
+    """Run the scene with every rung of a block's ladder and return their costs, crude to exact.
+
+    Parameters
+    ----------
+    variants : Variants
+    block : str
+    ladder : Ladder
+    against : str, optional
+        Another reference than the ladder's own.
+    repeats : int
+        How often each rung is timed.
+    budgets : mapping, optional
+        Largest allowed errors by unit; else the scene's ``[accuracy]``.
+    compare : callable, optional
+        Says what changed in what the run found.
+
+    Raises
+    ------
+    Unavailable
+        If the reference cannot be had in this scene.
+    """
+    reference = against or ladder.reference
+    best = Choice(block, ladder, ladder.rung(reference))
+    baselines = {"": _attempt(variants, [best], block)}
+    costs: list[RungCost] = []
+    runs: dict[str, RungRun] = {reference: baselines[""]}
+    for rung in ladder.rungs:
+        cost = RungCost(block, ladder, rung.name, reference)
+        costs.append(cost)
+        choice = Choice(block, ladder, rung)
+        try:
+            if rung.name != reference:
+                runs[rung.name] = _attempt(variants, [choice], block)
+            shared = str(sorted(rung.shared.items())) if rung.shared else ""
+            if shared and shared not in baselines:
+                baselines[shared] = _attempt(variants, [best], block, [choice])
+        except Unavailable as error:
+            runs.pop(rung.name, None)
+            cost.unavailable = str(error)
+    time_interleaved(list(runs.values()), repeats)
+    known: dict[str, Values] = {}
+    for key, baseline in baselines.items():
+        known[key] = values_of(ladder, baseline, baseline)
+    targets = max(_targets(known[""], ladder), 1)
+    for cost, rung in zip(costs, ladder.rungs, strict=True):
+        if cost.unavailable:
+            continue
+        run = runs[rung.name]
+        cost.in_scene = _same_block(run, variants, block)
+        scale = 1e6 / max(run.target_scans() * targets, 1)
+        median, spread = median_and_spread(run.repeats_s)
+        cost.cpu_us_per_target_scan, cost.cpu_spread_us = median * scale, spread * scale
+        cost.repeats = len(run.repeats_s)
+        if rung.name == reference:
+            cost.errors, cost.error_note = own_errors(ladder, run, known[""])
+        else:
+            key = str(sorted(rung.shared.items())) if rung.shared else ""
+            baseline = baselines[key]
+            cost.errors = errors_against(ladder, values_of(ladder, run, baseline), known[key])
+            if compare is not None:
+                cost.effect = compare(baseline.tables, run.tables)
+    _mark(costs, budgets or {}, variants.tolerance)
+    return costs
+
+
+def _attempt(
+    variants: Variants, choices: list[Choice], block: str, shared: list[Choice] | None = None
+) -> RungRun:
+    """Run a variant; whatever keeps it from running makes the rung unavailable."""
+    try:
+        return run_rung(variants.with_rungs(choices, shared or ()), block)
+    except SceneError as error:
+        raise Unavailable("; ".join(problem.message for problem in error.problems)) from error
+    except BlockFailure as error:
+        if error.block != block:
+            raise
+        raise Unavailable(error.reason.partition(": ")[2] or error.reason) from error
+
+
+def _targets(values: Values, ladder: Ladder) -> int:
+    return int(values[1][ladder.quantities[0].name].shape[1])
+
+
+def _same_block(run: RungRun, variants: Variants, block: str) -> bool:
+    mine, scenes = run.scene.blocks[block], variants.scene.blocks[block]
+    return mine.cls is scenes.cls and mine.parameters == scenes.parameters
+
+
+def _mark(
+    costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
+) -> None:
+    known = [cost for cost in costs if not cost.unavailable]
+    # A reference whose own error nobody knows is on the front: nothing is known to beat it.
+    points = [
+        (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)
+        for c in known
+    ]
+    for cost, front in zip(known, on_front(points), strict=True):
+        cost.pareto = front
+        limits = {
+            quantity.name: limit
+            for quantity in cost.ladder.quantities
+            if (limit := allowed_error(quantity, budgets, tolerance)) is not None
+        }
+        if limits:
+            is_reference = cost.rung == cost.reference
+            cost.inside_budget = all(
+                cost.errors[name].maximum <= limit if name in cost.errors else is_reference
+                for name, limit in limits.items()
+            )
+    inside = [cost for cost in known if cost.inside_budget]
+    if inside:
+        min(inside, key=lambda cost: cost.cpu_us_per_target_scan).cheapest_inside = True

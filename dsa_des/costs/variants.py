@@ -1,0 +1,107 @@
+"""A scene with another rung in one of its blocks, everything else as it was."""
+
+import copy
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsa_des.errors import SceneError
+from dsa_des.ladder import Ladder, Rung, Unavailable
+from dsa_des.overrides import apply_swap
+from dsa_des.scene import Scene, check_scene, open_scene
+from dsa_des.scene_file import COMMAND_LINE, SceneFile
+
+#: Lets the engine replace models by itself; a rung must be what it says.
+_CHOOSES_BY_ITSELF = "accuracy"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A rung of a ladder for one block."""
+
+    block: str
+    ladder: Ladder
+    rung: Rung
+
+
+class Variants:
+    """Makes scenes that differ from one scene by the rungs of their blocks.
+
+    ``[accuracy]`` is left out of all of them, since it lets the engine choose rungs by itself.
+
+    Parameters
+    ----------
+    path, sets, swaps, seed, duration_s
+        As for `dsa_des.scene.load_scene`.
+
+    Raises
+    ------
+    SceneError
+        If the scene itself cannot be run.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        *,
+        sets: Iterable[str] = (),
+        swaps: Iterable[str] = (),
+        seed: int | None = None,
+        duration_s: object = None,
+    ) -> None:
+        scene_file, problems, dropped = open_scene(
+            path, sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
+        )
+        stated = check_scene(copy.deepcopy(scene_file), problems)
+        #: What ``[accuracy]`` of the scene allows.
+        self.tolerance: Mapping[str, float] = stated.tolerance
+        self.dropped = dropped
+        scene_file.data.pop(_CHOOSES_BY_ITSELF, None)
+        self._file = scene_file
+        self.scene = self.with_rungs(())
+        self._blocks: dict[str, dict[str, Any]] = self.scene.resolved()["blocks"]
+
+    def with_rungs(self, choices: Iterable[Choice], shared: Iterable[Choice] = ()) -> Scene:
+        """Return the scene with these rungs in their blocks.
+
+        Parameters
+        ----------
+        choices : iterable of Choice
+        shared : iterable of Choice
+            Rungs of which only the `Rung.shared` parameters are set, after `choices`.
+
+        Raises
+        ------
+        Unavailable
+            If a rung needs what the scene does not give.
+        """
+        scene_file: SceneFile = copy.deepcopy(self._file)
+        for choice in choices:
+            self._apply(scene_file, choice)
+        for choice in shared:
+            _set(scene_file, choice.block, choice.rung.shared)
+        try:
+            return check_scene(scene_file)
+        except SceneError as error:
+            raise Unavailable("; ".join(_brief(problem) for problem in error.problems)) from error
+
+    def _apply(self, scene_file: SceneFile, choice: Choice) -> None:
+        block = scene_file.data["blocks"][choice.block]
+        for key in choice.ladder.clears:
+            block.pop(key, None)
+        values = choice.rung.changes(self._blocks[choice.block])
+        if choice.rung.type_name:
+            problems, _ = apply_swap(scene_file, f"{choice.block}={choice.rung.type_name}")
+            if problems:
+                raise Unavailable("; ".join(_brief(problem) for problem in problems))
+        _set(scene_file, choice.block, values)
+
+
+def _set(scene_file: SceneFile, block: str, values: Mapping[str, Any]) -> None:
+    for key, value in values.items():
+        scene_file.data["blocks"][block][key] = value
+        scene_file.sources[("blocks", block, key)] = COMMAND_LINE
+
+
+def _brief(problem: Any) -> str:
+    return f"{problem.key}: {problem.message}" if problem.key else str(problem.message)
