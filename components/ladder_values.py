@@ -85,5 +85,3 @@ def over_cells(
         wide[cells.row, cells.target] = of_cell
         found[name] = wide
     return found
-
-

@@ -16,7 +16,7 @@ from components.thesis.scene_run import SceneRun, run, scene
 
 #: Scene in ``configs/systems`` → the project and its sensor in Table 2.4.
 SYSTEMS = {
-    "dut_nlda": "DUT/NLDA: range boundary",
+    "dut_nlda": "DUT/NLDA: range boundary, 1D projection",
     "tecvol": "TECVOL: Swerling radar, range boundary",
     "afrl": "AFRL: EO sensors",
     "afrl_low_threshold": "AFRL: EO sensors, low threshold",
