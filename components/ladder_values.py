@@ -85,3 +85,5 @@ def over_cells(
         wide[cells.row, cells.target] = of_cell
         found[name] = wide
     return found
+
+

@@ -113,32 +113,14 @@ def explain(**options: Any) -> None:
 @_optional_scene_options
 @click.option("--block", metavar="NAME", help="Climb only this block's ladders.")
 @click.option("--against", metavar="RUNG", help="Another reference than the ladder's own.")
-@click.option(
-    "--repeats",
-    type=click.IntRange(min=1),
-    default=10,
-    show_default=True,
-    help="How often each rung is timed; every time counts the best of three.",
-)
-@click.option(
-    "--budget",
-    "budgets",
-    multiple=True,
-    metavar="ERROR",
-    help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m².",
-)
-@click.option(
-    "--all",
-    "whole_chain",
-    is_flag=True,
-    help="Combine the rungs of all blocks and draw the front of the whole chain.",
-)
-@click.option(
-    "--map",
-    "map_name",
-    metavar="LADDER",
-    help="Draw maps of the rungs' errors: geometry; needs no SCENE.",
-)
+@click.option("--repeats", type=click.IntRange(min=1), default=10, show_default=True,
+              help="How often each rung is timed; every time counts the best of three.")
+@click.option("--budget", "budgets", multiple=True, metavar="ERROR",
+              help="Largest error allowed, with its unit: 0.5mrad, 2m, 0.01Pd, 1m².")
+@click.option("--all", "whole_chain", is_flag=True,
+              help="Combine the rungs of all blocks and draw the front of the whole chain.")
+@click.option("--map", "map_name", metavar="LADDER",
+              help="Draw maps of the rungs' errors: geometry; needs no SCENE.")
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-cost-NNN].")
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON only.")
 @plain_errors

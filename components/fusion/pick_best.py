@@ -70,7 +70,6 @@ class PickBest(Fusion):
         fused = self.combine(wake.ticks, row, target, arrivals, entries)
         return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
 
-
 def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
     row = np.searchsorted(ticks, new.tick)

@@ -32,7 +32,9 @@ def measure_pd(block: Component, wake: Wake, reference: Component) -> dict[str, 
     radar: Any = block
     # What is too far away to be looked at is detected with probability 0.
     found: dict[str, AnyArray] = dict(
-        over_cells(radar, wake, lambda cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0)
+        over_cells(
+            radar, wake, lambda cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0
+        )
     )
     return found
 

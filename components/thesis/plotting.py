@@ -14,10 +14,11 @@ BLUE, ORANGE, RED, GREEN, PINK, SKY = (colour for colour, _, _ in STYLES)
 GREY = "#777777"
 
 
-def legend_below(axes: Any, columns: int = 4) -> None:
-    """Put the legend of one of a figure's axes below all of them."""
-    handles, labels = axes.get_legend_handles_labels()
-    axes.figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
+    """Put the legend of one of a figure's axes below all of them; `without` names an entry."""
+    entries = zip(*axes.get_legend_handles_labels(), strict=True)
+    shown = [entry for entry in entries if entry[1] != without]
+    axes.figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=columns)
 
 
 @contextmanager

@@ -97,7 +97,8 @@ def make() -> tuple[list[Row], Picture, Columns]:
         data["range_km"] += middle.tolist()
     caption = (
         "TECVOL: errors of the radar and of the EO camera over 100 Monte Carlo runs, by range; the "
-        "ownship's navigation has biases and white noise."
+        "ownship's navigation has biases and white noise. All runs fly the same encounter, so the "
+        "steps of the radar's grid of 1° do not average out."
     )
     return rows, Picture("table_2_4_tecvol", caption, draw), data
 

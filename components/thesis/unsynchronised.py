@@ -42,14 +42,14 @@ def make() -> Made:
                 mark(places, done, first, **style, label=label)
                 times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
                            fillstyle="none", linestyle="none")  # fmt: skip
-            places.set(xlim=(-1.8, 1.8), ylim=(-0.2, 2.9))
+            places.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
             places.set_title("Radar/IR detection, first 10 s", loc="left")
             times.set_yticks(range(len(_MARKS)), ["radar alone", "IR alone", "fused"])
             times.set_xticks(range(11))
             times.set(xlim=(-0.3, 10.3), ylim=(-0.5, len(_MARKS) - 0.5))
             times.set_title("radar scan rate 5 Hz, IR scan rate 2 Hz", loc="left")
             times.set_xlabel("time [s]")
-            legend_below(places, 5)
+            legend_below(places, 5, without="ownship")
 
     data = {
         "sensors": [name for name, rows in fused.items() for _ in rows["time_s"]],

@@ -92,13 +92,13 @@ def _say(text: str, silent: bool) -> None:
         click.echo(text, err=True)
 
 
-def _climbs(variants: Variants, block: str | None, against: str | None) -> tuple[Climbs, list[str]]:
+def _climbs(
+    variants: Variants, block: str | None, against: str | None
+) -> tuple[Climbs, list[str]]:
     """Return the ladders to climb, and notes on those that change nothing in this scene."""
     blocks = variants.scene.blocks
     if block is not None and block not in blocks:
-        raise UsageError(
-            f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}"
-        )
+        raise UsageError(f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}")
     names = list(blocks) if block is None else [block]
     declared = [(name, ladder) for name in names for ladder in blocks[name].cls.ladders]
     if not declared:

@@ -82,7 +82,9 @@ def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, 
         return {}, f"not measured: {error}"
     except Unavailable as error:
         return {}, str(error)
-    spreads = {name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]}
+    spreads = {
+        name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]
+    }
     count = max(spread.count for spread in spreads.values())
     return spreads, f"measured at {count} target-scans"
 
