@@ -76,6 +76,11 @@ class Flights:
         self.own = Track("ownship", times, east, north, np.zeros(len(times)))
         self.targets = [self._track(target, count) for target in source.targets]
 
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Latitude and longitude in degrees and altitude in metres of the map's origin."""
+        return self._lat_deg, self._lon_deg, self._alt_m
+
     @classmethod
     def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
         """Return the flights of a run, or None if it has no `TrafficSource`."""

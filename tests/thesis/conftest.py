@@ -1,0 +1,12 @@
+"""All items made once, without drawing."""
+
+import pytest
+
+from components.thesis.made import Made
+from components.thesis.registry import ITEMS
+
+
+@pytest.fixture(scope="session")
+def results() -> dict[str, Made]:
+    """What became of each item, by name."""
+    return {item.name: item.make() for item in ITEMS}

@@ -1,0 +1,168 @@
+"""The rows of `dsa-des reproduce` against numbers worked out by hand from the equations."""
+
+import math
+
+import pytest
+
+DEG = math.pi / 180.0
+# Pixels of Table 2.5 and 2.6 by hand.
+EO_PIXEL = (220.0 / 6144.0 * DEG) * (60.0 / 2048.0 * DEG)
+IR_PIXEL = (100.0 / 1024.0 * DEG) ** 2
+
+
+def eo_km(area_m2):
+    """Eq. 14-19 solved for the range: a = 0.3, threshold 1, P = 1, b = 0."""
+    return math.sqrt(0.3 * area_m2 / EO_PIXEL) / 1000.0
+
+
+def ir_km(area_m2):
+    return math.sqrt(0.3 * area_m2 / IR_PIXEL) / 1000.0
+
+
+def pd(rcs_dbsm, range_km):
+    """Errata 16 and eq. 7: SNR scales with RCS / R⁴ from 0.9114 for 1.76 dBsm at 6.91 km."""
+    snr = (math.log(0.05) / math.log(0.9114) - 1.0) * 10.0 ** ((rcs_dbsm - 1.76) / 10.0)
+    return 0.05 ** (1.0 / (1.0 + snr * (6.91 / range_km) ** 4))
+
+
+CLIMB = math.sin(1.4 * DEG)
+
+# item, start of the quantity, expected, absolute tolerance
+ROWS = [
+    ("fig-3.11", "area shown at relative heading 0°", 1.0, 1e-12),
+    ("fig-3.11", "area shown at relative heading 180°", 1.5, 1e-12),
+    ("fig-3.11", "area shown abeam", 1.25, 1e-12),
+    ("fig-4.2", "SNR for Pd 0.9, Swerling I", 10 * math.log10(math.log(0.05) / math.log(0.9) - 1),
+     1e-9),
+    # Swerling V at 0.05 and one pulse: the noncentral chi-square's root.
+    ("fig-4.2", "SNR for Pd 0.9, Swerling V", 8.012, 2e-3),
+    ("fig-4.2", "largest error of the lookup table, Swerling I", 0.0, 1e-6),
+    ("fig-4.2", "largest error of the Gram-Charlier", 0.022, 4e-3),
+    ("sec-4.1.1", "3.5 statute miles", 5.632704, 1e-9),
+    ("sec-4.1.1", "first detection of 5 m²", 6.48 - 0.025, 0.026),
+    ("sec-4.1.1", "Pd of 5 m² at 6.48 km, nautical", 0.9, 2e-4),
+    ("sec-4.1.1", "Pd of 5 m² at 6.48 km, flight test", pd(6.9897, 6.48), 1e-6),
+    ("sec-4.1.1", "range of Pd 0.9 for 5 m², specification", 5.6, 1e-6),
+    ("sec-4.1.1", "bandwidth, flight test", 486.0, 1.0),
+    ("sec-4.1.1", "bandwidth, specification", 4283.0, 2.0),
+    ("sec-4.1.1", "bandwidth, 3.5 nautical", 2386.0, 3.0),
+    ("fig-4.3", "Pd at 6.91 km", pd(1.76, 22.4 / 6 * 1.852), 1e-9),
+    ("fig-4.4", "Pd at 7.31 km", pd(3.01, 35.5 / 9 * 1.852), 1e-9),
+    ("fig-4.5", "Pd at 9.75 km", pd(6.99, 57.9 / 11 * 1.852), 1e-9),
+    ("fig-4.4", "Pd at 7.31 km", 0.9170, 5e-4),
+    ("fig-4.5", "Pd at 9.75 km", 0.896, 1e-3),
+    ("sec-4.1.3", "the same by one least-squares bandwidth, small", 0.9114 - 0.010, 1e-3),
+    ("sec-4.1.3", "the same by one least-squares bandwidth, medium", 0.9170 - 0.010, 1e-3),
+    ("sec-4.1.3", "the same by one least-squares bandwidth, large", 0.8668 + 0.018, 1e-3),
+    ("sec-4.1.3", "range at which the large class", 10.45, 5e-3),
+    ("sec-4.1.3", "RCS that has Pd 0.8668", 5.8, 0.05),
+    ("table-4.1", "RCS of the King Air", 6.99, 0.0),
+    ("table-4.2", "average of Table 4.2, small", 41.48 / 6, 1e-9),
+    ("table-4.2", "average of Table 4.2, medium", 65.73 / 9, 1e-9),
+    ("table-4.2", "average of Table 4.2, large", 107.22 / 11, 1e-9),
+    # A single look at 15 to 14.85 km has Pd 0.29, so the mean wait is a few scans of 150 m.
+    ("table-4.2", "simulated average of the first detection, small", 14.62, 0.12),
+    ("fig-4.8", "shown share at 0°, rotation about x", 42.0 / 132.0, 1e-9),
+    ("fig-4.8", "shown share at 0°, rotation about y", 12.0 / 132.0, 1e-9),
+    ("fig-4.9", "shown share at 0°, rotation about y", 7.0 / 277.0, 1e-9),
+    ("fig-4.10", "shown share at 90°, rotation about z", 340.0 / 740.0, 1e-9),
+    ("table-4.3", "mean error, Beech 99, rotation about x", 3.97, 0.01),
+    ("table-4.3", "maximum error, F-16, rotation about y", 22.56, 0.01),
+    ("eq-34", "error in range for +20 % area, detection at 6.28", 1e3 * eo_km(42.0) * 0.0954451,
+     1e-3),
+    ("eq-34", "error in range for +20 % area, smallest", 9.54451, 1e-4),
+    ("eq-34", "error in range for -20 % area", 10.55728, 1e-4),
+    ("eq-34", "denominator of eq. 34 at the threshold, smallest", 3.6, 1e-9),
+    ("eq-34", "denominator of eq. 34 at the threshold, largest", 27.0, 1e-9),
+    ("table-4.4", "Level head-on, King Air, thesis", 3.36, 5e-3),
+    ("table-4.4", "Level abeam, King Air, thesis", 6.28, 5e-3),
+    ("table-4.4", "Level head-on, Convair, thesis", 9.19, 5e-3),
+    ("table-4.4", "Ascending head-on, Convair, thesis", eo_km(90 + 250 * CLIMB), 1e-9),
+    ("table-4.4", "Ascending head-on, Convair, exact", eo_km(90 + 650 * CLIMB), 1e-9),
+    ("table-4.4", "Ascending head-on, King Air, thesis", eo_km(12 + 30 * CLIMB), 1e-9),
+    ("table-4.4", "contrast P that gives the literature, Level head-on, King Air", 3.985, 2e-3),
+    ("fig-4.11", "detection range tail-on, commercial transport", ir_km(65.0), 1e-9),
+    ("fig-4.11", "detection range abeam, commercial transport", ir_km(48.75 + 223.0), 1e-9),
+    ("fig-4.11", "detection range head-on, small fighter", ir_km(7.0), 1e-9),
+    ("fig-4.13", "detection range abeam, general aviation", ir_km(4.6 + 6.0), 1e-9),
+    ("fig-4.13", "abeam range, refined over first, general", math.sqrt(10.6 / 15.75), 1e-9),
+    ("fig-4.14", "share of fused detections with a range", 1.0, 0.0),
+    ("fig-4.14", "range within which the EO camera joins", 5.05, 0.1),
+    ("fig-4.17", "outermost detection to the right, radar", 109.3, 0.75),
+    ("fig-4.17", "outermost detection to the left, ir", 49.3, 0.75),
+    ("fig-4.19", "spacing of the reported azimuths at 2.5°", 2.5, 1e-6),
+    ("fig-4.20", "combinations of detection", 4.0, 0.0),
+    ("fig-4.20", "azimuth up to which both detect", 14.3, 0.8),
+    ("fig-4.21", "steps of the timed scene", 1800.0, 0.0),
+    ("fig-4.22", "share of IR detections fused", 0.5, 0.0),
+    ("fig-4.22", "IR detections", 60.0, 0.0),
+    ("table-2.4", "AFRL, pixels in azimuth", 6144.0, 0.0),
+    ("table-2.4", "AFRL, field of view in azimuth", 220.0, 1e-9),
+    ("table-2.4", "farthest EO detection of TECVOL", 2.9625, 0.0376),
+    # Navigation alone: bias 0.1°, noise 0.1°; the grid of 0.1° adds 0.1/sqrt(12).
+    ("table-2.4", "TECVOL, mean azimuth error, EO", 0.1, 0.015),
+    ("table-2.4", "TECVOL, standard deviation of the azimuth error, EO", 0.104, 0.006),
+    ("table-2.4", "range of Pd 0.9 for the small aircraft", 7.141, 2e-3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("item", "quantity", "expected", "tolerance"), ROWS, ids=lambda value: str(value)[:50]
+)
+def test_number(results, item, quantity, expected, tolerance):
+    found = [row for row in results[item].rows if row.quantity.startswith(quantity)]
+    assert found, [row.quantity for row in results[item].rows]
+    assert abs(found[0].ours - expected) <= tolerance * (1 + 1e-9), found[0].ours
+
+
+def test_angle_errors_stay_within_half_a_step_of_the_grid(results):
+    limits = {"radar alone": 0.5, "with EO": 0.5 * 220.0 / 6144.0}
+    checked = 0
+    for row in results["fig-4.14"].rows:
+        for who, limit in limits.items():
+            if row.quantity.startswith("largest") and row.quantity.endswith(who):
+                assert 0.7 * limit < row.ours <= limit + 1e-9
+                checked += 1
+    assert checked == 4
+
+
+def test_share_of_detections_scatters_about_pd(results):
+    (row,) = [r for r in results["fig-4.18"].rows if r.quantity.startswith("chi-square")]
+    assert 0.2 < row.ours < 2.1
+
+
+def test_every_row_is_computed_and_says_why(results):
+    for item, made in results.items():
+        quantities = [row.quantity for row in made.rows]
+        assert len(set(quantities)) == len(quantities), item
+        for row in made.rows:
+            assert math.isfinite(row.ours), (item, row.quantity)
+            assert row.why.endswith("."), (item, row.quantity)
+            status = row.status
+            assert status in ("agrees", "thesis gives no value") or (
+                status.startswith("differs, because ") and len(status) > 40
+            )
+
+
+def test_what_must_agree_agrees(results):
+    """Everything the thesis prints and computes rightly from what it prints."""
+    agreeing = {
+        (item, row.quantity)
+        for item, made in results.items()
+        for row in made.rows
+        if row.status == "agrees"
+    }
+    for item in ("fig-3.11", "fig-4.3", "fig-4.4", "table-4.1", "fig-4.14", "fig-4.17", "fig-4.22"):
+        silent = {
+            (item, row.quantity)
+            for row in results[item].rows
+            if row.status == "thesis gives no value"
+        }
+        assert {(item, row.quantity) for row in results[item].rows} <= agreeing | silent
+    printed = {q for item, q in agreeing if item == "table-4.4"}
+    assert printed == {
+        "Ascending head-on, Convair, thesis's eq. 9-13",
+        "Level abeam, King Air, thesis's eq. 9-13",
+        "Level head-on, King Air, thesis's eq. 9-13",
+        "Level head-on, Convair, thesis's eq. 9-13",
+    }
