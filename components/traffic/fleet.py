@@ -40,8 +40,8 @@ class ScriptedFleet:
     """
 
     def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
-        self.trajectories = list(trajectories)
-        self.names = [trajectory.name for trajectory in self.trajectories]
+        self._everyone = list(trajectories)
+        self._columns = np.arange(len(self._everyone))
         kinds = [t.segments[0].kind if len(t.segments) == 1 else "" for t in self.trajectories]
         self._groups = [
             _Group([i for i, k in enumerate(kinds) if k == kind], self.trajectories, formula)
@@ -54,6 +54,16 @@ class ScriptedFleet:
         self._legs: LegTable | None = None
         self._place_in_legs = np.arange(len(self.trajectories))
 
+    @property
+    def trajectories(self) -> list[ScriptedTrajectory]:
+        """The aircraft, in order."""
+        return [self._everyone[i] for i in self._columns.tolist()]
+
+    @property
+    def names(self) -> list[str]:
+        """Their names."""
+        return [trajectory.name for trajectory in self.trajectories]
+
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some aircraft, without preparing them anew.
 
@@ -63,8 +73,7 @@ class ScriptedFleet:
             Indices into the aircraft, ascending.
         """
         fleet = copy(self)
-        fleet.trajectories = [self.trajectories[i] for i in columns.tolist()]
-        fleet.names = [trajectory.name for trajectory in fleet.trajectories]
+        fleet._columns = self._columns[columns]
         parts = [group.subset(columns) for group in self._groups]
         fleet._groups = [part for part in parts if part is not None]
         fleet._others = np.flatnonzero(np.isin(columns, self._others))
@@ -86,7 +95,7 @@ class ScriptedFleet:
             Arrays of shape (S, T), aircraft in the order given.
         """
         times = _times(time_s)
-        state = _empty_state(len(times), len(self.trajectories))
+        state = _empty_state(len(times), len(self._columns))
         for group in self._groups:
             group.fill(state, times)
         if len(self._others):
