@@ -80,9 +80,11 @@ def chosen(names: Sequence[str]) -> list[Case]:
     return [known[name] for name in names] if names else list(CASES)
 
 
-def scene_of(case: Case, *, quick: bool, duration_s: str | None = None) -> Scene:
-    """Load a case's scene, perhaps shortened."""
-    sets = case.quick if quick else ()
+def scene_of(
+    case: Case, *, quick: bool, duration_s: str | None = None, sets: tuple[str, ...] = ()
+) -> Scene:
+    """Load a case's scene, perhaps shortened or changed."""
+    sets = (*case.quick, *sets) if quick else sets
     return load_scene(SCENES / f"{case.name}.toml", sets=sets, duration_s=duration_s)
 
 
