@@ -146,7 +146,20 @@ def load_scene(
     SceneError
         With every problem found.
     """
-    scene_file = read_scene_file(path)
+    return load_tables(
+        read_scene_file(path), sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
+    )
+
+
+def load_tables(
+    scene_file: SceneFile,
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+    duration_s: object = None,
+) -> Scene:
+    """Override and check tables that were read; see `load_scene`."""
     problems: list[Problem] = []
     dropped: list[str] = []
     for swap in swaps:
