@@ -18,11 +18,15 @@ from dsa_des.types import FloatArray, IntArray
 UInt32Array = npt.NDArray[np.uint32]
 UInt64Array = npt.NDArray[np.uint64]
 
-_M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
-_W0, _W1 = 0x9E3779B9, 0xBB67AE85
+_ROUNDS = 10
 _LOW = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
-_ROUNDS = 10
+# Words 2 and 0 of a counter are multiplied, words 1 and 3 are not: lanes in this order.
+_MULTIPLIERS = np.array([0xCD9E8D57, 0xD2511F53], dtype=np.uint64)
+_BUMPS = np.array(
+    [[n * 0x9E3779B9 & 0xFFFFFFFF, n * 0xBB67AE85 & 0xFFFFFFFF] for n in range(_ROUNDS)],
+    dtype=np.uint64,
+)
 
 
 def philox4x32(
@@ -44,20 +48,32 @@ def philox4x32(
     -----
     Checked against the known-answer vectors published with the Random123 library.
     """
-    x0, x1, x2, x3 = (np.asarray(word, dtype=np.uint64) for word in counter)
-    k0, k1 = (np.asarray(word, dtype=np.uint64) for word in key)
+    k = _lanes(*key)
+    x0, x1, x2, x3 = np.broadcast_arrays(*counter, k[0])[:4] if k.ndim > 1 else counter
+    multiplied, other = _lanes(x2, x0), _lanes(x1, x3)
+    column = (-1,) + (1,) * (multiplied.ndim - 1)
+    multipliers = _MULTIPLIERS.reshape(column)
+    keys = (k + _BUMPS.reshape(_ROUNDS, 2, *(1,) * (k.ndim - 1))) & _LOW
+    if k.ndim == 1:
+        keys = keys.reshape(_ROUNDS, *column)
     for round_number in range(_ROUNDS):
-        bump0 = np.uint64(round_number * _W0 & 0xFFFFFFFF)
-        bump1 = np.uint64(round_number * _W1 & 0xFFFFFFFF)
-        product0 = x0 * _M0
-        product1 = x2 * _M1
-        x0, x1, x2, x3 = (
-            (product1 >> _32) ^ x1 ^ ((k0 + bump0) & _LOW),
-            product1 & _LOW,
-            (product0 >> _32) ^ x3 ^ ((k1 + bump1) & _LOW),
-            product0 & _LOW,
-        )
-    return x0, x1, x2, x3
+        product = multiplied * multipliers
+        # Words 0 and 2 of the next counter; the low halves become words 1 and 3.
+        mixed = product >> _32
+        mixed ^= other
+        mixed ^= keys[round_number]
+        product &= _LOW
+        multiplied, other = mixed[::-1], product
+    return multiplied[1], other[0], multiplied[0], other[1]
+
+
+def _lanes(first: npt.ArrayLike, second: npt.ArrayLike) -> UInt64Array:
+    """Return two words as one array, (2, ...)."""
+    a, b = np.asarray(first, dtype=np.uint64), np.asarray(second, dtype=np.uint64)
+    shape = a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape)
+    lanes = np.empty((2, *shape), dtype=np.uint64)
+    lanes[0], lanes[1] = a, b
+    return lanes
 
 
 def key_of(*parts: object) -> int:

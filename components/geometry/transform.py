@@ -5,6 +5,7 @@ range in the ownship's NED frame, the same line of sight in its body axes (the t
 and the target's attitude relative to that line of sight.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
@@ -12,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
-from components.geometry.angles import wrap_pi
+from components.geometry.angles import wrap_pi_unchecked
 from components.geometry.attitude import sensor_angles
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
@@ -80,7 +81,10 @@ class Transform(Component):
             states.own_pitch_rad[:, np.newaxis],
             states.own_roll_rad[:, np.newaxis],
             model=self.p.attitude,
+            validate=False,
         )
+        heading = wrap_pi_unchecked(states.yaw_rad - azimuth)
+        _require_numbers(p, heading, states.pitch_rad, states.roll_rad)
         return RelativeTargets(
             tick=states.tick,
             azimuth_rad=azimuth,
@@ -88,7 +92,7 @@ class Transform(Component):
             range_m=range_m,
             body_azimuth_rad=p,
             body_elevation_rad=q,
-            relative_heading_rad=wrap_pi(states.yaw_rad - azimuth),
+            relative_heading_rad=heading,
             target_pitch_rad=states.pitch_rad,
             target_roll_rad=states.roll_rad,
             own_alt_m=states.own_alt_m,
@@ -104,6 +108,13 @@ class Transform(Component):
         for belief in self._beliefs:
             return belief(states)
         return None
+
+
+def _require_numbers(*angles: FloatArray) -> None:
+    """Refuse what is not a finite number, here for all blocks downstream."""
+    # A sum is finite only if all of it is; it stands for whatever the angles came from.
+    if not math.isfinite(sum(float(angle.sum()) for angle in angles)):
+        raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 
 class FlatEarth(Transform):
