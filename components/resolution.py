@@ -111,6 +111,7 @@ class Grid:
     ) -> None:
         round_to_grid(0.0, step, limit_low=limit_low, limit_high=limit_high)  # checks them
         self.step = float(step)
+        self._countable = min(self.step, 1e200) / _COUNTABLE
         self._lowest = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
         self._highest = None if limit_high is None else _outermost(np.float64(limit_high), step)
 
@@ -127,14 +128,14 @@ class Grid:
         else:
             size = np.abs(values)
             # NaN, and what cannot be counted in steps, take the general way.
-            simple = size.size and float(size.max()) * _COUNTABLE < min(self.step, 1e200)
+            simple = size.size and float(size.max()) < self._countable
             result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
             np.copysign(result, values, out=result)
         if self._highest is not None:
             result = np.minimum(result, self._highest)
         if self._lowest is not None:
             result = np.maximum(result, self._lowest)
-        return np.asarray(result + 0.0)  # adding 0 turns -0 into 0
+        return result + 0.0  # adding 0 turns -0 into 0
 
 
 def _finite(name: str, value: ArrayLike) -> Any:

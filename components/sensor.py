@@ -72,16 +72,19 @@ class Cells:
     ) -> None:
         self._targets = targets
         self.roster = targets.roster
-        place = np.flatnonzero(wanted)
+        place = wanted.ravel().nonzero()[0]
         width = max(1, wanted.shape[1])
         #: Index of each cell's scan within this look, and of its target in the roster.
         self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
-        self._flat = rows[self.row] * width + self.target
+        # Rows that only rise and are as many as there are, are all of them.
+        self._everything = len(place) == targets.range_m.size and (
+            len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
+        )
+        self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
-        self._everything = len(place) == targets.range_m.size
         self._gathered: dict[str, AnyArray] = {}
 
     def __len__(self) -> int:
@@ -188,8 +191,9 @@ class Sensor(Component):
         look = self.look(cells)
         for judge in self._judgements:
             look = judge(cells, look)
-        found = np.flatnonzero(look.detected)
-        per_scan = np.bincount(cells.row[found], minlength=len(wake))
+        found = look.detected.nonzero()[0]
+        offsets = np.zeros(len(wake) + 1, dtype=np.int64)
+        np.bincount(cells.row[found], minlength=len(wake)).cumsum(out=offsets[1:])
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
         azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
@@ -199,7 +203,7 @@ class Sensor(Component):
             scan=wake.scans,
             evaluated=wanted.sum(axis=1),
             skipped=_skipped(reason, len(targets.roster)),
-            offsets=np.concatenate(([0], np.cumsum(per_scan))),
+            offsets=offsets,
             target=cells.target[found],
             azimuth_rad=azimuth,
             elevation_rad=elevation,
@@ -287,6 +291,11 @@ class Sensor(Component):
 
 
 def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:
+    if len(reason) == 1:
+        count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
+        skipped = {name: count[code : code + 1] for name, code in SKIP_REASONS.items()}
+        skipped[CULLED] = np.array([everybody - reason.shape[1]])
+        return skipped
     skipped = {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}
     skipped[CULLED] = np.full(len(reason), everybody - reason.shape[1])
     return skipped

@@ -63,6 +63,7 @@ class ElectroOptical(Camera):
             side_m2=cells.of_target(cells.roster.column("eo.side_m2")),
             horizontal_m2=cells.of_target(cells.roster.column("eo.horizontal_m2")),
             model=self.p.silhouette,
+            validate=False,
         )
 
     def contrast(self, cells: Cells) -> FloatArray:

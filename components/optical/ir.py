@@ -42,6 +42,7 @@ class Infrared(Camera):
             side_m2=cells.of_target(cells.roster.column("ir.side_m2")),
             horizontal_m2=cells.of_target(cells.roster.column("ir.horizontal_m2")),
             model=self.p.silhouette,
+            validate=False,
         )
         return np.asarray(area)
 
