@@ -290,6 +290,7 @@ class HostDriven:
         for runner in self._runners:
             triggered = False
             complete = True
+            waiting = False
             held: dict[str, tuple[Any, IntArray]] = {}
             for port in runner.ports:
                 new = sent.get(port.sender)
@@ -299,6 +300,7 @@ class HostDriven:
                         port.held = new
                     else:
                         port.waiting.append((tick, new))
+                waiting = waiting or bool(port.waiting)
                 if port.held is not None:
                     rows = _FIRST_ROW if len(port.held) == 1 else np.array([len(port.held) - 1])
                     held[port.name] = (port.held, rows)
@@ -312,7 +314,7 @@ class HostDriven:
                 _NO_SCAN if scan is None else np.array([scan], dtype=np.int64),
                 self.ticks_per_s,
                 held,
-                _collected(runner.ports),
+                _collected(runner.ports) if waiting else {},
                 {name: _FIRST_ROW if name in scans else _NO_ROW for name in runner.demands},
             )
             try:

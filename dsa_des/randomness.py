@@ -18,15 +18,14 @@ from dsa_des.types import FloatArray, IntArray
 UInt32Array = npt.NDArray[np.uint32]
 UInt64Array = npt.NDArray[np.uint64]
 
-_ROUNDS = 10
-_LOW = np.uint64(0xFFFFFFFF)
-_32 = np.uint64(32)
-# Words 2 and 0 of a counter are multiplied, words 1 and 3 are not: lanes in this order.
-_MULTIPLIERS = np.array([0xCD9E8D57, 0xD2511F53], dtype=np.uint64)
-_BUMPS = np.array(
-    [[n * 0x9E3779B9 & 0xFFFFFFFF, n * 0xBB67AE85 & 0xFFFFFFFF] for n in range(_ROUNDS)],
-    dtype=np.uint64,
-)
+_M0, _M1 = 0xD2511F53, 0xCD9E8D57
+_LOW = 0xFFFFFFFF
+#: What each of the ten rounds adds to the key.
+_BUMPS = [(n * 0x9E3779B9 & _LOW, n * 0xBB67AE85 & _LOW) for n in range(10)]
+_U_LOW, _U32 = np.uint64(_LOW), np.uint64(32)
+
+# Up to this many draws Python's integers take less time than the calls of NumPy do.
+_FEW = 12
 
 
 def philox4x32(
@@ -48,32 +47,28 @@ def philox4x32(
     -----
     Checked against the known-answer vectors published with the Random123 library.
     """
-    k = _lanes(*key)
-    x0, x1, x2, x3 = np.broadcast_arrays(*counter, k[0])[:4] if k.ndim > 1 else counter
-    multiplied, other = _lanes(x2, x0), _lanes(x1, x3)
-    column = (-1,) + (1,) * (multiplied.ndim - 1)
-    multipliers = _MULTIPLIERS.reshape(column)
-    keys = (k + _BUMPS.reshape(_ROUNDS, 2, *(1,) * (k.ndim - 1))) & _LOW
-    if k.ndim == 1:
-        keys = keys.reshape(_ROUNDS, *column)
-    for round_number in range(_ROUNDS):
-        product = multiplied * multipliers
-        # Words 0 and 2 of the next counter; the low halves become words 1 and 3.
-        mixed = product >> _32
-        mixed ^= other
-        mixed ^= keys[round_number]
-        product &= _LOW
-        multiplied, other = mixed[::-1], product
-    return multiplied[1], other[0], multiplied[0], other[1]
+    x0, x1, x2, x3 = (np.asarray(word, dtype=np.uint64) for word in counter)
+    k0, k1 = (np.asarray(word, dtype=np.uint64) for word in key)
+    constants = np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32
+    bumps = [(np.uint64(first), np.uint64(second)) for first, second in _BUMPS]
+    return _ten_rounds(x0, x1, x2, x3, k0, k1, bumps, *constants)
 
 
-def _lanes(first: npt.ArrayLike, second: npt.ArrayLike) -> UInt64Array:
-    """Return two words as one array, (2, ...)."""
-    a, b = np.asarray(first, dtype=np.uint64), np.asarray(second, dtype=np.uint64)
-    shape = a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape)
-    lanes = np.empty((2, *shape), dtype=np.uint64)
-    lanes[0], lanes[1] = a, b
-    return lanes
+def _ten_rounds(
+    x0: Any, x1: Any, x2: Any, x3: Any, k0: Any, k1: Any, bumps: Any,
+    m0: Any = _M0, m1: Any = _M1, low: Any = _LOW, half: Any = 32,
+) -> Any:  # fmt: skip
+    """The generator itself, for arrays of uint64 or for Python's integers."""
+    for bump0, bump1 in bumps:
+        product0 = x0 * m0
+        product1 = x2 * m1
+        x0, x1, x2, x3 = (
+            (product1 >> half) ^ x1 ^ ((k0 + bump0) & low),
+            product1 & low,
+            (product0 >> half) ^ x3 ^ ((k1 + bump1) & low),
+            product0 & low,
+        )
+    return x0, x1, x2, x3
 
 
 def key_of(*parts: object) -> int:
@@ -111,13 +106,23 @@ class Stream:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
         target = np.asarray(targets, dtype=np.uint64)
         key, numbers = self._key_and_scan(np.asarray(scans, dtype=np.int64))
-        scan = numbers.astype(np.uint64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
+        few = target.shape == numbers.shape and 0 < target.size <= _FEW and target.ndim == 1
+        if few and isinstance(key[0], int):
+            words = [
+                _ten_rounds(
+                    draw | ((s >> 32) & 0xFFFF) << 16, s & _LOW, t & _LOW, t >> 32, *key, _BUMPS
+                )
+                for t, s in zip(target.tolist(), numbers.tolist(), strict=True)
+            ]
+            w0, w1, w2, w3 = np.array(words, dtype=np.uint64).T
+            return w0, w1, w2, w3
+        scan = numbers.astype(np.uint64)
         counter = (
-            np.uint64(draw) | ((scan >> _32) & np.uint64(0xFFFF)) << np.uint64(16),
-            scan & _LOW,
-            target & _LOW,
-            target >> _32,
+            np.uint64(draw) | ((scan >> _U32) & np.uint64(0xFFFF)) << np.uint64(16),
+            scan & _U_LOW,
+            target & _U_LOW,
+            target >> _U32,
         )
         return philox4x32(counter, key)
 

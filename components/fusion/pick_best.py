@@ -16,6 +16,13 @@ from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals, Wake
 
 
+#: What the sensor that gives the angles also says, and all numbers of a fused row.
+_ANGLES = (
+    "azimuth_rad", "elevation_rad", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+)  # fmt: skip
+_VALUES = (*_ANGLES, "range_m")
+
+
 class PickBestParameters(Parameters):
     """Parameters of pick-best fusion."""
 
@@ -72,10 +79,11 @@ class PickBest(Component):
         reported = {new.source: new for new in wake.arrivals("detections")}
         if not reported:
             return None
-        arrivals = {
-            name: Arrivals(name, new.tick, true_entries(new.message))
-            for name, new in reported.items()
-        }
+        arrivals = reported
+        true = {name: true_entries(new.message) for name, new in reported.items()}
+        all_true = all(true[name] is new.message for name, new in reported.items())
+        if not all_true:
+            arrivals = {n: Arrivals(n, new.tick, true[n]) for n, new in reported.items()}
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
@@ -92,6 +100,8 @@ class PickBest(Component):
                 name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
             }
         fused = self._combine(wake.ticks, row, target, arrivals, entries)
+        if all_true:
+            return fused
         return pass_false_alarms(fused, reported, [self.sensors[i] for i in self._by_range])
 
     def _with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
@@ -121,33 +131,19 @@ class PickBest(Component):
         contributors = np.zeros(count, dtype=np.int64)
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
-        values = {
-            name: np.full(count, np.nan)
-            for name in (
-                "azimuth_rad",
-                "elevation_rad",
-                "range_m",
-                "true_azimuth_rad",
-                "true_elevation_rad",
-                "true_range_m",
-            )
-        }
+        values = dict(zip(_VALUES, np.full((len(_VALUES), count), np.nan), strict=True))
+        found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self._by_angles:
             name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                contributors[found] |= 1 << index
-                angle_source[found] = index
-                for column in ("azimuth_rad", "elevation_rad"):
-                    _copy(values, column, found, arrivals[name], entries[name])
-                    _copy(values, f"true_{column}", found, arrivals[name], entries[name])
-                _copy(values, "true_range_m", found, arrivals[name], entries[name])
+            if name in found and len(found[name]):
+                contributors[found[name]] |= 1 << index
+                angle_source[found[name]] = index
+                _copy(values, _ANGLES, found[name], arrivals[name], entries[name])
         for index in self._by_range:
             name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                range_source[found] = index
-                _copy(values, "range_m", found, arrivals[name], entries[name])
+            if name in found and len(found[name]):
+                range_source[found[name]] = index
+                _copy(values, ("range_m",), found[name], arrivals[name], entries[name])
         return FusedDetections(
             tick=ticks,
             offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
@@ -163,12 +159,20 @@ class PickBest(Component):
 
 def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
+    if len(ticks) == 1:
+        return new.message.target
     row = np.searchsorted(ticks, new.tick)
     offsets = new.message.offsets
     return np.repeat(row, np.diff(offsets)) * width + new.message.target
 
 
 def _copy(
-    values: dict[str, FloatArray], column: str, at: IntArray, new: Arrivals, entry: IntArray
+    values: dict[str, FloatArray],
+    columns: tuple[str, ...],
+    at: IntArray,
+    new: Arrivals,
+    entry: IntArray,
 ) -> None:
-    values[column][at] = getattr(new.message, column)[entry[at]]
+    chosen = entry[at]
+    for column in columns:
+        values[column][at] = getattr(new.message, column)[chosen]

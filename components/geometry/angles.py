@@ -120,7 +120,11 @@ def longitude_difference_deg(
 
 def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArray:
     """Give the double nearest to lon2 - lon1 in [-180, 180), for checked arrays of one axis up."""
-    return _add_wrapped(*_two_difference(_reduced(lon1), _reduced(lon2)))[0]
+    total, low = _two_difference(lon1, lon2)
+    # The two-sum is exact for any size; only whole turns of an absurd total are not.
+    if total.size and max(total.max(), -total.min()) > _LARGE_LONGITUDE_DEG:
+        total, low = _two_difference(_reduced(lon1), _reduced(lon2))
+    return _add_wrapped(total, low)[0]
 
 
 def _longitude_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -130,7 +130,9 @@ def positions(
         "alt_m": contiguous("alt_m", alt_m),
     }
     shape = named["alt_m"].shape
-    if any(array.shape != shape for array in named.values()):
+    # One observer for all targets of a row is what every scan has.
+    column = (*shape[:-1], 1) if len(shape) > 1 else shape
+    if any(array.shape != shape and array.shape != column for array in named.values()):
         shape = common_shape(**named)
     if validate:
         for name, array in named.items():

@@ -65,10 +65,11 @@ class Transform(Component):
         states = wake["states"]
         if states is None:
             return None
+        own_lat, own_lon, own_alt, own_yaw, own_pitch, own_roll = _beside_targets(states)
         azimuth, elevation, range_m = type(self).line_of_sight(
-            states.own_lat_deg[:, np.newaxis],
-            states.own_lon_deg[:, np.newaxis],
-            states.own_alt_m[:, np.newaxis],
+            own_lat,
+            own_lon,
+            own_alt,
             states.lat_deg,
             states.lon_deg,
             states.alt_m,
@@ -77,9 +78,9 @@ class Transform(Component):
         p, q = sensor_angles(
             azimuth,
             elevation,
-            states.own_yaw_rad[:, np.newaxis],
-            states.own_pitch_rad[:, np.newaxis],
-            states.own_roll_rad[:, np.newaxis],
+            own_yaw,
+            own_pitch,
+            own_roll,
             model=self.p.attitude,
             validate=False,
         )
@@ -108,6 +109,21 @@ class Transform(Component):
         for belief in self._beliefs:
             return belief(states)
         return None
+
+
+def _beside_targets(states: TrafficStates) -> list[FloatArray]:
+    """Return the ownship's position and attitude, broadcastable to the targets'."""
+    own = (
+        states.own_lat_deg, states.own_lon_deg, states.own_alt_m,
+        states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad,
+    )  # fmt: skip
+    if len(states) > 1:
+        return [values[:, np.newaxis] for values in own]
+    # Of a single row, arrays of the targets' own shape take NumPy half as long as broadcast ones.
+    wide = np.empty((6, *states.lat_deg.shape))
+    for row, values in zip(wide, own, strict=True):
+        row[...] = values
+    return list(wide)
 
 
 def _require_numbers(*angles: FloatArray) -> None:
