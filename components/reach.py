@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
@@ -17,6 +17,7 @@ ReasonArray = npt.NDArray[np.uint8]
 #: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
 EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
 SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+_field_of_view = lru_cache(maxsize=256)(FieldOfView)
 _EVALUATE, _FIELD_OF_VIEW = np.uint8(EVALUATE), np.uint8(FIELD_OF_VIEW)
 #: Targets that were not even moved, because no sensor could have looked at them.
 CULLED = "culled"
@@ -42,7 +43,7 @@ class Reach:
 
     @cached_property
     def _field(self) -> FieldOfView:
-        return FieldOfView(self.azimuth_rad, self.elevation_rad)
+        return _field_of_view(self.azimuth_rad, self.elevation_rad)
 
     def decide(
         self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray

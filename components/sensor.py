@@ -7,7 +7,7 @@ engine's business.
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -117,6 +117,9 @@ class Cells:
 SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
 
 _BODY_AXES = BodyAxes()
+
+# Grids are the same in every run of a scene: they are made once.
+_grid = lru_cache(maxsize=256)(Grid)
 
 
 class Sensor(Component):
@@ -260,11 +263,11 @@ class Sensor(Component):
     @cached_property
     def _elevation_grid(self) -> Grid:
         low, high = self.reach.elevation_rad
-        return Grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+        return _grid(self.elevation_step_rad, limit_low=low, limit_high=high)
 
     @cached_property
     def _range_grid(self) -> Grid:
-        return Grid(self.range_step_m, limit_low=0.0)
+        return _grid(self.range_step_m, limit_low=0.0)
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
@@ -276,8 +279,8 @@ class Sensor(Component):
     def _azimuth_grid(self) -> Grid:
         low, high = self._azimuth_sector
         if high - low >= 2.0 * math.pi:
-            return Grid(self.azimuth_step_rad)
-        return Grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
+            return _grid(self.azimuth_step_rad)
+        return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
     def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
         low, high = self._azimuth_sector

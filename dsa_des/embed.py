@@ -160,7 +160,8 @@ class HostDriven:
         self.simulation = Simulation(scene)
         self.ticks_per_s = scene.ticks_per_s
         self.components = self.simulation.components
-        self._last_tick = -1
+        #: Tick of the last call, -1 before the first.
+        self.last_tick = -1
         self._runners = self._make_runners()
         self._cursors = {r.name: r.cursor for r in self._runners if r.cursor is not None}
         self._source_key = (source, next(iter(self.components[source].outputs)))
@@ -233,7 +234,10 @@ class HostDriven:
         after_s : time, optional
             By default the last call's; before the first call, the very first scan.
         """
-        after = self._last_tick if after_s is None else self.tick_of(after_s)
+        return self.scan_after(self.last_tick if after_s is None else self.tick_of(after_s))
+
+    def scan_after(self, after: int) -> float:
+        """Return the same for a tick."""
         return min(cursor.after(after) for cursor in self._cursors.values()) / self.ticks_per_s
 
     def due(self, tick: int) -> Step:
@@ -248,15 +252,15 @@ class HostDriven:
         ValueError
             If `tick` lies before the last call's.
         """
-        if tick < self._last_tick:
+        if tick < self.last_tick:
             raise ValueError(
                 f"time_s is {tick / self.ticks_per_s:g}: it must not go back, the last call was at "
-                f"{self._last_tick / self.ticks_per_s:g}"
+                f"{self.last_tick / self.ticks_per_s:g}"
             )
-        if self._last_tick < 0 < tick:
+        if self.last_tick < 0 < tick:
             for cursor in self._cursors.values():
                 cursor.seek(tick)
-        self._last_tick = tick
+        self.last_tick = tick
         scans: dict[str, int] = {}
         missed: dict[str, int] = {}
         for name, cursor in self._cursors.items():

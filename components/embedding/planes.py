@@ -119,14 +119,19 @@ def _rows(label: str, value: ArrayLike) -> FloatArray:
     return rows
 
 
-def number_of(plane: str, names: list[str]) -> int:
-    """Return the number of a plane by its name.
+def number_of(plane: str | int, names: tuple[str, ...]) -> int:
+    """Return the number of a plane by its name or its number.
 
     Raises
     ------
     ValueError
-        If there is none of this name.
+        If there is none of this name or number.
     """
-    if plane not in names:
-        raise ValueError(f"there is no plane {plane!r}{did_you_mean(str(plane), names)}")
-    return names.index(plane)
+    if isinstance(plane, str):
+        if plane not in names:
+            raise ValueError(f"there is no plane {plane!r}{did_you_mean(plane, names)}")
+        return names.index(plane)
+    number = int(plane)
+    if not 0 <= number < len(names):
+        raise ValueError(f"plane is {plane}: it must be a name or from 0 to {len(names) - 1}")
+    return number

@@ -170,7 +170,9 @@ class Simulator:
         after_s : float, optional
             By default the time of the last call; before the first, the scene's start, included.
         """
-        return (self._chains[-1] if self._chains else self._clocks).next_scan_s(after_s)
+        if after_s is not None or not self._chains:
+            return self._clocks.next_scan_s(after_s)
+        return self._clocks.scan_after(max(chain.last_tick for chain in self._chains))
 
     def simulate(
         self,
@@ -218,7 +220,7 @@ class Simulator:
             chain, chosen = self._chains[0], None
             free = self._free
         else:
-            number = plane if isinstance(plane, int) else number_of(plane, list(self.planes))
+            number = number_of(plane, self.planes)
             chain, chosen = self._chains[number], [number]
             free = [] if number in self._fixed else [number]
         moved = checked_rows("intruder", lla_intruder, att_intruder, len(free))
