@@ -75,7 +75,10 @@ class Cells:
         place = wanted.ravel().nonzero()[0]
         width = max(1, wanted.shape[1])
         #: Index of each cell's scan within this look, and of its target in the roster.
-        self.row, self.target = np.divmod(place, width)
+        if len(rows) == 1:
+            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
+        else:
+            self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
@@ -195,17 +198,24 @@ class Sensor(Component):
         for judge in self._judgements:
             look = judge(cells, look)
         found = look.detected.nonzero()[0]
-        offsets = np.zeros(len(wake) + 1, dtype=np.int64)
-        np.bincount(cells.row[found], minlength=len(wake)).cumsum(out=offsets[1:])
+        evaluated, skipped = _counted(reason, len(targets.roster))
+        if len(wake) == 1:
+            offsets = np.array([0, len(found)], dtype=np.int64)
+        else:
+            offsets = np.zeros(len(wake) + 1, dtype=np.int64)
+            np.bincount(cells.row[found], minlength=len(wake)).cumsum(out=offsets[1:])
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
-        azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
-        azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        if len(found):
+            azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
+            azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        else:
+            azimuth, elevation, range_m = p, q, r
         detections = Detections(
             tick=wake.ticks,
             scan=wake.scans,
-            evaluated=wanted.sum(axis=1),
-            skipped=_skipped(reason, len(targets.roster)),
+            evaluated=evaluated,
+            skipped=skipped,
             offsets=offsets,
             target=cells.target[found],
             azimuth_rad=azimuth,
@@ -234,6 +244,8 @@ class Sensor(Component):
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
             decision = targets.decisions[self.name]
             place = decision.place[rows]
+            if len(place) == 1 == len(decision.reason) and place[0] == 0:
+                return rows, decision.reason
             if place.min(initial=0) >= 0:
                 if len(place) == len(decision.reason) and place[0] == 0:
                     return rows, decision.reason
@@ -293,12 +305,13 @@ class Sensor(Component):
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
-def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:
-    if len(reason) == 1:
+def _counted(reason: ReasonArray, everybody: int) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return how many targets were evaluated at each scan, and skipped by reason."""
+    if len(reason) == 1:  # one pass instead of one for each reason
         count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
-        skipped = {name: count[code : code + 1] for name, code in SKIP_REASONS.items()}
-        skipped[CULLED] = np.array([everybody - reason.shape[1]])
-        return skipped
-    skipped = {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}
+        of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
+    else:
+        of = {code: (reason == code).sum(axis=1) for code in (EVALUATE, *SKIP_REASONS.values())}
+    skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     skipped[CULLED] = np.full(len(reason), everybody - reason.shape[1])
-    return skipped
+    return of[EVALUATE], skipped

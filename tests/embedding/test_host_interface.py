@@ -38,7 +38,7 @@ def test_one_plane_dead_ahead(simulator):
     azimuth, elevation, range_m = result.detected[0]
     assert abs(azimuth) < 0.01 and abs(elevation) < 0.01
     # Meridian radius of the ellipsoid at this latitude, and 1 km of height: 6,375 km.
-    assert range_m == pytest.approx(5e-5 * 6_375_000, abs=8)  # half a step of its range
+    assert range_m == pytest.approx(5e-5 * 6_375_000, abs=76.2 / 2)  # half a step
     assert sighting.polar == tuple(result.detected[0])
     assert sighting.confidence["radar"] > 20  # dB
 
