@@ -55,7 +55,7 @@ class ScanCursor:
         """Make the first scan at or after `tick` the next one."""
         # Jitter moves a scan by less than half a period off its grid.
         scan = max(0, self.clock.first_scan_at_or_after(tick) - 1)
-        while (at := self._tick(scan)) < tick:
+        while (at := self.clock.tick_of(scan)) < tick:
             scan += 1
         self.scan, self.tick = scan, at
 
@@ -64,7 +64,7 @@ class ScanCursor:
         if tick < self.tick:
             return None
         first = self.scan
-        self.scan, self.tick = first + 1, self._tick(first + 1)
+        self.scan, self.tick = first + 1, self.clock.tick_of(first + 1)
         if self.tick <= tick:
             self.seek(tick + 1)
         return self.scan - 1, self.scan - 1 - first
@@ -76,9 +76,6 @@ class ScanCursor:
         ahead = ScanCursor(self.clock)
         ahead.seek(tick + 1)
         return ahead.tick
-
-    def _tick(self, scan: int) -> int:
-        return int(self.clock.ticks(np.array([scan], dtype=np.int64))[0])
 
 
 @dataclass
@@ -129,7 +126,7 @@ class _Runner:
         self.name = component.name
         self.component = component
         self.cursor = cursor
-        self.demands = demands
+        self.demands = dict.fromkeys(demands, _NO_ROW)
         self.ports: list[_Port] = []
         self.only_output = next(iter(component.outputs)) if len(component.outputs) == 1 else None
 
@@ -319,7 +316,8 @@ class HostDriven:
                 self.ticks_per_s,
                 held,
                 _collected(runner.ports) if waiting else {},
-                {name: _FIRST_ROW if name in scans else _NO_ROW for name in runner.demands},
+                runner.demands
+                and {name: _FIRST_ROW if name in scans else _NO_ROW for name in runner.demands},
             )
             try:
                 result = runner.component.run(wake)
@@ -348,9 +346,12 @@ def _collected(ports: list[_Port]) -> dict[str, list[Arrivals]]:
         if not port.waiting:
             continue
         messages = [message for _, message in port.waiting]
-        ticks = [np.full(len(message), tick, dtype=np.int64) for tick, message in port.waiting]
-        joined = messages[0] if len(messages) == 1 else type(messages[0]).concatenate(messages)
-        arrivals = Arrivals(port.sender[0], np.concatenate(ticks), joined)
+        ticks = [np.array([tick] * len(message)) for tick, message in port.waiting]
+        if len(messages) == 1:
+            arrivals = Arrivals(port.sender[0], ticks[0], messages[0])
+        else:
+            joined = type(messages[0]).concatenate(messages)
+            arrivals = Arrivals(port.sender[0], np.concatenate(ticks), joined)
         arrived.setdefault(port.name, []).append(arrivals)
         port.waiting.clear()
     return arrived

@@ -77,9 +77,11 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned = np.where(angle < 0.0, angle + TWO_PI, angle)
+    turned = angle + 0.0
+    np.add(angle, TWO_PI, out=turned, where=angle < 0.0)
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
-    return np.where(turned >= TWO_PI, 0.0, turned) + 0.0
+    turned[turned >= TWO_PI] = 0.0
+    return turned
 
 
 def longitude_difference_deg(

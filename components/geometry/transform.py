@@ -129,7 +129,7 @@ def _beside_targets(states: TrafficStates) -> list[FloatArray]:
 def _require_numbers(*angles: FloatArray) -> None:
     """Refuse what is not a finite number, here for all blocks downstream."""
     # A sum is finite only if all of it is; it stands for whatever the angles came from.
-    if not math.isfinite(sum(float(angle.sum()) for angle in angles)):
+    if not math.isfinite((angles[0] + angles[1] + angles[2] + angles[3]).sum()):
         raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 
