@@ -145,7 +145,6 @@ class Grid:
             result = np.maximum(result, self._lowest)
         return result + 0.0  # adding 0 turns -0 into 0
 
-
     def _round_one(self, value: float) -> float:
         """Round one value with the floating-point steps of `_nearest_countable`."""
         size = abs(value)

@@ -209,7 +209,9 @@ class HostDriven:
                 raise ValueError(f"time_s is {time_s}: it must be a finite number of seconds")
             # A float of seconds is meant as the decimal it was written as; above 2^53 ticks the
             # product is no longer whole ticks and Python's integers decide.
-            tick = round(ticks) if abs(ticks) < 2**53 else round(Fraction(time_s) * self.ticks_per_s)
+            tick = (
+                round(ticks) if abs(ticks) < 2**53 else round(Fraction(time_s) * self.ticks_per_s)
+            )
         else:
             if isinstance(time_s, np.generic):
                 time_s = time_s.item()

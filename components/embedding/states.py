@@ -44,7 +44,10 @@ def checked_rows(
         If a shape does not fit or a number is out of range.
     """
     rows = np.empty((count, 6))
-    for label, value, columns in ((f"lla_{who}", lla, slice(0, 3)), (f"att_{who}", att, slice(3, 6))):
+    for label, value, columns in (
+        (f"lla_{who}", lla, slice(0, 3)),
+        (f"att_{who}", att, slice(3, 6)),
+    ):
         try:
             array = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError) as error:
@@ -55,7 +58,7 @@ def checked_rows(
             allowed = "(3,)" if who == "ownship" else f"({count}, 3), a row for each plane"
             raise ValueError(f"{label} has the shape {array.shape}: it must be {allowed}")
         rows[:, columns] = array
-    inside = (rows >= _LOW) & (rows <= _HIGH)
+    inside = np.asarray((rows >= _LOW) & (rows <= _HIGH))
     if not inside.all():
         absent = np.isnan(rows[:, :3]).all(axis=1) & missing
         wrong = np.argwhere(~inside & ~absent[:, np.newaxis])

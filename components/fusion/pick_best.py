@@ -15,7 +15,6 @@ from dsa_des.sorted_union import sorted_union
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals, Wake
 
-
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
     "azimuth_rad", "elevation_rad", "true_azimuth_rad", "true_elevation_rad", "true_range_m",

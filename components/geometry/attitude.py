@@ -180,8 +180,8 @@ def sensor_angles(
         ahead with the wings level; abeam, pitch is wrongly subtracted, astern it has the wrong
         sign.
     validate : bool
-        False skips the checks, for a caller that has contiguous arrays of finite doubles, directions
-        of the broadcast shape and at least one axis.
+        False skips the checks, for a caller that has contiguous arrays of finite doubles with at
+        least one axis, the directions of the broadcast shape.
 
     Returns
     -------
@@ -199,8 +199,8 @@ def sensor_angles(
     if model == "exact":
         if not validate:
             with np.errstate(under="ignore"):
-                ned: Any = _unit_vector(azimuth_rad, elevation_rad)
-                return _body_angles(*_ned_to_body(*ned, yaw_rad, pitch_rad, roll_rad))
+                n, e, d = _unit_vector(azimuth_rad, elevation_rad)
+                return _body_angles(*_ned_to_body(n, e, d, yaw_rad, pitch_rad, roll_rad))
         north, east, down = unit_vector(azimuth_rad, elevation_rad)
         return body_angles(*ned_to_body(north, east, down, yaw_rad, pitch_rad, roll_rad))
     if model != "small_angle":

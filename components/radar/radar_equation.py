@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.radar.inputs import FloatArray, broadcast_flat, finite, not_negative, positive, unflatten
+from components.radar.inputs import (
+    FloatArray,
+    broadcast_flat,
+    finite,
+    not_negative,
+    positive,
+    unflatten,
+)
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 BOLTZMANN_J_K = 1.380649e-23

@@ -280,7 +280,7 @@ def test_a_scene_without_fusion_is_refused(configs, tmp_path):
 
 def test_a_scene_for_a_host_does_not_run_by_itself(scene):
     loaded = load_scene(scene, swaps=["traffic=traffic.host"], duration_s=1)
-    with pytest.raises(BlockFailure, match="drive this scene with dsa_des.embed.Simulator"):
+    with pytest.raises(BlockFailure, match=r"drive this scene with dsa_des\.embed\.Simulator"):
         Simulation(loaded).run()
 
 
