@@ -60,7 +60,7 @@ def checked_rows(
         rows[:, columns] = array
     inside = np.asarray((rows >= _LOW) & (rows <= _HIGH))
     if not inside.all():
-        absent = np.isnan(rows[:, :3]).all(axis=1) & missing
+        absent = np.asarray(np.isnan(rows[:, :3]).all(axis=1) & missing)
         wrong = np.argwhere(~inside & ~absent[:, np.newaxis])
         if len(wrong):
             row, column = wrong[0].tolist()
