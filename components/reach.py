@@ -63,7 +63,7 @@ class Reach:
         if self.range_max_m < math.inf:
             seen &= range_m > self.range_max_m
             reason[seen] = RANGE
-        if not present.all():
+        if np.count_nonzero(present) < present.size:
             reason[~present] = ABSENT
         return reason
 

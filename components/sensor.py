@@ -154,6 +154,8 @@ class Sensor(Component):
         self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
         self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
         self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
+        # What `look` says of no cells, once it is known; many scans have none.
+        self._look_at_nothing: Look | None = None
 
     def request(self, port: str) -> Any:
         """Ask whoever feeds us for the targets in our reach."""
@@ -194,7 +196,11 @@ class Sensor(Component):
         rows, reason = self._decide(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks)
-        look = self.look(cells)
+        look = self._look_at_nothing if len(cells) == 0 else None
+        if look is None:
+            look = self.look(cells)
+            if len(cells) == 0 and self.serves_replicas():  # remembers nothing of a look either
+                self._look_at_nothing = look
         for judge in self._judgements:
             look = judge(cells, look)
         found = look.detected.nonzero()[0]
@@ -313,5 +319,5 @@ def _counted(reason: ReasonArray, everybody: int) -> tuple[IntArray, dict[str, I
     else:
         of = {code: (reason == code).sum(axis=1) for code in (EVALUATE, *SKIP_REASONS.values())}
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    skipped[CULLED] = np.full(len(reason), everybody - reason.shape[1])
+    skipped[CULLED] = np.array([everybody - reason.shape[1]] * len(reason), dtype=np.int64)
     return of[EVALUATE], skipped

@@ -7,11 +7,13 @@ group ``dsa_des.embed``.
 """
 
 import math
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from networkx import ancestors
 
 from dsa_des.clock import MAX_TICK, ScanClock, parse_rational
 from dsa_des.component import Component
@@ -140,6 +142,9 @@ class HostDriven:
     source : str
         The block in whose place the host speaks: it runs on demand, and its `Component.run` is
         never called.
+    wanted : iterable of str, optional
+        Blocks whose messages the host wants: those that they do not depend on never run. By
+        default all.
 
     Raises
     ------
@@ -148,7 +153,7 @@ class HostDriven:
         loss, latencies, shared processors, blocks with a process of their own, other sources.
     """
 
-    def __init__(self, scene: Scene, source: str) -> None:
+    def __init__(self, scene: Scene, source: str, wanted: Iterable[str] | None = None) -> None:
         problems = list(_refusals(scene, source))
         if problems:
             raise SceneError(problems)
@@ -159,16 +164,17 @@ class HostDriven:
         self.components = self.simulation.components
         #: Tick of the last call, -1 before the first.
         self.last_tick = -1
-        self._runners = self._make_runners()
+        names = set(scene.blocks) if wanted is None else set(wanted)
+        self._runners = self._make_runners(names.union(*(ancestors(scene.graph, n) for n in names)))
         self._cursors = {r.name: r.cursor for r in self._runners if r.cursor is not None}
         self._source_key = (source, next(iter(self.components[source].outputs)))
 
-    def _make_runners(self) -> list[_Runner]:
+    def _make_runners(self, needed: Set[str]) -> list[_Runner]:
         nodes = self.simulation.nodes
         runners = []
         for name in sorted(nodes, key=lambda name: nodes[name].priority()):
             node = nodes[name]
-            if name == self.source:
+            if name == self.source or name not in needed:
                 continue
             cursor = None if node.clock is None else ScanCursor(node.clock)
             demands = [] if cursor else [demand.block for demand in node.demands]
@@ -305,8 +311,7 @@ class HostDriven:
                         port.waiting.append((tick, new))
                 waiting = waiting or bool(port.waiting)
                 if port.held is not None:
-                    rows = _FIRST_ROW if len(port.held) == 1 else np.array([len(port.held) - 1])
-                    held[port.name] = (port.held, rows)
+                    held[port.name] = (port.held, _last_row(port.held))
                 elif port.required:
                     complete = False
             scan = scans.get(runner.name)
@@ -331,7 +336,7 @@ class HostDriven:
                 assert runner.only_output is not None
                 result = {runner.only_output: result}
             for output, given in result.items():
-                if len(given):
+                if len(given.tick):
                     sent[runner.name, output] = given
         return step
 
@@ -339,6 +344,11 @@ class HostDriven:
         reason = f"{type(error).__name__}: {error}"
         path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
         return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
+
+
+def _last_row(message: Message) -> IntArray:
+    count = len(message.tick)
+    return _FIRST_ROW if count == 1 else np.array([count - 1])
 
 
 def _collected(ports: list[_Port]) -> dict[str, list[Arrivals]]:

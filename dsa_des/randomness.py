@@ -49,23 +49,25 @@ def philox4x32(
     """
     x0, x1, x2, x3 = (np.asarray(word, dtype=np.uint64) for word in counter)
     k0, k1 = (np.asarray(word, dtype=np.uint64) for word in key)
-    constants = np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32
-    bumps = [(np.uint64(first), np.uint64(second)) for first, second in _BUMPS]
-    return _ten_rounds(x0, x1, x2, x3, k0, k1, bumps, *constants)
+    keys = [
+        ((k0 + np.uint64(first)) & _U_LOW, (k1 + np.uint64(second)) & _U_LOW)
+        for first, second in _BUMPS
+    ]
+    return _ten_rounds(x0, x1, x2, x3, keys, np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32)
 
 
 def _ten_rounds(
-    x0: Any, x1: Any, x2: Any, x3: Any, k0: Any, k1: Any, bumps: Any,
+    x0: Any, x1: Any, x2: Any, x3: Any, keys: Any,
     m0: Any = _M0, m1: Any = _M1, low: Any = _LOW, half: Any = 32,
 ) -> Any:  # fmt: skip
-    """The generator itself, for arrays of uint64 or for Python's integers."""
-    for bump0, bump1 in bumps:
+    """The generator itself, for arrays of uint64 or for Python's integers; a key for each round."""
+    for k0, k1 in keys:
         product0 = x0 * m0
         product1 = x2 * m1
         x0, x1, x2, x3 = (
-            (product1 >> half) ^ x1 ^ ((k0 + bump0) & low),
+            (product1 >> half) ^ x1 ^ k0,
             product1 & low,
-            (product0 >> half) ^ x3 ^ ((k1 + bump1) & low),
+            (product0 >> half) ^ x3 ^ k1,
             product0 & low,
         )
     return x0, x1, x2, x3
@@ -94,6 +96,10 @@ class Stream:
     def __init__(self, seed: int, block: str, purpose: str) -> None:
         key = key_of(seed, block, purpose)
         self._key = (key & 0xFFFFFFFF, key >> 32)
+        self._round_keys = [
+            ((self._key[0] + first) & _LOW, (self._key[1] + second) & _LOW)
+            for first, second in _BUMPS
+        ]
 
     def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
         """Return the generator's key, and the scan numbers that count."""
@@ -111,7 +117,11 @@ class Stream:
         if few and isinstance(key[0], int):
             words = [
                 _ten_rounds(
-                    draw | ((s >> 32) & 0xFFFF) << 16, s & _LOW, t & _LOW, t >> 32, *key, _BUMPS
+                    draw | ((s >> 32) & 0xFFFF) << 16,
+                    s & _LOW,
+                    t & _LOW,
+                    t >> 32,
+                    self._round_keys,
                 )
                 for t, s in zip(target.tolist(), numbers.tolist(), strict=True)
             ]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -98,6 +98,11 @@ class Result:
         return np.array([sighting.polar for sighting in self.sightings]).reshape(-1, 3)
 
 
+@lru_cache(maxsize=256)
+def _names_of(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
+
+
 def sightings_of(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
@@ -126,7 +131,7 @@ def sightings_of(
         fused.contributors.tolist(),
         strict=True,
     ):
-        sensors = tuple(name for i, name in enumerate(fused.sensors) if mask >> i & 1)
+        sensors = _names_of(mask, fused.sensors)
         if target < 0:
             false.append(Sighting("", p, q, r, sensors))
             continue

@@ -36,6 +36,9 @@ class Simulator:
         As ``--set`` and ``--swap``; for a path only.
     seed : int, optional
         Overrides the scene's.
+    beyond_fusion : bool
+        Whether to run also what the answer does not rest on, such as a tracker behind the fusion;
+        its messages are then in `Result.messages`.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class Simulator:
         sets: Iterable[str] = (),
         swaps: Iterable[str] = (),
         seed: int | None = None,
+        beyond_fusion: bool = False,
     ) -> None:
         self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed)
         self._source = source_of(self.scene)
@@ -59,9 +63,10 @@ class Simulator:
         #: One chain for all planes, or one for each when the host calls plane by plane.
         self._chains: list[HostDriven] = []
         self._plane_by_plane = False
+        self._fusion = self._only_fusion()
+        self._wanted = None if beyond_fusion else [self._fusion]
         # Whatever the planes will be, this scene can be driven or it cannot.
         self._clocks = self._chain()
-        self._fusion = self._only_fusion()
 
     # -- before the first call -----------------------------------------------------------------
 
@@ -156,6 +161,7 @@ class Simulator:
         self._plane_by_plane = plane_by_plane
         # A rehearsal on a chain of its own loads modules and fills tables; nothing remembers it.
         self._rehearse(self._chain())
+        self._unseen = [Sighting(name) for name in self.planes]
         self._free = [i for i in range(len(self._planes)) if i not in self._fixed]
         count = len(self._planes) if plane_by_plane else 1
         self._chains = [self._chain() for _ in range(count)]
@@ -238,7 +244,7 @@ class Simulator:
     # -- inside --------------------------------------------------------------------------------
 
     def _chain(self) -> HostDriven:
-        return HostDriven(with_host(self.scene, self._planes), self._source)
+        return HostDriven(with_host(self.scene, self._planes), self._source, self._wanted)
 
     def _only_fusion(self) -> str:
         found = [
@@ -273,15 +279,10 @@ class Simulator:
         return rows
 
     def _result(self, step: Step, everybody: Sequence[int], ticks_per_s: int) -> Result:
-        messages = {name: message for (name, _), message in step.sent.items()}
-        reported: dict[str, Any] = {
-            name: message for name, message in messages.items() if isinstance(message, Detections)
-        }
-        fused: Any = messages.get(self._fusion)
-        seen, false = sightings_of(fused, reported)
-        sightings = tuple(
-            seen.get(number) or Sighting(self._planes[number].name) for number in everybody
-        )
+        messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
+        reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
+        seen, false = sightings_of(messages.get(self._fusion), reported)
+        sightings = tuple(seen.get(number) or self._unseen[number] for number in everybody)
         return Result(
             step.tick / ticks_per_s,
             sightings,

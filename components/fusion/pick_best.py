@@ -86,7 +86,7 @@ class PickBest(Component):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = sorted_union(keys)
+        union = _union(keys, width) if len(wake) == 1 else sorted_union(keys)
         row, target = np.divmod(union, width)
         if self._gate_ticks:
             arrivals = self._with_recent(arrivals)
@@ -154,6 +154,14 @@ class PickBest(Component):
             sensors=self.sensors,
             **values,
         )
+
+
+def _union(keys: list[IntArray], width: int) -> IntArray:
+    """Return every target of one row once, ascending."""
+    there = np.zeros(width, dtype=bool)
+    for key in keys:
+        there[key] = True
+    return there.nonzero()[0]
 
 
 def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:

@@ -41,7 +41,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
     """`wrap_pi` for a contiguous array that is known to be finite."""
     inside = (angle > -np.pi) & (angle <= np.pi)
-    if inside.all():
+    if np.count_nonzero(inside) == inside.size:
         return angle + 0.0
     # The library's sin and cos reduce by the true pi, for any size of argument.
     wrapped = np.arctan2(np.sin(angle), np.cos(angle))
@@ -160,7 +160,7 @@ def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatA
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low
     over = (difference >= 180.0) | (difference < -180.0)
-    if over.any():
+    if np.count_nonzero(over):
         difference = np.where(
             over, difference - np.where(difference > 0.0, 360.0, -360.0), difference
         )

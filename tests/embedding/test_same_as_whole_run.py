@@ -65,7 +65,7 @@ def _assert_same(results, tables, table):
 def test_detections_are_the_same_to_the_bit(configs, flying, sets):
     scene = configs / "first_light.toml"
     host = flying.Host(scene, sets=sets)
-    simulator = flying.Simulator(scene, sets=sets)
+    simulator = flying.Simulator(scene, sets=sets, beyond_fusion=True)
     host.add_planes(simulator)
     results = flying.fly(simulator, host, 60.0)
     tables = flying.run_whole(scene, sets=(*sets, "duration_s=60"))
