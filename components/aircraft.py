@@ -136,6 +136,11 @@ class Roster:
         """Swerling model of each target, 5 written as 0, shape (targets,)."""
         return np.array([craft.swerling % 5 for craft in self.aircraft], dtype=np.int64)
 
+    @cached_property
+    def swerling_models(self) -> tuple[int, ...]:
+        """Which models there are, ascending, 5 written as 0."""
+        return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
+
     def column(self, path: str) -> FloatArray:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
         columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})

@@ -47,8 +47,13 @@ class Gate(Component):
         if targets is None:
             return None
         decisions = {}
+        width = targets.range_m.shape[1]
         for sensor, reach in self._reach.items():
             rows = wake.demand.get(sensor)
+            if rows is not None and len(rows) == 0:
+                place = np.full(len(targets), -1, dtype=np.int64)
+                decisions[sensor] = Decision(place, np.empty((0, width), dtype=np.uint8))
+                continue
             if rows is None or len(rows) == len(targets):
                 place = np.arange(len(targets))
                 part = targets

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.field_of_view import inside
+from components.geometry.field_of_view import FieldOfView
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
 ReasonArray = npt.NDArray[np.uint8]
@@ -19,6 +20,8 @@ SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "r
 #: Targets up to so many reaches away count when models of the line of sight are judged: one that
 #: is off may take them to be in reach.
 REACH_MARGIN = 1.05
+_field_of_view = lru_cache(maxsize=256)(FieldOfView)
+_EVALUATE, _FIELD_OF_VIEW = np.uint8(EVALUATE), np.uint8(FIELD_OF_VIEW)
 #: Targets that were not even moved, because no sensor could have looked at them.
 CULLED = "culled"
 
@@ -52,6 +55,10 @@ class Reach:
         """Largest size of an elevation in body axes that is looked at."""
         return max(abs(angle) for angle in self.elevation_rad)
 
+    @cached_property
+    def _field(self) -> FieldOfView:
+        return _field_of_view(self.azimuth_rad, self.elevation_rad)
+
     def decide(
         self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
     ) -> ReasonArray:
@@ -60,22 +67,17 @@ class Reach:
         Parameters
         ----------
         p_rad, q_rad, range_m, present : arrays of one shape
-            Body azimuth and elevation, slant range, and whether the target is there.
+            Body azimuth in (-pi, pi] and elevation, slant range, and whether the target is there;
+            finite.
         """
         if not self.enabled:
             return np.full(range_m.shape, OFF, dtype=np.uint8)
-        seen = inside(
-            p_rad,
-            q_rad,
-            azimuth_min_rad=self.azimuth_rad[0],
-            azimuth_max_rad=self.azimuth_rad[1],
-            elevation_min_rad=self.elevation_rad[0],
-            elevation_max_rad=self.elevation_rad[1],
-        )
-        reason = np.where(seen, np.uint8(EVALUATE), np.uint8(FIELD_OF_VIEW))
-        if math.isfinite(self.range_max_m):
-            reason[seen & (range_m > self.range_max_m)] = RANGE
-        if not present.all():
+        seen = self._field.holds(p_rad, q_rad)
+        reason = np.where(seen, _EVALUATE, _FIELD_OF_VIEW)
+        if self.range_max_m < math.inf:
+            seen &= range_m > self.range_max_m
+            reason[seen] = RANGE
+        if np.count_nonzero(present) < present.size:
             reason[~present] = ABSENT
         return reason
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ _LIMIT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
 # grid point may not exist: such values stay as they are.
 _COUNTABLE = 2.0**-50
 _LARGEST = 1e300
+
+# Up to this many values Python's numbers take less time than the calls of NumPy do.
+_FEW = 6
 
 
 def round_to_grid(
@@ -111,8 +115,11 @@ class Grid:
     ) -> None:
         round_to_grid(0.0, step, limit_low=limit_low, limit_high=limit_high)  # checks them
         self.step = float(step)
-        self._lowest = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
-        self._highest = None if limit_high is None else _outermost(np.float64(limit_high), step)
+        self._countable = min(self.step, 1e200) / _COUNTABLE
+        low = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
+        high = None if limit_high is None else _outermost(np.float64(limit_high), step)
+        self._lowest = None if low is None else float(low)
+        self._highest = None if high is None else float(high)
 
     def round(self, values: FloatArray) -> FloatArray:
         """Round finite values, bit for bit as `round_to_grid` does.
@@ -124,17 +131,37 @@ class Grid:
         """
         if self.step == 0.0:
             result = values
+        elif values.size <= _FEW and values.ndim == 1:
+            return np.array([self._round_one(value) for value in values.tolist()])
         else:
             size = np.abs(values)
             # NaN, and what cannot be counted in steps, take the general way.
-            simple = size.size and float(size.max()) * _COUNTABLE < min(self.step, 1e200)
+            simple = size.size and float(size.max()) < self._countable
             result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
             np.copysign(result, values, out=result)
         if self._highest is not None:
             result = np.minimum(result, self._highest)
         if self._lowest is not None:
             result = np.maximum(result, self._lowest)
-        return np.asarray(result + 0.0)  # adding 0 turns -0 into 0
+        return result + 0.0  # adding 0 turns -0 into 0
+
+    def _round_one(self, value: float) -> float:
+        """Round one value with the floating-point steps of `_nearest_countable`."""
+        size = abs(value)
+        if not size < self._countable:
+            result = float(_nearest(np.float64(size), self.step))
+        else:
+            rest = math.fmod(size, self.step)
+            whole = round((size - rest) / self.step)
+            other = self.step - rest
+            whole += rest > other or (rest == other and whole % 2 == 1)
+            result = whole * self.step
+        result = math.copysign(result, value)
+        if self._highest is not None:
+            result = min(result, self._highest)
+        if self._lowest is not None:
+            result = max(result, self._lowest)
+        return result + 0.0
 
 
 def _finite(name: str, value: ArrayLike) -> Any:

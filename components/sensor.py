@@ -7,7 +7,7 @@ engine's business.
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -73,16 +73,22 @@ class Cells:
         self._targets = targets
         self.message_rows = rows
         self.roster = targets.roster
-        place = np.flatnonzero(wanted)
+        place = wanted.ravel().nonzero()[0]
         width = max(1, wanted.shape[1])
         #: Index of each cell's scan within this look, and of its target in the roster.
-        self.row, self.target = np.divmod(place, width)
+        if len(rows) == 1:
+            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
+        else:
+            self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
         self._width = width
-        self._flat = rows[self.row] * width + self.target
+        # Rows that only rise and are as many as there are, are all of them.
+        self._everything = len(place) == targets.range_m.size and (
+            len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
+        )
+        self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
-        self._everything = len(place) == targets.range_m.size
         self._gathered: dict[str, AnyArray] = {}
 
     def __len__(self) -> int:
@@ -115,6 +121,9 @@ class Cells:
 SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
 
 _BODY_AXES = BodyAxes()
+
+# Grids are the same in every run of a scene: they are made once.
+_grid = lru_cache(maxsize=256)(Grid)
 
 
 class Sensor(Component):
@@ -207,25 +216,32 @@ class Sensor(Component):
         targets, rows = self.seen(*held)
         cells, reason = self.cells(targets, rows, wake)
         rows = cells.message_rows
-        wanted = reason == EVALUATE
         look = self._idle
         if look is None or len(cells):
             look = self.look(cells)
             for judge in self._judgements:
                 look = judge(cells, look)
             self._idle = None if len(cells) else look
-        found = np.flatnonzero(look.detected)
-        per_scan = np.bincount(cells.row[found], minlength=len(wake))
+        found = look.detected.nonzero()[0]
+        evaluated, skipped = _counted(reason, len(targets.roster))
+        if len(wake) == 1:
+            offsets = np.array([0, len(found)], dtype=np.int64)
+        else:
+            offsets = np.zeros(len(wake) + 1, dtype=np.int64)
+            np.bincount(cells.row[found], minlength=len(wake)).cumsum(out=offsets[1:])
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
-        azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
-        azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        if len(found):
+            azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
+            azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        else:
+            azimuth, elevation, range_m = p, q, r
         detections = Detections(
             tick=wake.ticks,
             scan=wake.scans,
-            evaluated=wanted.sum(axis=1),
-            skipped=_skipped(reason, len(targets.roster)),
-            offsets=np.concatenate(([0], np.cumsum(per_scan))),
+            evaluated=evaluated,
+            skipped=skipped,
+            offsets=offsets,
             target=cells.target[found],
             azimuth_rad=azimuth,
             elevation_rad=elevation,
@@ -268,6 +284,8 @@ class Sensor(Component):
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
             decision = targets.decisions[self.name]
             place = decision.place[rows]
+            if len(place) == 1 == len(decision.reason) and place[0] == 0:
+                return rows, decision.reason
             if place.min(initial=0) >= 0:
                 if len(place) == len(decision.reason) and place[0] == 0:
                     return rows, decision.reason
@@ -297,11 +315,11 @@ class Sensor(Component):
     @cached_property
     def _elevation_grid(self) -> Grid:
         low, high = self.reach.elevation_rad
-        return Grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+        return _grid(self.elevation_step_rad, limit_low=low, limit_high=high)
 
     @cached_property
     def _range_grid(self) -> Grid:
-        return Grid(self.range_step_m, limit_low=0.0)
+        return _grid(self.range_step_m, limit_low=0.0)
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
@@ -313,8 +331,8 @@ class Sensor(Component):
     def _azimuth_grid(self) -> Grid:
         low, high = self._azimuth_sector
         if high - low >= 2.0 * math.pi:
-            return Grid(self.azimuth_step_rad)
-        return Grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
+            return _grid(self.azimuth_step_rad)
+        return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
     def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
         low, high = self._azimuth_sector
@@ -327,7 +345,13 @@ class Sensor(Component):
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
-def _skipped(reason: ReasonArray, everybody: int) -> dict[str, IntArray]:
-    skipped = {name: (reason == code).sum(axis=1) for name, code in SKIP_REASONS.items()}
-    skipped[CULLED] = np.full(len(reason), everybody - reason.shape[1])
-    return skipped
+def _counted(reason: ReasonArray, everybody: int) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return how many targets were evaluated at each scan, and skipped by reason."""
+    if len(reason) == 1:  # one pass instead of one for each reason
+        count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
+        of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
+    else:
+        of = {code: (reason == code).sum(axis=1) for code in (EVALUATE, *SKIP_REASONS.values())}
+    skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
+    skipped[CULLED] = np.array([everybody - reason.shape[1]] * len(reason), dtype=np.int64)
+    return of[EVALUATE], skipped

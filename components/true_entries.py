@@ -23,7 +23,7 @@ def true_entries(message: AnyDetections) -> AnyDetections:
     Detections or FusedDetections
         The same rows.
     """
-    if message.target.min(initial=0) >= 0:
+    if np.count_nonzero(message.target < 0) == 0:
         return message
     keep = np.flatnonzero(message.target >= 0)
     rows = np.arange(len(message) + 1)

@@ -66,6 +66,11 @@ def main() -> None:
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON only.")
 @_everything_option
+@click.option(
+    "--realtime",
+    metavar="FACTOR",
+    help="Pace the run: FACTOR simulated seconds per second; results do not change.",
+)
 @plain_errors
 def run(**options: Any) -> None:
     """Run SCENE and say which sensor saw which intruder, when, and how far away."""

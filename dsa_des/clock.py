@@ -137,6 +137,12 @@ class ScanClock:
             ticks = np.maximum(ticks + np.rint(shift).astype(np.int64), 0)
         return ticks
 
+    def tick_of(self, scan: int) -> int:
+        """Return the tick of one scan."""
+        if self._jitter_draw is None:
+            return self._grid_tick(scan)
+        return int(self.ticks(np.array([scan], dtype=np.int64))[0])
+
     def first_scan_at_or_after(self, tick: int) -> int:
         """Return the number of the first scan (not below 0) whose grid instant is >= tick."""
         # Python integers, which neither round nor overflow; Fractions took ten times as long.

@@ -18,11 +18,14 @@ from dsa_des.types import FloatArray, IntArray
 UInt32Array = npt.NDArray[np.uint32]
 UInt64Array = npt.NDArray[np.uint64]
 
-_M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
-_W0, _W1 = 0x9E3779B9, 0xBB67AE85
-_LOW = np.uint64(0xFFFFFFFF)
-_32 = np.uint64(32)
-_ROUNDS = 10
+_M0, _M1 = 0xD2511F53, 0xCD9E8D57
+_LOW = 0xFFFFFFFF
+#: What each of the ten rounds adds to the key.
+_BUMPS = [(n * 0x9E3779B9 & _LOW, n * 0xBB67AE85 & _LOW) for n in range(10)]
+_U_LOW, _U32 = np.uint64(_LOW), np.uint64(32)
+
+# Up to this many draws Python's integers take less time than the calls of NumPy do.
+_FEW = 12
 
 
 def philox4x32(
@@ -46,16 +49,26 @@ def philox4x32(
     """
     x0, x1, x2, x3 = (np.asarray(word, dtype=np.uint64) for word in counter)
     k0, k1 = (np.asarray(word, dtype=np.uint64) for word in key)
-    for round_number in range(_ROUNDS):
-        bump0 = np.uint64(round_number * _W0 & 0xFFFFFFFF)
-        bump1 = np.uint64(round_number * _W1 & 0xFFFFFFFF)
-        product0 = x0 * _M0
-        product1 = x2 * _M1
+    keys = [
+        ((k0 + np.uint64(first)) & _U_LOW, (k1 + np.uint64(second)) & _U_LOW)
+        for first, second in _BUMPS
+    ]
+    return _ten_rounds(x0, x1, x2, x3, keys, np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32)
+
+
+def _ten_rounds(
+    x0: Any, x1: Any, x2: Any, x3: Any, keys: Any,
+    m0: Any = _M0, m1: Any = _M1, low: Any = _LOW, half: Any = 32,
+) -> Any:  # fmt: skip
+    """The generator itself, for arrays of uint64 or for Python's integers; a key for each round."""
+    for k0, k1 in keys:
+        product0 = x0 * m0
+        product1 = x2 * m1
         x0, x1, x2, x3 = (
-            (product1 >> _32) ^ x1 ^ ((k0 + bump0) & _LOW),
-            product1 & _LOW,
-            (product0 >> _32) ^ x3 ^ ((k1 + bump1) & _LOW),
-            product0 & _LOW,
+            (product1 >> half) ^ x1 ^ k0,
+            product1 & low,
+            (product0 >> half) ^ x3 ^ k1,
+            product0 & low,
         )
     return x0, x1, x2, x3
 
@@ -83,6 +96,10 @@ class Stream:
     def __init__(self, seed: int, block: str, purpose: str) -> None:
         key = key_of(seed, block, purpose)
         self._key = (key & 0xFFFFFFFF, key >> 32)
+        self._round_keys = [
+            ((self._key[0] + first) & _LOW, (self._key[1] + second) & _LOW)
+            for first, second in _BUMPS
+        ]
 
     def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
         """Return the generator's key, and the scan numbers that count."""
@@ -95,13 +112,27 @@ class Stream:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
         target = np.asarray(targets, dtype=np.uint64)
         key, numbers = self._key_and_scan(np.asarray(scans, dtype=np.int64))
-        scan = numbers.astype(np.uint64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
+        few = target.shape == numbers.shape and 0 < target.size <= _FEW and target.ndim == 1
+        if few and isinstance(key[0], int):
+            words = [
+                _ten_rounds(
+                    draw | ((s >> 32) & 0xFFFF) << 16,
+                    s & _LOW,
+                    t & _LOW,
+                    t >> 32,
+                    self._round_keys,
+                )
+                for t, s in zip(target.tolist(), numbers.tolist(), strict=True)
+            ]
+            w0, w1, w2, w3 = np.array(words, dtype=np.uint64).T
+            return w0, w1, w2, w3
+        scan = numbers.astype(np.uint64)
         counter = (
-            np.uint64(draw) | ((scan >> _32) & np.uint64(0xFFFF)) << np.uint64(16),
-            scan & _LOW,
-            target & _LOW,
-            target >> _32,
+            np.uint64(draw) | ((scan >> _U32) & np.uint64(0xFFFF)) << np.uint64(16),
+            scan & _U_LOW,
+            target & _U_LOW,
+            target >> _U32,
         )
         return philox4x32(counter, key)
 

@@ -146,23 +146,26 @@ def load_scene(
     SceneError
         With every problem found.
     """
-    scene_file, problems, dropped = open_scene(
-        path, sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
+    return load_tables(
+        read_scene_file(path), sets=sets, swaps=swaps, seed=seed, duration_s=duration_s
     )
+
+
+def load_tables(scene_file: SceneFile, **overrides: Any) -> Scene:
+    """Override and check tables that were read; see `load_scene`."""
+    problems, dropped = _overridden(scene_file, **overrides)
     scene = check_scene(scene_file, problems)
     scene.dropped = dropped
     return scene
 
 
-def open_scene(
-    path: Path | str,
-    *,
-    sets: Iterable[str] = (),
-    swaps: Iterable[str] = (),
-    seed: int | None = None,
-    duration_s: object = None,
-) -> tuple[SceneFile, list[Problem], list[str]]:
+def open_scene(path: Path | str, **overrides: Any) -> tuple[SceneFile, list[Problem], list[str]]:
     """Read and override a scene without checking it.
+
+    Parameters
+    ----------
+    path, **overrides
+        As for `load_scene`.
 
     Returns
     -------
@@ -178,6 +181,18 @@ def open_scene(
         If a file cannot be read.
     """
     scene_file = read_scene_file(path)
+    return scene_file, *_overridden(scene_file, **overrides)
+
+
+def _overridden(
+    scene_file: SceneFile,
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+    duration_s: object = None,
+) -> tuple[list[Problem], list[str]]:
+    """Override values, and return what is wrong and which parameters a swap dropped."""
     problems: list[Problem] = []
     dropped: list[str] = []
     for swap in swaps:
@@ -190,7 +205,7 @@ def open_scene(
         _override(scene_file, "seed", seed)
     if duration_s is not None:
         _override(scene_file, "duration_s", duration_s)
-    return scene_file, problems, dropped
+    return problems, dropped
 
 
 def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) -> Scene:

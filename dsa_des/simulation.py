@@ -299,6 +299,11 @@ class Simulation:
         scans_per_tick = sum(1 / clock.period for clock in clocks)
         return max(1, int(scans / scans_per_tick))
 
+    def limit_windows(self, longest_s: float) -> None:
+        """Let no look-ahead window be longer than this simulated time; results stay the same."""
+        longest = max(1, int(min(longest_s * self.ticks_per_s, self.end_tick)))
+        self._window_ticks = min(self._window_ticks, longest)
+
     # -- running -------------------------------------------------------------------------------
 
     @property

@@ -92,7 +92,7 @@ class Wake:
         message, rows = held
         count = len(rows)
         whole = len(message) == count and rows[0] == 0 and rows[-1] == count - 1
-        if whole and bool(np.all(rows[1:] > rows[:-1])):
+        if whole and (count == 1 or bool(np.all(rows[1:] > rows[:-1]))):
             return message
         if rows[0] < 0:
             if rows[-1] < 0:

@@ -12,6 +12,11 @@ from dsa_des.plain_errors import plain_errors
 @click.option("--quick", is_flag=True, help="Shorter scenes and fewer repetitions: a minute.")
 @click.option("--repeats", type=click.IntRange(1, 99), help="Repetitions [default: 5].")
 @click.option("--json", "json_file", metavar="FILE", help="Write the rows to FILE as JSON.")
+@click.option(
+    "--embed",
+    is_flag=True,
+    help="Time single calls of the embedding interface instead: 4 intruders, 3 sensors.",
+)
 @click.option("--compare", metavar="OLD.json", help="Show the change since an earlier FILE.")
 @plain_errors
 def benchmark(**options: Any) -> None:

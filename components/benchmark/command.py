@@ -20,16 +20,33 @@ def run_benchmark(
     repeats: int | None,
     json_file: str | None,
     compare: str | None,
+    embed: bool,
 ) -> None:
     """Measure the cases; without names, all of them."""
     from rich.console import Console
 
-    cases = chosen(scenes)
+    if embed and (scenes or compare):
+        raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
+    cases = [] if embed else chosen(scenes)
     before = {} if compare is None else _read(Path(compare))
     target = None if json_file is None else Path(json_file)
     if target is not None and not target.parent.is_dir():
         raise UsageError(f"--json {target}: the folder {target.parent} does not exist")
     console = Console()
+    rows: list[dict[str, Any]] = []
+    if embed:
+        rows.append(_measured_calls(quick, repeats or (1 if quick else 3)))
+        console.print(_calls_table(rows[0]))
+    else:
+        rows += _measured_cases(console, cases, quick, repeats, before)
+    if target is not None:
+        write_json(target, rows)
+        console.print(f"rows written to {target}")
+
+
+def _measured_cases(
+    console: Any, cases: list[Case], quick: bool, repeats: int | None, before: dict[str, Any]
+) -> list[dict[str, Any]]:
     rows = []
     for case in cases:
         console.print(f"{case.name}: {case.what} ...", style="dim")
@@ -39,23 +56,50 @@ def run_benchmark(
     for row in thesis:
         times = row["target_scans_per_s"] / _THESIS_PER_S
         console.print(f"thesis scene: {times:.0f} times the thesis's own 7,200 target-scans/s")
-    if target is not None:
-        write_json(target, rows)
-        console.print(f"rows written to {target}")
+    return rows
 
 
 def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
     """Measure times and memory in two fresh processes."""
     row: dict[str, Any] = {}
     for more in ([f"--repeats={repeats}"], ["--memory"]):
-        command = [sys.executable, "-m", "components.benchmark.measure", case.name, *more]
-        done = subprocess.run(
-            [*command, "--quick"] if quick else command, capture_output=True, text=True, check=False
-        )
-        if done.returncode != 0:
-            raise UsageError(f"scene {case.name} failed:\n{done.stderr.strip()}")
-        row.update(json.loads(done.stdout))
+        row.update(_fresh("measure", [case.name, *more, *(["--quick"] if quick else [])]))
     return row
+
+
+def _measured_calls(quick: bool, repeats: int) -> dict[str, Any]:
+    """Measure calls of the embedding interface in a fresh process."""
+    chosen([])  # says so where the scenes are missing
+    return _fresh("embedded", [f"--repeats={repeats}", f"--calls={300 if quick else 1800}"])
+
+
+def _fresh(module: str, arguments: list[str]) -> dict[str, Any]:
+    """Return what a measuring module prints in a process of its own."""
+    command = [sys.executable, "-m", f"components.benchmark.{module}", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise UsageError(f"{' '.join(arguments)} failed:\n{done.stderr.strip()}")
+    row: dict[str, Any] = json.loads(done.stdout)
+    return row
+
+
+def _calls_table(row: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    title = f"simulate: {row['what']}; {row['calls']} calls"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for heading in ("us per call", "p50", "p99", "wanted", "max", "first"):
+        table.add_column(heading, justify="left" if heading == "us per call" else "right")
+    ends = {
+        "wall_us": [f"{row['wanted_p99_us']:.0f}", f"{row['first_us']:.0f}"],
+        "cpu_us": ["", ""],
+    }
+    for key, name in (("wall_us", "wall time"), ("cpu_us", "processor time")):
+        times, (wanted, first) = row[key], ends[key]
+        cells = (times["p50"], times["p99"], times["max"])
+        p50, p99, most = (f"{value:.0f}" for value in cells)
+        table.add_row(name, p50, p99, wanted, most, first)
+    return table
 
 
 def _read(path: Path) -> dict[str, dict[str, Any]]:

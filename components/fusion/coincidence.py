@@ -21,7 +21,8 @@ def same_instant(keys: IntArray, asked: IntArray) -> IntArray:
         The same for what is asked about; holds every one of `keys`.
     """
     entry = np.full(len(asked), -1, dtype=np.int64)
-    entry[np.searchsorted(asked, keys)] = np.arange(len(keys))
+    if len(keys):
+        entry[asked.searchsorted(keys)] = np.arange(len(keys))
     return entry
 
 

@@ -10,6 +10,12 @@ from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals
 
+#: What the sensor that gives the angles also says, and all numbers of a fused row.
+_ANGLES = (
+    "azimuth_rad", "elevation_rad", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+)  # fmt: skip
+_VALUES = (*_ANGLES, "range_m")
+
 
 class Fusion(Component):
     """Puts detections together; subclasses say which belong together.
@@ -93,33 +99,19 @@ class Fusion(Component):
         contributors = np.zeros(count, dtype=np.int64)
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
-        values = {
-            name: np.full(count, np.nan)
-            for name in (
-                "azimuth_rad",
-                "elevation_rad",
-                "range_m",
-                "true_azimuth_rad",
-                "true_elevation_rad",
-                "true_range_m",
-            )
-        }
+        values = dict(zip(_VALUES, np.full((len(_VALUES), count), np.nan), strict=True))
+        found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self.by_angles:
             name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                contributors[found] |= 1 << index
-                angle_source[found] = index
-                for column in ("azimuth_rad", "elevation_rad"):
-                    _copy(values, column, found, arrivals[name], entries[name])
-                    _copy(values, f"true_{column}", found, arrivals[name], entries[name])
-                _copy(values, "true_range_m", found, arrivals[name], entries[name])
+            if name in found and len(found[name]):
+                contributors[found[name]] |= 1 << index
+                angle_source[found[name]] = index
+                _copy(values, _ANGLES, found[name], arrivals[name], entries[name])
         for index in self.by_range:
             name = self.sensors[index]
-            if name in entries:
-                found = np.flatnonzero(entries[name] >= 0)
-                range_source[found] = index
-                _copy(values, "range_m", found, arrivals[name], entries[name])
+            if name in found and len(found[name]):
+                range_source[found[name]] = index
+                _copy(values, ("range_m",), found[name], arrivals[name], entries[name])
         return FusedDetections(
             tick=ticks,
             offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
@@ -134,6 +126,12 @@ class Fusion(Component):
 
 
 def _copy(
-    values: dict[str, FloatArray], column: str, at: IntArray, new: Arrivals, entry: IntArray
+    values: dict[str, FloatArray],
+    columns: tuple[str, ...],
+    at: IntArray,
+    new: Arrivals,
+    entry: IntArray,
 ) -> None:
-    values[column][at] = getattr(new.message, column)[entry[at]]
+    chosen = entry[at]
+    for column in columns:
+        values[column][at] = getattr(new.message, column)[chosen]

@@ -49,14 +49,15 @@ class PickBest(Fusion):
         reported = {new.source: new for new in wake.arrivals("detections")}
         if not reported:
             return None
-        arrivals = {
-            name: Arrivals(name, new.tick, true_entries(new.message))
-            for name, new in reported.items()
-        }
+        arrivals = reported
+        true = {name: true_entries(new.message) for name, new in reported.items()}
+        all_true = all(true[name] is new.message for name, new in reported.items())
+        if not all_true:
+            arrivals = {n: Arrivals(n, new.tick, true[n]) for n, new in reported.items()}
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = sorted_union(keys)
+        union = _union(keys, width) if len(wake) == 1 else sorted_union(keys)
         row, target = np.divmod(union, width)
         if self.gate_ticks:
             arrivals = self.with_recent(arrivals)
@@ -69,11 +70,23 @@ class PickBest(Fusion):
                 name: same_instant(key, union) for name, key in zip(arrivals, keys, strict=True)
             }
         fused = self.combine(wake.ticks, row, target, arrivals, entries)
+        if all_true:
+            return fused
         return pass_false_alarms(fused, reported, [self.sensors[i] for i in self.by_range])
+
+
+def _union(keys: list[IntArray], width: int) -> IntArray:
+    """Return every target of one row once, ascending."""
+    there = np.zeros(width, dtype=bool)
+    for key in keys:
+        there[key] = True
+    return there.nonzero()[0]
 
 
 def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
+    if len(ticks) == 1:
+        return new.message.target
     row = np.searchsorted(ticks, new.tick)
     offsets = new.message.offsets
     return np.repeat(row, np.diff(offsets)) * width + new.message.target

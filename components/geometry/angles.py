@@ -41,7 +41,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
     """`wrap_pi` for a contiguous array that is known to be finite."""
     inside = (angle > -np.pi) & (angle <= np.pi)
-    if inside.all():
+    if np.count_nonzero(inside) == inside.size:
         return angle + 0.0
     # The library's sin and cos reduce by the true pi, for any size of argument.
     wrapped = np.arctan2(np.sin(angle), np.cos(angle))
@@ -77,9 +77,11 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned = np.where(angle < 0.0, angle + TWO_PI, angle)
+    turned = angle + 0.0
+    np.add(angle, TWO_PI, out=turned, where=angle < 0.0)
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
-    return np.where(turned >= TWO_PI, 0.0, turned) + 0.0
+    turned[turned >= TWO_PI] = 0.0
+    return turned
 
 
 def longitude_difference_deg(
@@ -120,7 +122,11 @@ def longitude_difference_deg(
 
 def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArray:
     """Give the double nearest to lon2 - lon1 in [-180, 180), for checked arrays of one axis up."""
-    return _add_wrapped(*_two_difference(_reduced(lon1), _reduced(lon2)))[0]
+    total, low = _two_difference(lon1, lon2)
+    # The two-sum is exact for any size; only whole turns of an absurd total are not.
+    if total.size and max(total.max(), -total.min()) > _LARGE_LONGITUDE_DEG:
+        total, low = _two_difference(_reduced(lon1), _reduced(lon2))
+    return _add_wrapped(total, low)[0]
 
 
 def _longitude_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -154,7 +160,7 @@ def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatA
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low
     over = (difference >= 180.0) | (difference < -180.0)
-    if over.any():
+    if np.count_nonzero(over):
         difference = np.where(
             over, difference - np.where(difference > 0.0, 360.0, -360.0), difference
         )

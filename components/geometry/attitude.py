@@ -7,6 +7,8 @@ All angles in radians; azimuth is clockwise from north (or from the nose), eleva
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -50,13 +52,10 @@ def ned_to_body(
     ValueError
         NaN, infinity, or shapes that do not fit.
     """
-    shape, (n, e, d, yaw, pitch, roll) = _checked(
+    shape, arrays = _checked(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    level_x, level_y = _turn(n, e, yaw)
-    z, x = _turn(d, level_x, pitch)
-    y, z = _turn(level_y, z, roll)
-    x, y, z = shaped(shape, x, y, z)
+    x, y, z = shaped(shape, *_ned_to_body(*arrays))
     return x, y, z
 
 
@@ -117,10 +116,8 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Tri
     ValueError
         NaN, infinity, or shapes that do not fit.
     """
-    shape, (azimuth, elevation) = _checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
-    level = np.cos(elevation)
-    north, east = level * np.cos(azimuth), level * np.sin(azimuth)
-    north, east, down = shaped(shape, north, east, -np.sin(elevation))
+    shape, arrays = _checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
+    north, east, down = shaped(shape, *_unit_vector(*arrays))
     return north, east, down
 
 
@@ -153,13 +150,9 @@ def body_angles(
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
     degrees, where the asin of thesis eq. 5 loses half the digits.
     """
-    shape, (bx, by, bz) = _checked(x=x, y=y, z=z)
-    bx, by, bz = (np.ascontiguousarray(v) for v in np.broadcast_arrays(bx, by, bz))
-    level = np.hypot(bx, by)
-    azimuth = np.arctan2(by, bx)
-    azimuth = np.where(azimuth <= -np.pi, np.pi, azimuth)
-    p = np.where(level <= _ZENITH_RAD * np.abs(bz), 0.0, azimuth) + 0.0
-    p, q = shaped(shape, p, np.arctan2(0.0 - bz, level))
+    shape, arrays = _checked(x=x, y=y, z=z)
+    p, q = shaped(shape, *_body_angles(*(np.ascontiguousarray(np.broadcast_to(a, shape or (1,)))
+                                         for a in arrays)))  # fmt: skip
     return p, q
 
 
@@ -170,6 +163,8 @@ def sensor_angles(
     pitch_rad: npt.ArrayLike,
     roll_rad: npt.ArrayLike,
     model: str = "exact",
+    *,
+    validate: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
     """Find where in its own axes the ownship sees a target: the thesis's angles p and q.
 
@@ -184,6 +179,9 @@ def sensor_angles(
         corrected: p = wrap(azimuth - yaw), q = elevation - pitch, roll ignored. It is right dead
         ahead with the wings level; abeam, pitch is wrongly subtracted, astern it has the wrong
         sign.
+    validate : bool
+        False skips the checks, for a caller that has contiguous arrays of finite doubles with at
+        least one axis, the directions of the broadcast shape.
 
     Returns
     -------
@@ -199,6 +197,10 @@ def sensor_angles(
         An unknown model, NaN, infinity, or shapes that do not fit.
     """
     if model == "exact":
+        if not validate:
+            with np.errstate(under="ignore"):
+                n, e, d = _unit_vector(azimuth_rad, elevation_rad)
+                return _body_angles(*_ned_to_body(n, e, d, yaw_rad, pitch_rad, roll_rad))
         north, east, down = unit_vector(azimuth_rad, elevation_rad)
         return body_angles(*ned_to_body(north, east, down, yaw_rad, pitch_rad, roll_rad))
     if model != "small_angle":
@@ -340,6 +342,27 @@ def aspect_angles(
         azimuth_rad, elevation_rad, target_yaw_rad, target_pitch_rad, target_roll_rad
     )
     return body_angles(-x, -y, -z)
+
+
+def _unit_vector(azimuth: Any, elevation: Any) -> Triple:
+    level = np.cos(elevation)
+    return level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
+
+
+def _ned_to_body(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Triple:
+    level_x, level_y = _turn(n, e, yaw)
+    z, x = _turn(d, level_x, pitch)
+    y, z = _turn(level_y, z, roll)
+    return x, y, z
+
+
+def _body_angles(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`body_angles` for contiguous arrays of one shape."""
+    level = np.hypot(x, y)
+    azimuth = np.arctan2(y, x)
+    azimuth = np.where(azimuth <= -np.pi, np.pi, azimuth)
+    p = np.where(level <= _ZENITH_RAD * np.abs(z), 0.0, azimuth) + 0.0
+    return p, np.arctan2(0.0 - z, level)
 
 
 def _turn(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -163,7 +163,8 @@ def spherical_from_enu(
     azimuth_rad, elevation_rad, range_m : ndarray
         Azimuth is 0 where there is no horizontal offset.
     """
-    north, east, up = (np.ascontiguousarray(x) for x in np.broadcast_arrays(north, east, up))
+    if not north.shape == east.shape == up.shape:
+        north, east, up = (np.ascontiguousarray(x) for x in np.broadcast_arrays(north, east, up))
     level_squared = north * north
     level_squared += east * east
     level = np.sqrt(level_squared)

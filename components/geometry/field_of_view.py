@@ -68,6 +68,41 @@ def inside(
     return np.asarray(in_azimuth & in_elevation)[()]
 
 
+class FieldOfView:
+    """A field of view, checked once, for azimuths in (-pi, pi] that are known to be finite.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad : (min, max)
+        As for `inside`.
+
+    Raises
+    ------
+    ValueError
+        A bound out of place.
+    """
+
+    def __init__(
+        self, azimuth_rad: tuple[float, float], elevation_rad: tuple[float, float]
+    ) -> None:
+        inside(
+            0.0, 0.0, azimuth_min_rad=azimuth_rad[0], azimuth_max_rad=azimuth_rad[1],
+            elevation_min_rad=elevation_rad[0], elevation_max_rad=elevation_rad[1],
+        )  # fmt: skip
+        self._low, self._high = _azimuth_bounds(*azimuth_rad)
+        self._lowest, self._highest = elevation_rad
+
+    def holds(self, p_rad: FloatArray, q_rad: FloatArray) -> BoolArray:
+        """Tell which directions lie inside, as `inside` does."""
+        found = q_rad >= self._lowest
+        found &= q_rad <= self._highest
+        if self._high - self._low < TWO_PI:
+            within = p_rad >= self._low
+            within &= p_rad <= self._high
+            found &= _at_other_turns(p_rad, p_rad, self._low, self._high, within)
+        return found
+
+
 def within_range(
     range_m: npt.ArrayLike, *, range_min_m: float = 0.0, range_max_m: float = math.inf
 ) -> BoolArray:
@@ -122,11 +157,19 @@ def _in_sector(azimuth: FloatArray, low: float, high: float) -> BoolArray:
     slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
     slack_here = np.where(p == azimuth, 0.0, slack)
     result = (p >= low - slack_here) & (p <= high + slack_here)
+    return _at_other_turns(p, azimuth, low, high, result)
+
+
+def _at_other_turns(
+    p: FloatArray, azimuth: FloatArray, low: float, high: float, result: BoolArray
+) -> BoolArray:
+    """Add to the result what lies inside after whole turns; p is the wrapped azimuth."""
     for turns in (-2.0, -1.0, 1.0, 2.0):
         shift = turns * TWO_PI
         # A margin of 1 rad only decides whether the comparison is worth doing.
         if shift - math.pi <= high + 1.0 and shift + math.pi >= low - 1.0:
             turned = p + shift
+            slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
             result |= (turned >= low - slack) & (turned <= high + slack)
     return result
 

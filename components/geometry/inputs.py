@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -65,7 +67,7 @@ def shaped(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[FloatArray, ...
         if array.shape != shape:
             # A result need not depend on every input, so it can be smaller than all of them;
             # and scalars are worked on as arrays of one element.
-            if array.size == int(np.prod(shape)):
+            if array.size == math.prod(shape):
                 array = array.reshape(shape)
             else:
                 array = np.ascontiguousarray(np.broadcast_to(array, shape))
@@ -115,7 +117,11 @@ def positions(
         "lon_deg": contiguous("lon_deg", lon_deg),
         "alt_m": contiguous("alt_m", alt_m),
     }
-    shape = common_shape(**named)
+    shape = named["alt_m"].shape
+    # One observer for all targets of a row is what every scan has.
+    column = (*shape[:-1], 1) if len(shape) > 1 else shape
+    if any(array.shape != shape and array.shape != column for array in named.values()):
+        shape = common_shape(**named)
     if validate:
         for name, array in named.items():
             if "lat" in name:

@@ -5,6 +5,7 @@ range in the ownship's NED frame, the same line of sight in its body axes (the t
 and the target's attitude relative to that line of sight.
 """
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
@@ -13,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
-from components.geometry.angles import wrap_pi
+from components.geometry.angles import wrap_pi_unchecked
 from components.geometry.attitude import sensor_angles
 from components.geometry.ladder import ATTITUDE, EARTH
 from components.geometry.rung_planning import Rung, pick_rung
@@ -110,7 +111,7 @@ class Transform(Component):
         states = wake["states"]
         if states is None:
             return None
-        own = {name: getattr(states, f"own_{name}")[:, np.newaxis] for name in _PLACE}
+        own = _beside_targets(states)
         return RelativeTargets(
             tick=states.tick,
             own_alt_m=states.own_alt_m,
@@ -118,7 +119,7 @@ class Transform(Component):
             columns=states.columns,
             believed=self._believed(states),
             revisit=self._revisit(states.flights),
-            **self._as_seen(SimpleNamespace(**own), states, states.present),
+            **self._as_seen(own, states, states.present),
         )
 
     def _as_seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
@@ -140,15 +141,18 @@ class Transform(Component):
             validate=False,
         )  # fmt: skip
         p, q = sensor_angles(
-            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad, model=self.rung.attitude
-        )
+            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad,
+            model=self.rung.attitude, validate=False,
+        )  # fmt: skip
+        heading = wrap_pi_unchecked(other.yaw_rad - azimuth)
+        _require_numbers(p, heading, other.pitch_rad, other.roll_rad)
         return {
             "azimuth_rad": azimuth,
             "elevation_rad": elevation,
             "range_m": range_m,
             "body_azimuth_rad": p,
             "body_elevation_rad": q,
-            "relative_heading_rad": wrap_pi(other.yaw_rad - azimuth),
+            "relative_heading_rad": heading,
             "target_pitch_rad": other.pitch_rad,
             "target_roll_rad": other.roll_rad,
             "alt_m": other.alt_m,
@@ -175,6 +179,26 @@ class Transform(Component):
 
 def _block(state: Any, rows: slice) -> SimpleNamespace:
     return SimpleNamespace(**{name: getattr(state, name)[rows] for name in _PLACE})
+
+
+def _beside_targets(states: TrafficStates) -> SimpleNamespace:
+    """Return the ownship's position and attitude, broadcastable to the targets'."""
+    own = [getattr(states, f"own_{name}") for name in _PLACE]
+    if len(states) > 1:
+        columns = [values[:, np.newaxis] for values in own]
+        return SimpleNamespace(**dict(zip(_PLACE, columns, strict=True)))
+    # Of a single row, arrays of the targets' own shape take NumPy half as long as broadcast ones.
+    wide = np.empty((6, *states.lat_deg.shape))
+    for row, values in zip(wide, own, strict=True):
+        row[...] = values
+    return SimpleNamespace(**dict(zip(_PLACE, wide, strict=True)))
+
+
+def _require_numbers(*angles: FloatArray) -> None:
+    """Refuse what is not a finite number, here for all blocks downstream."""
+    # A sum is finite only if all of it is; it stands for whatever the angles came from.
+    if not math.isfinite((angles[0] + angles[1] + angles[2] + angles[3]).sum()):
+        raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 
 class FlatEarth(Transform):

@@ -48,6 +48,7 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         cells.target_roll_rad,
         cells.elevation_rad,
         model=silhouette,
+        validate=False,
         **{name: cells.of_target(column) for name, column in areas.items()},
     )
     return area

@@ -10,7 +10,7 @@ from pydantic import Field
 from components.optical.dynamic_signature import DynamicSignature
 from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
-from components.optical.signature import confidence, pixels_covered, total_signature
+from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
 from components.sensor import Cells, Look, Sensor, SensorParameters
 from dsa_des.effects import Effect
@@ -133,20 +133,19 @@ class Camera(Sensor):
     def look(self, cells: Cells) -> Look:
         """Compare every target's signature with the threshold."""
         area = self.shown_area(cells)
-        pixels = pixels_covered(
+        pixels = pixels_of_cells(
             area,
             cells.range_m,
-            pixel_azimuth_rad=self.pixel_azimuth_rad,
-            pixel_elevation_rad=self.pixel_elevation_rad,
-            sensor_pixels=float(self.p.azimuth_pixels * self.p.elevation_pixels),
+            self.pixel_azimuth_rad,
+            self.pixel_elevation_rad,
+            float(self.p.azimuth_pixels * self.p.elevation_pixels),
         )
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
             contrast = contrast * factor(cells)
-        signature = total_signature(
-            pixels, contrast_gain=contrast, static_weight=self.p.static_weight
-        )
+        # Eq. 18, by hand: total_signature adds the rate of the line of sight, here an effect.
+        signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
             signature = signature + added(cells)
-        margin = confidence(signature, self.p.threshold)
+        margin = signature - self.p.threshold
         return Look(margin >= 0.0, margin, {"pixels": pixels})

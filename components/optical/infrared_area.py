@@ -85,6 +85,7 @@ def infrared_area(
     engine: str | None = None,
     plume_share_of_back: ArrayLike | None = None,
     model: str = "exact",
+    validate: bool = True,
 ) -> Any:
     """Give the area that radiates towards an infrared camera (thesis eq. 20-21).
 
@@ -104,6 +105,8 @@ def infrared_area(
         Used instead of the engine's own share.
     model : {"exact", "thesis", "convex_hull"}
         Rung of the silhouette.
+    validate : bool
+        False skips the silhouette's checks, see `visible_area`.
 
     Returns
     -------
@@ -124,6 +127,7 @@ def infrared_area(
         horizontal_m2=horizontal_m2,
         back_m2=back_m2,
         model=model,
+        validate=validate,
     )
     if engine is None:
         if plume_share_of_back is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.checks import broadcast_flat, finite, not_negative, positive, unflatten
+from components.optical.arrays import FloatArray
 from components.optical.line_of_sight_rate import line_of_sight_rate
 
 __all__ = [
@@ -64,11 +65,18 @@ def pixels_covered(
         pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
         sensor_pixels=positive("sensor_pixels", sensor_pixels),
     )
+    return unflatten(pixels_of_cells(area, distance, across, upward, most), shape)
+
+
+def pixels_of_cells(
+    area: FloatArray, distance: FloatArray, across: Any, upward: Any, most: Any
+) -> FloatArray:
+    """`pixels_covered` for flat arrays that were checked; the pixels may be plain numbers."""
     distance = np.minimum(distance, _FARTHEST_M)
     pixel_m2 = (distance * across) * (distance * upward)
     fills = area >= pixel_m2 * most
     pixels = np.where(fills, most, area / np.where(fills, 1.0, pixel_m2))
-    return unflatten(np.where(area > 0.0, pixels, 0.0), shape)
+    return np.where(area > 0.0, pixels, 0.0)
 
 
 def total_signature(

@@ -40,6 +40,7 @@ def visible_area(
     model: str = "exact",
     table: AspectTable | None = None,
     mesh: TriangleMesh | None = None,
+    validate: bool = True,
 ) -> Any:
     """Give the area of a target projected on the plane across the line of sight.
 
@@ -78,6 +79,9 @@ def visible_area(
         For ``aspect_table``.
     mesh : TriangleMesh, optional
         For ``convex_hull``.
+    validate : bool
+        False skips the checks, for a caller that has flat contiguous arrays of one shape and knows
+        the areas to be there.
 
     Returns
     -------
@@ -94,6 +98,9 @@ def visible_area(
     -----
     Thesis eq. 9-13 and 20-21; errata 4, 8, 9 and 12.
     """
+    if not validate and model in _PARAMETRIC and mesh is None:
+        arrays: Any = (relative_heading_rad, pitch_rad, roll_rad, elevation_rad)
+        return _PARAMETRIC[model](*arrays, front_m2, side_m2, horizontal_m2, back_m2)
     angles: dict[str, FloatArray] = {
         "relative_heading_rad": angle("relative_heading_rad", relative_heading_rad),
         "pitch_rad": angle("pitch_rad", pitch_rad),

@@ -118,6 +118,16 @@ def miss_probability(
     return _probability(snr, pulses, false_alarm_probability, model, method, miss=True)
 
 
+def probability_of_cells(
+    snr: FloatArray, pulses: int, false_alarm_probability: float, model: str, method: str
+) -> FloatArray:
+    """`detection_probability` for a flat contiguous SNR and one radar, all of it checked."""
+    if method == "exact":
+        return exact_probability(snr, pulses, false_alarm_probability, model, miss=False)
+    with np.errstate(under="ignore"):
+        return _RUNGS[method](snr, pulses, false_alarm_probability, model)
+
+
 def _probability(
     snr: ArrayLike,
     pulses: ArrayLike,

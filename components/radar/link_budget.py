@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, not_negative, positive, refuse, unflatten
+from components.checks import (
+    FloatArray,
+    broadcast_flat,
+    not_negative,
+    positive,
+    refuse,
+    unflatten,
+)
 from components.radar.radar_equation import (
     SMALLEST_MINIMUM_RANGE_M,
     checked_minimum_range,
+    echo_snr,
     radar_constant,
     snr,
     wavelength,
@@ -85,7 +94,7 @@ class LinkBudget:
             return self.wavelength_m
         return float(wavelength(self.frequency_hz if self.frequency_hz is not None else 0.0))
 
-    @property
+    @cached_property
     def constant_m2(self) -> float:
         """`radar_constant` of this budget, m²."""
         return radar_constant(
@@ -98,7 +107,7 @@ class LinkBudget:
             losses_db=self.losses_db,
         )
 
-    @property
+    @cached_property
     def nearest_m(self) -> float:
         """The minimum range in use: given, or the start of the antenna's far field."""
         if self.minimum_range_m is not None:
@@ -109,6 +118,10 @@ class LinkBudget:
     def snr(self, range_m: ArrayLike, rcs_m2: ArrayLike) -> Any:
         """Return the SNR at a slant range for an RCS; see `components.radar.radar_equation.snr`."""
         return snr(range_m, rcs_m2, constant_m2=self.constant_m2, minimum_range_m=self.nearest_m)
+
+    def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
+        """Return the same for flat arrays of one shape that are known to be 0 or more."""
+        return echo_snr(range_m, rcs_m2, self.constant_m2, self.nearest_m)
 
     def range_for_snr(self, snr: ArrayLike, rcs_m2: ArrayLike) -> Any:
         """Return the slant range in metres at which the radar equation gives an SNR.

@@ -8,13 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, finite, not_negative, positive, unflatten
+from components.checks import (
+    FloatArray,
+    broadcast_flat,
+    finite,
+    not_negative,
+    positive,
+    unflatten,
+)
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 BOLTZMANN_J_K = 1.380649e-23
 REFERENCE_TEMPERATURE_K = 290.0
 
 LARGEST_DB = 300.0
+_LARGEST = float(np.finfo(np.float64).max)
 SMALLEST_MINIMUM_RANGE_M = 1e-3
 
 
@@ -144,6 +152,13 @@ def snr(
     shape, (distance, rcs) = broadcast_flat(
         range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
     )
+    return unflatten(echo_snr(distance, rcs, constant_m2, nearest), shape)
+
+
+def echo_snr(
+    distance: FloatArray, rcs: FloatArray, constant_m2: float, nearest: float
+) -> FloatArray:
+    """`snr` for flat contiguous arrays of one shape, all arguments checked."""
     near = distance < nearest
     safe = np.where(near, nearest, distance)
     # Both factors are divided by the square: neither the fourth power of a large range nor their
@@ -151,5 +166,4 @@ def snr(
     with np.errstate(under="ignore", over="ignore"):
         square = safe * safe
         echo = (constant_m2 / square) * (rcs / square)
-    echo = np.where(near, 0.0, np.minimum(echo, np.finfo(np.float64).max))
-    return unflatten(echo, shape)
+    return np.where(near, 0.0, np.minimum(echo, _LARGEST))

@@ -81,11 +81,12 @@ def models_of(swerling: int | None) -> ModelsOfCells:
         return lambda cells: [(swerling % 5, slice(None))]
 
     def models(cells: Cells) -> list[tuple[int, Any]]:
+        known = cells.roster.swerling_models
+        if len(known) == 1:
+            return [(known[0], slice(None))]
         of_cell = cells.of_target(cells.roster.swerling)
-        found = np.unique(of_cell).tolist()
-        if len(found) == 1:
-            return [(found[0], slice(None))]
-        return [(model, np.flatnonzero(of_cell == model)) for model in found]
+        found = [(model, np.flatnonzero(of_cell == model)) for model in known]
+        return [(model, chosen) for model, chosen in found if len(chosen)]
 
     return models
 

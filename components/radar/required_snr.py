@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,6 +50,11 @@ def required_snr(
             f"pd is {wanted:g}: it must be above the false-alarm probability {pfa:g}, which noise "
             "alone reaches"
         )
+    return _solved(wanted, pfa, n, name)
+
+
+@lru_cache(maxsize=1024)
+def _solved(wanted: float, pfa: float, n: int, name: str) -> float:
     if n == 1 and name in ("swerling1", "swerling2"):
         return math.log(pfa / wanted) / math.log(wanted)
     low, high = math.log(1e-30), math.log(1e30)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
-from components.radar.detection import detection_probability
+from components.radar.detection import detection_probability, probability_of_cells
 from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
@@ -149,14 +149,9 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
-        pd = np.asarray(
-            detection_probability(
-                snr,
-                pulses=self.p.pulses,
-                false_alarm_probability=self.p.false_alarm_probability,
-                model=f"swerling{model}",
-                method=self._method,
-            )
+        p = self.p
+        pd = probability_of_cells(
+            snr, p.pulses, p.false_alarm_probability, f"swerling{model}", self._method
         )
         if cnr is None or not cnr.any():
             return pd

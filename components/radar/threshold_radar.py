@@ -97,7 +97,7 @@ class LinkBudgetRadar(Radar):
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""
-        snr = self._echo_budget.snr(cells.range_m, rcs_m2)
+        snr = self._echo_budget.snr_of_cells(cells.range_m, rcs_m2)
         for factor in self.snr_factors:
             snr = snr * factor(cells)
         return snr

@@ -49,8 +49,8 @@ class TrackerStub(Component):
         if fused is None:
             return None
         fused = true_entries(fused)
-        counts = np.diff(fused.offsets)
-        updated = np.flatnonzero(counts)
+        counts = fused.offsets[1:] - fused.offsets[:-1]
+        updated = counts.nonzero()[0]
         if len(updated) == 0:
             return None
         replica = wake.replica[updated]
@@ -60,14 +60,17 @@ class TrackerStub(Component):
         targets = _present(self._targets, fused.target, len(fused.roster))
         pool, start = self._pool(fused, counts)
         last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
-        last[0, np.searchsorted(targets, self._targets)] = np.arange(start)
-        rows = np.repeat(np.arange(1, len(updated) + 1), counts[updated])
-        last[rows, np.searchsorted(targets, fused.target)] = start + np.arange(len(fused.target))
+        last[0, targets.searchsorted(self._targets)] = np.arange(start)
+        rows: Any = 1
+        if len(updated) > 1:
+            rows = np.repeat(np.arange(1, len(updated) + 1), counts[updated])
+        last[rows, targets.searchsorted(fused.target)] = np.arange(start, start + len(fused.target))
         last = np.maximum.accumulate(last, axis=0)
         if replica[0] != replica[-1]:
             _forget_other_replicas(last, replica, start, counts[updated])
-        self._targets = targets[last[-1] >= 0]
-        held_at_end = last[-1][last[-1] >= 0]
+        at_end = last[-1] >= 0
+        self._targets = targets[at_end]
+        held_at_end = last[-1][at_end]
         self._held = {name: values[held_at_end] for name, values in pool.items()}
         return self._tracks(fused, fused.tick[updated], targets, last[1:], pool)
 
@@ -94,11 +97,11 @@ class TrackerStub(Component):
         held = last >= 0
         if self.p.drop_after_s is not None:
             held &= age_s < self.p.drop_after_s
-        row, column = np.nonzero(held)
+        row, column = held.nonzero()
         entry = last[row, column]
         return Tracks(
             tick=ticks,
-            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
+            offsets=row.searchsorted(np.arange(len(ticks) + 1)),
             target=targets[column],
             azimuth_rad=pool["azimuth_rad"][entry],
             elevation_rad=pool["elevation_rad"][entry],
@@ -115,7 +118,7 @@ def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:
     there = np.zeros(targets, dtype=bool)
     there[held] = True
     there[new] = True
-    return np.flatnonzero(there)
+    return there.nonzero()[0]
 
 
 def _forget_other_replicas(last: IntArray, replica: IntArray, start: int, counts: IntArray) -> None:

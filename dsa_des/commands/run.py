@@ -14,6 +14,7 @@ import click
 
 from dsa_des import __version__
 from dsa_des.commands.loading import load
+from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.recording import ObserverSink, Recorder
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
@@ -34,12 +35,18 @@ def run_scene(
     quiet: bool,
     as_json: bool,
     simulate_everything: bool,
+    realtime: str | None,
 ) -> None:
     """Run a scene into a folder, then print its summary."""
+    pacer = None if realtime is None else Pacer(parse_factor(realtime))
     loaded = load(scene, sets, swaps, seed, duration)
     target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
     summary = record_run(
-        loaded, target, simulate_everything=simulate_everything, silent=quiet or as_json
+        loaded,
+        target,
+        simulate_everything=simulate_everything,
+        silent=quiet or as_json,
+        pacer=pacer,
     )
     if as_json:
         click.echo(json.dumps(summary, indent=2))
@@ -49,10 +56,17 @@ def run_scene(
         console = Console()
         for report in load_reports():
             report.show(console, summary)
+        if pacer is not None:
+            console.print(pacer.sentence(), soft_wrap=True)
 
 
 def record_run(
-    loaded: Scene, target: Path, *, simulate_everything: bool = False, silent: bool = True
+    loaded: Scene,
+    target: Path,
+    *,
+    simulate_everything: bool = False,
+    silent: bool = True,
+    pacer: Pacer | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
@@ -64,6 +78,8 @@ def record_run(
     check_target(target)
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
+    if pacer is not None:
+        simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
     observers = ObserverSink(
         observer for report in reports for observer in report.observers(simulation)
@@ -75,8 +91,10 @@ def record_run(
         recorder.sinks += [ParquetSink(folder), observers]
         started = time.perf_counter()
         with _progress(simulation, silent=silent) as progress:
-            outcome = simulation.run(progress)
+            outcome = simulation.run(_paced(progress, pacer))
         summary = _summary(observers, outcome, target)
+        if pacer is not None:
+            summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
         (folder / "scene.toml").write_text(scene_text, encoding="utf-8")
         wall_s = time.perf_counter() - started
@@ -106,7 +124,11 @@ def _info(
     wall_s: float,
 ) -> dict[str, Any]:
     """Return the content of run.json; only ``timings`` may differ between two runs."""
-    sections = {k: v for k, v in summary.items() if k not in ("simulated_s", "cpu_s", "out")}
+    own = ("simulated_s", "cpu_s", "out", "realtime")
+    sections = {key: value for key, value in summary.items() if key not in own}
+    timings = {"cpu_s": outcome.cpu_s, "wall_s": wall_s}
+    if "realtime" in summary:
+        timings["realtime"] = summary["realtime"]
     return {
         "title": simulation.scene.title,
         "seed": simulation.scene.seed,
@@ -121,8 +143,24 @@ def _info(
         "look_ahead": outcome.windowed,
         "rows": recorder.rows,
         "summary": sections,
-        "timings": {"cpu_s": outcome.cpu_s, "wall_s": wall_s},
+        "timings": timings,
     }
+
+
+def _paced(
+    progress: Callable[[float], None] | None, pacer: Pacer | None
+) -> Callable[[float], None] | None:
+    """Return what is called after each window: the pacer first, then the progress bar."""
+    if pacer is None:
+        return progress
+
+    def after_window(time_s: float) -> None:
+        pacer(time_s)
+        if progress is not None:
+            progress(time_s)
+
+    pacer.start()
+    return after_window
 
 
 @contextmanager

@@ -1,0 +1,1 @@
+"""The chain inside a host simulator that owns time (thesis Appendix A)."""

@@ -1,0 +1,94 @@
+"""A scene with the host program in the place of its traffic."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from components.embedding.host_traffic import HostTraffic, HostTrafficParameters, Plane
+from components.target_messages import TrafficStates
+from dsa_des.component import Component
+from dsa_des.errors import Problem, SceneError, UsageError
+from dsa_des.registry import UnknownType, find
+from dsa_des.scene import Block, Scene, load_tables
+from dsa_des.scene_file import SceneFile, read_scene_file
+
+HOST = "traffic.host"
+#: What the source is called in a scene that has none; its wires then name it so.
+_NAME = "traffic"
+
+
+def load_for_host(
+    scene: Scene | Path | str,
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+) -> Scene:
+    """Return a scene, read from a file or as it is, that has a traffic block.
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    UsageError
+        If a scene that was loaded already is to be changed.
+    """
+    if isinstance(scene, Scene):
+        if tuple(sets) or tuple(swaps):
+            raise UsageError("sets and swaps change a scene while it is loaded: give its file")
+        return scene if seed is None else replace(scene, seed=seed)
+    scene_file = read_scene_file(scene)
+    blocks = scene_file.data.get("blocks", {})
+    if isinstance(blocks, dict) and _NAME not in blocks and not _has_traffic(scene_file):
+        blocks[_NAME] = {"type": HOST}
+    return load_tables(scene_file, sets=sets, swaps=swaps, seed=seed)
+
+
+def _has_traffic(scene_file: SceneFile) -> bool:
+    for table in scene_file.data["blocks"].values():
+        try:
+            if isinstance(table, dict) and _is_traffic(find(str(table.get("type")))):
+                return True
+        except UnknownType:  # said when the scene is checked
+            continue
+    return False
+
+
+def _is_traffic(cls: type[Component]) -> bool:
+    sends = [output.message for output in cls.outputs.values()]
+    alone = not any(port.required for port in cls.inputs.values())
+    return alone and any(issubclass(message, TrafficStates) for message in sends)
+
+
+def source_of(scene: Scene) -> str:
+    """Return the name of the block that the host replaces.
+
+    Raises
+    ------
+    SceneError
+        If no block, or more than one, sends traffic.
+    """
+    found = [name for name, block in scene.blocks.items() if _is_traffic(block.cls)]
+    if len(found) != 1:
+        what = f"{len(found)} blocks send traffic ({', '.join(found)})" if found else "no traffic"
+        message = f"{what}: a host takes the place of exactly one"
+        raise SceneError([Problem(str(scene.path), "blocks", message)])
+    return found[0]
+
+
+def planes_known_to(scene: Scene) -> list[Plane]:
+    """Return the planes that a scene made for a host lists itself."""
+    parameters: Any = scene.blocks[source_of(scene)].parameters
+    return list(parameters.planes) if isinstance(parameters, HostTrafficParameters) else []
+
+
+def with_host(scene: Scene, planes: Sequence[Plane]) -> Scene:
+    """Return the scene with these planes, moved by the host, for traffic.
+
+    The ticks stay those of the scene, so scans and draws are those of the whole run.
+    """
+    name = source_of(scene)
+    parameters = HostTrafficParameters(planes=list(planes))
+    block = Block(name, HOST, HostTraffic, parameters)
+    return replace(scene, blocks={**scene.blocks, name: block})

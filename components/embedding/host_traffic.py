@@ -1,0 +1,63 @@
+"""The traffic source of a scene that a host program drives (``traffic.host``)."""
+
+from fractions import Fraction
+from typing import Any
+
+from pydantic import Field
+
+from components.aircraft import Aircraft, Roster
+from components.target_messages import TrafficStates
+from dsa_des.component import Component, Parameters
+from dsa_des.ports import Output
+from dsa_des.wake import Wake
+
+# A host says itself when it ends; effects that ask for the length of the run are told a year.
+_NO_END_S = Fraction(365 * 86400)
+
+
+class Plane(Aircraft):
+    """An aircraft that the host moves."""
+
+    name: str = Field(min_length=1, description="Name; keys its random draws.")
+
+
+class HostTrafficParameters(Parameters):
+    """Parameters of traffic whose positions a host program gives."""
+
+    planes: list[Plane] = Field(default=[], description="Aircraft that are known from the start.")
+
+
+class HostTraffic(Component):
+    """Stands where the host program gives positions; such a scene runs inside it only.
+
+    See `dsa_des.embed.Simulator`.
+    """
+
+    outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
+    Parameters = HostTrafficParameters
+    windowed = True
+    clocked = "demand"
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self.roster = Roster.of([(plane.name, plane) for plane in parameters.planes])
+
+    def offer(self, port: str) -> Roster:
+        """Say what the targets are."""
+        return self.roster
+
+    def natural_duration_s(self) -> Fraction:
+        """Return a length for scenes that give none."""
+        return _NO_END_S
+
+    @property
+    def width(self) -> int:
+        """Number of targets."""
+        return len(self.roster)
+
+    def run(self, wake: Wake) -> None:
+        """Refuse to run by itself."""
+        raise TypeError(
+            "positions come from a host program: drive this scene with dsa_des.embed.Simulator, "
+            "or swap its traffic for one that flies by itself"
+        )

@@ -1,0 +1,140 @@
+"""What one call says of the planes: where they were detected, by which sensors, how surely."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from components.messages import Detections, FusedDetections
+from dsa_des.message import Message
+from dsa_des.types import FloatArray
+
+_NAN = math.nan
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One plane, or a false alarm, in one call.
+
+    Parameters
+    ----------
+    name : str
+        Empty for a false alarm.
+    azimuth_rad, elevation_rad : float
+        In the ownship's body axes, azimuth clockwise from the nose and elevation upward; NaN when
+        it was not detected.
+    range_m : float
+        Slant range; NaN when no contributing sensor measures it.
+    sensors : tuple of str
+        Those whose detections were put together; empty when it was not detected.
+    confidence : dict of float
+        Of each sensor that detected it in this call: its margin over the threshold, in the unit of
+        the sensor (dB for radar, signature for cameras).
+    """
+
+    name: str
+    azimuth_rad: float = _NAN
+    elevation_rad: float = _NAN
+    range_m: float = _NAN
+    sensors: tuple[str, ...] = ()
+    confidence: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def detected(self) -> bool:
+        """Whether any sensor detected it."""
+        return bool(self.sensors)
+
+    @property
+    def polar(self) -> tuple[float, float, float]:
+        """Azimuth and elevation in rad and range in m, as the thesis's ``detected``."""
+        return self.azimuth_rad, self.elevation_rad, self.range_m
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What one call of `simulate` came to; sightings by plane name or position.
+
+    Parameters
+    ----------
+    time_s : float
+    sightings : tuple of Sighting
+        One for each plane of the call, in the order in which planes were added.
+    false_alarms : tuple of Sighting
+        They belong to no plane; a call for one plane reports none.
+    scans : dict of int
+        Number of the scan that each sensor made in this call; sensors that are not due are absent.
+    missed : dict of int
+        Earlier scans that fell between the calls and were not made.
+    messages : dict of Message
+        What each block sent, in full.
+    """
+
+    time_s: float
+    sightings: tuple[Sighting, ...]
+    false_alarms: tuple[Sighting, ...]
+    scans: Mapping[str, int]
+    missed: Mapping[str, int]
+    messages: Mapping[str, Message]
+
+    def __len__(self) -> int:
+        return len(self.sightings)
+
+    def __iter__(self) -> Iterator[Sighting]:
+        return iter(self.sightings)
+
+    def __getitem__(self, plane: str | int) -> Sighting:
+        if isinstance(plane, int):
+            return self.sightings[plane]
+        for sighting in self.sightings:
+            if sighting.name == plane:
+                return sighting
+        raise KeyError(plane)
+
+    @cached_property
+    def detected(self) -> FloatArray:
+        """Azimuth (rad), elevation (rad) and range (m) of each plane, shape (planes, 3)."""
+        return np.array([sighting.polar for sighting in self.sightings]).reshape(-1, 3)
+
+
+@lru_cache(maxsize=256)
+def _names_of(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
+
+
+def sightings_of(
+    fused: FusedDetections | None, detections: Mapping[str, Detections]
+) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
+    """Return what was detected, by index in the roster, and the false alarms.
+
+    Parameters
+    ----------
+    fused : FusedDetections, one row, or None
+        None when no sensor reported.
+    detections : mapping of Detections
+        What each sensor reported in this call, one row each.
+    """
+    seen: dict[int, Sighting] = {}
+    false: list[Sighting] = []
+    if fused is None:
+        return seen, ()
+    margins = {
+        sensor: dict(zip(m.target.tolist(), m.confidence.tolist(), strict=True))
+        for sensor, m in detections.items()
+    }
+    for target, p, q, r, mask in zip(
+        fused.target.tolist(),
+        fused.azimuth_rad.tolist(),
+        fused.elevation_rad.tolist(),
+        fused.range_m.tolist(),
+        fused.contributors.tolist(),
+        strict=True,
+    ):
+        sensors = _names_of(mask, fused.sensors)
+        if target < 0:
+            false.append(Sighting("", p, q, r, sensors))
+            continue
+        confidence = {s: m[target] for s, m in margins.items() if target in m}
+        seen[target] = Sighting(fused.roster.names[target], p, q, r, sensors, confidence)
+    return seen, tuple(false)

@@ -1,0 +1,124 @@
+"""From the arrays of a host program to the traffic message of one instant."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.aircraft import Roster
+from components.geometry.inputs import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
+from components.target_messages import TrafficStates
+from dsa_des.types import FloatArray
+
+_NAMES = ("latitude", "longitude", "altitude", "yaw", "pitch", "roll")
+# A latitude of 90° that came through radians may be a last place above pi/2.
+_LOW = np.array([-math.pi / 2, -LARGEST, LOWEST_ALTITUDE_M, -LARGEST, -LARGEST, -LARGEST])
+_HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LARGEST])
+
+
+def checked_rows(
+    who: str, lla: ArrayLike, att: ArrayLike, count: int, *, missing: bool = True
+) -> FloatArray:
+    """Return latitude, longitude, altitude, yaw, pitch, roll as rows, checked.
+
+    Parameters
+    ----------
+    who : str
+        ``ownship`` or ``intruder``, for messages.
+    lla : (count, 3) array_like
+        Rad, rad, m; (3,) for one row; anything empty for none.
+    att : (count, 3) array_like, rad
+    count : int
+        Rows expected.
+    missing : bool
+        Whether a row may be NaN, all of its position: that plane is not there.
+
+    Returns
+    -------
+    (count, 6) array
+        Rows that are not there are NaN throughout.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit or a number is out of range.
+    """
+    rows = np.empty((count, 6))
+    for label, value, columns in (
+        (f"lla_{who}", lla, slice(0, 3)),
+        (f"att_{who}", att, slice(3, 6)),
+    ):
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{label} is {value!r}: it must hold numbers") from error
+        if array.shape != (count, 3) and not (array.shape == (3,) and count == 1):
+            if array.size == 0 and count == 0:
+                continue
+            allowed = "(3,)" if who == "ownship" else f"({count}, 3), a row for each plane"
+            raise ValueError(f"{label} has the shape {array.shape}: it must be {allowed}")
+        rows[:, columns] = array
+    inside = np.asarray((rows >= _LOW) & (rows <= _HIGH))
+    if not inside.all():
+        absent = np.asarray(np.isnan(rows[:, :3]).all(axis=1) & missing)
+        wrong = np.argwhere(~inside & ~absent[:, np.newaxis])
+        if len(wrong):
+            row, column = wrong[0].tolist()
+            label = f"{'lla' if column < 3 else 'att'}_{who}"
+            place = f" of row {row}" if count > 1 else ""
+            low, high = _LOW[column], _HIGH[column]
+            unit = "m" if column == 2 else "rad"
+            raise ValueError(
+                f"{label}: {_NAMES[column]}{place} is {rows[row, column]:g}: it must lie in "
+                f"[{low:g}, {high:g}] {unit}"
+            )
+        rows[absent] = np.nan
+    return rows
+
+
+def traffic_states(
+    own: FloatArray, rows: FloatArray, tick: int, roster: Roster, chosen: list[int] | None
+) -> TrafficStates:
+    """Return the traffic message of one instant.
+
+    Parameters
+    ----------
+    own : (1, 6) array
+        From `checked_rows`.
+    rows : (planes, 6) array
+    tick : int
+    roster : Roster
+    chosen : list of int or None
+        Which planes of the roster the rows are; None for all.
+    """
+    present = np.ones((1, len(rows)), dtype=bool)
+    there = rows[:, 0] == rows[:, 0]
+    if not there.all():
+        present[0] = there
+        # Arithmetic on who is not there must be safe: far enough from us to have a direction.
+        rows = np.where(there[:, np.newaxis], rows, own)
+    values = np.ascontiguousarray(rows.T)
+    own_values = own.reshape(6, 1)
+    lat_lon, own_lat_lon = np.degrees(values[:2]), np.degrees(own_values[:2])
+    return TrafficStates(
+        tick=np.array([tick], dtype=np.int64),
+        own_lat_deg=own_lat_lon[0],
+        own_lon_deg=own_lat_lon[1],
+        own_alt_m=own_values[2],
+        own_yaw_rad=own_values[3],
+        own_pitch_rad=own_values[4],
+        own_roll_rad=own_values[5],
+        lat_deg=lat_lon[:1],
+        lon_deg=lat_lon[1:],
+        alt_m=values[2:3],
+        yaw_rad=values[3:4],
+        pitch_rad=values[4:5],
+        roll_rad=values[5:6],
+        present=present,
+        roster=roster,
+        columns=_everybody(len(roster)) if chosen is None else np.array(chosen, dtype=np.int64),
+    )
+
+
+def _everybody(count: int) -> np.ndarray:
+    return np.arange(count)
