@@ -36,7 +36,12 @@ def run_benchmark(
     rows: list[dict[str, Any]] = []
     if embed:
         rows.append(_measured_calls(quick, repeats or (1 if quick else 3)))
+        what, calls = rows[0]["what"], rows[0]["calls"]
+        console.print(f"simulate: {what}; {calls} calls", soft_wrap=True)
         console.print(_calls_table(rows[0]))
+        share = rows[0]["share_within_wanted"]
+        wanted_ms = rows[0]["wanted_p99_us"] / 1000.0
+        console.print(f"{share:.1%} of the calls within {wanted_ms:g} ms of wall time")
     else:
         rows += _measured_cases(console, cases, quick, repeats, before)
     if target is not None:
@@ -86,8 +91,7 @@ def _fresh(module: str, arguments: list[str]) -> dict[str, Any]:
 def _calls_table(row: dict[str, Any]) -> Any:
     from rich.table import Table
 
-    title = f"simulate: {row['what']}; {row['calls']} calls"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("us per call", "p50", "p99", "wanted", "max", "first"):
         table.add_column(heading, justify="left" if heading == "us per call" else "right")
     ends = {

@@ -6,7 +6,6 @@ starts it anew, so that nothing is warm from elsewhere.
 
 import argparse
 import json
-import os
 import sys
 import time
 from typing import Any
@@ -29,8 +28,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--calls", type=int, default=1800)
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args(arguments)
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     print(json.dumps(measured(options.calls, options.repeats)))
     return 0
 
