@@ -10,7 +10,8 @@ def test_every_call_is_timed():
     row = measured(calls=12, repeats=2)
     assert row["calls"] == 24
     assert row["sightings"] > 0 and row["sightings"] % 2 == 0  # the same in each repetition
-    for key in ("wall_us", "cpu_us"):
+    assert row["undisturbed_us"]["p99"] <= row["wall_us"]["p99"]
+    for key in ("wall_us", "cpu_us", "undisturbed_us"):
         times = row[key]
         assert 0.0 < times["p50"] <= times["p99"] <= times["max"]
     assert 0.0 <= row["share_within_wanted"] <= 1.0
