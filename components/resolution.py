@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from math import copysign, fmod
 from typing import Any
 
 import numpy as np
@@ -132,7 +132,7 @@ class Grid:
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
-            return np.array([self._round_one(value) for value in values.tolist()])
+            return np.array(self._round_few(values.tolist()))
         else:
             size = np.abs(values)
             # NaN, and what cannot be counted in steps, take the general way.
@@ -145,23 +145,28 @@ class Grid:
             result = np.maximum(result, self._lowest)
         return result + 0.0  # adding 0 turns -0 into 0
 
-    def _round_one(self, value: float) -> float:
-        """Round one value with the floating-point steps of `_nearest_countable`."""
-        size = abs(value)
-        if not size < self._countable:
-            result = float(_nearest(np.float64(size), self.step))
-        else:
-            rest = math.fmod(size, self.step)
-            whole = round((size - rest) / self.step)
-            other = self.step - rest
-            whole += rest > other or (rest == other and whole % 2 == 1)
-            result = whole * self.step
-        result = math.copysign(result, value)
-        if self._highest is not None:
-            result = min(result, self._highest)
-        if self._lowest is not None:
-            result = max(result, self._lowest)
-        return result + 0.0
+    def _round_few(self, values: list[float]) -> list[float]:
+        """Round single values with the floating-point steps of `_nearest_countable`."""
+        step, countable, low, high = self.step, self._countable, self._lowest, self._highest
+        results = []
+        for value in values:
+            size = abs(value)
+            if size < countable:
+                rest = fmod(size, step)
+                whole = round((size - rest) / step)
+                other = step - rest
+                if rest > other or (rest == other and whole % 2 == 1):
+                    whole += 1
+                result = whole * step
+            else:
+                result = float(_nearest(np.float64(size), step))
+            result = copysign(result, value)
+            if high is not None and result > high:
+                result = high
+            if low is not None and result < low:
+                result = low
+            results.append(result + 0.0)
+        return results
 
 
 def _finite(name: str, value: ArrayLike) -> Any:

@@ -89,20 +89,17 @@ class Cells:
         )
         self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
-        self._gathered: dict[str, AnyArray] = {}
 
     def __len__(self) -> int:
         return len(self.target)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
+        if name[0] == "_":
             raise AttributeError(name)
-        gathered = self._gathered
-        if name not in gathered:
-            values = getattr(self._targets, name)
-            flat = values.reshape(-1)
-            gathered[name] = flat if self._everything else flat.take(self._flat)
-        return gathered[name]
+        flat = getattr(self._targets, name).reshape(-1)
+        gathered = flat if self._everything else flat.take(self._flat)
+        self.__dict__[name] = gathered  # the next time it is a plain attribute
+        return gathered
 
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""

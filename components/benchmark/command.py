@@ -35,8 +35,13 @@ def run_benchmark(
     console = Console()
     rows: list[dict[str, Any]] = []
     if embed:
-        rows.append(_measured_calls(quick, repeats or (1 if quick else 3)))
+        rows.append(_measured_calls(quick, repeats or (2 if quick else 5)))
+        what, calls = rows[0]["what"], rows[0]["calls"]
+        console.print(f"simulate: {what}; {calls} calls", soft_wrap=True)
         console.print(_calls_table(rows[0]))
+        share = rows[0]["share_within_wanted"]
+        wanted_ms = rows[0]["wanted_p99_us"] / 1000.0
+        console.print(f"{share:.1%} of the calls within {wanted_ms:g} ms of wall time")
     else:
         rows += _measured_cases(console, cases, quick, repeats, before)
     if target is not None:
@@ -86,18 +91,18 @@ def _fresh(module: str, arguments: list[str]) -> dict[str, Any]:
 def _calls_table(row: dict[str, Any]) -> Any:
     from rich.table import Table
 
-    title = f"simulate: {row['what']}; {row['calls']} calls"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("us per call", "p50", "p99", "wanted", "max", "first"):
         table.add_column(heading, justify="left" if heading == "us per call" else "right")
-    ends = {
-        "wall_us": [f"{row['wanted_p99_us']:.0f}", f"{row['first_us']:.0f}"],
-        "cpu_us": ["", ""],
+    names = {
+        "wall_us": "wall time",
+        "cpu_us": "processor time",
+        "undisturbed_us": "wall time, best of each call's repetitions",
     }
-    for key, name in (("wall_us", "wall time"), ("cpu_us", "processor time")):
-        times, (wanted, first) = row[key], ends[key]
-        cells = (times["p50"], times["p99"], times["max"])
-        p50, p99, most = (f"{value:.0f}" for value in cells)
+    for key, name in names.items():
+        p50, p99, most = (f"{row[key][end]:.0f}" for end in ("p50", "p99", "max"))
+        first = f"{row['first_us']:.0f}" if key == "wall_us" else ""
+        wanted = "" if key == "cpu_us" else f"{row['wanted_p99_us']:.0f}"
         table.add_row(name, p50, p99, wanted, most, first)
     return table
 

@@ -91,6 +91,7 @@ class FieldOfView:
         )  # fmt: skip
         self._low, self._high = _azimuth_bounds(*azimuth_rad)
         self._lowest, self._highest = elevation_rad
+        self._turns = bool(_turns(self._low, self._high))
 
     def holds(self, p_rad: FloatArray, q_rad: FloatArray) -> BoolArray:
         """Tell which directions lie inside, as `inside` does."""
@@ -99,7 +100,9 @@ class FieldOfView:
         if self._high - self._low < TWO_PI:
             within = p_rad >= self._low
             within &= p_rad <= self._high
-            found &= _at_other_turns(p_rad, p_rad, self._low, self._high, within)
+            if self._turns:
+                within = _at_other_turns(p_rad, p_rad, self._low, self._high, within)
+            found &= within
         return found
 
 
@@ -164,14 +167,18 @@ def _at_other_turns(
     p: FloatArray, azimuth: FloatArray, low: float, high: float, result: BoolArray
 ) -> BoolArray:
     """Add to the result what lies inside after whole turns; p is the wrapped azimuth."""
-    for turns in (-2.0, -1.0, 1.0, 2.0):
-        shift = turns * TWO_PI
-        # A margin of 1 rad only decides whether the comparison is worth doing.
-        if shift - math.pi <= high + 1.0 and shift + math.pi >= low - 1.0:
-            turned = p + shift
-            slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
-            result |= (turned >= low - slack) & (turned <= high + slack)
+    for shift in _turns(low, high):
+        turned = p + shift
+        slack = _WRAP_TOLERANCE_RAD + _EPS * np.abs(azimuth)
+        result |= (turned >= low - slack) & (turned <= high + slack)
     return result
+
+
+def _turns(low: float, high: float) -> list[float]:
+    """Return the whole turns by which an azimuth may have to be moved to lie in the field."""
+    shifts = [turns * TWO_PI for turns in (-2.0, -1.0, 1.0, 2.0)]
+    # A margin of 1 rad only decides whether the comparison is worth doing.
+    return [s for s in shifts if s - math.pi <= high + 1.0 and s + math.pi >= low - 1.0]
 
 
 def _require(name: str, value: float, limit: float, allowed: str) -> None:
