@@ -40,13 +40,15 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
     """`wrap_pi` for a contiguous array that is known to be finite."""
-    inside = (angle > -np.pi) & (angle <= np.pi)
-    if np.count_nonzero(inside) == inside.size:
-        return angle + 0.0
-    # The library's sin and cos reduce by the true pi, for any size of argument.
-    wrapped = np.arctan2(np.sin(angle), np.cos(angle))
-    wrapped = np.where(wrapped <= -np.pi, np.pi, wrapped)
-    return np.where(inside, angle, wrapped) + 0.0
+    result = angle + 0.0
+    outside = (angle <= -np.pi) | (angle > np.pi)
+    if np.count_nonzero(outside):
+        # The library's sin and cos reduce by the true pi, for any size of argument.
+        far = angle[outside]
+        wrapped = np.arctan2(np.sin(far), np.cos(far))
+        wrapped[wrapped <= -np.pi] = np.pi
+        result[outside] = wrapped + 0.0
+    return result
 
 
 def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
