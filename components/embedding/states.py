@@ -116,9 +116,5 @@ def traffic_states(
         roll_rad=values[5:6],
         present=present,
         roster=roster,
-        columns=_everybody(len(roster)) if chosen is None else np.array(chosen, dtype=np.int64),
+        columns=np.arange(len(roster)) if chosen is None else np.array(chosen, dtype=np.int64),
     )
-
-
-def _everybody(count: int) -> np.ndarray:
-    return np.arange(count)
