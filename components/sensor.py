@@ -23,6 +23,7 @@ from components.sensor_parameters import SensorParameters
 from components.target_messages import GatedTargets, RelativeTargets
 from dsa_des.component import Component
 from dsa_des.effects import Effect
+from dsa_des.message import offsets_of
 from dsa_des.ports import Input, Output
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.wake import Wake
@@ -224,8 +225,7 @@ class Sensor(Component):
         if len(wake) == 1:
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
-            offsets = np.zeros(len(wake) + 1, dtype=np.int64)
-            np.bincount(cells.row[found], minlength=len(wake)).cumsum(out=offsets[1:])
+            offsets = offsets_of(cells.row[found], len(wake))
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
         if len(found):

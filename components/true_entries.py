@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from components.messages import Detections, FusedDetections
-from dsa_des.message import PER_ENTRY
+from dsa_des.message import PER_ENTRY, offsets_of
 
 AnyDetections = TypeVar("AnyDetections", Detections, FusedDetections)
 
@@ -36,4 +36,4 @@ def true_entries(message: AnyDetections) -> AnyDetections:
                 kept[item.name] = {name: column[keep] for name, column in values.items()}
             else:
                 kept[item.name] = values[keep]
-    return replace(message, offsets=np.searchsorted(row, rows), **kept)
+    return replace(message, offsets=offsets_of(row, len(rows) - 1), **kept)

@@ -11,7 +11,7 @@ import numpy as np
 
 from dsa_des.message import Message
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.sorted_union import sorted_union
+from dsa_des.sorted_union import last_at_or_before, sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wire_faults import WireFaults
 
@@ -137,7 +137,7 @@ class Channel:
         if held is None:
             return None
         arrivals, message = held
-        rows = np.searchsorted(arrivals, ticks, side="right") - 1
+        rows = last_at_or_before(arrivals, ticks)
         if self._replicas is not None:
             span = self._replicas.span_ticks
             rows[arrivals[rows] // span != ticks // span] = -1

@@ -198,6 +198,20 @@ def _join(values: list[Any]) -> Any:
     return np.concatenate(values)
 
 
+def offsets_of(row: IntArray, rows: int) -> IntArray:
+    """Return the offsets of entries that belong to rows, given each entry's row, ascending.
+
+    Parameters
+    ----------
+    row : (entries,) of int64
+    rows : int
+        How many rows there are.
+    """
+    offsets = np.zeros(rows + 1, dtype=np.int64)
+    np.bincount(row, minlength=rows).cumsum(out=offsets[1:])
+    return offsets
+
+
 def _entries(offsets: IntArray, rows: slice | IntArray) -> tuple[IntArray, slice | IntArray]:
     if isinstance(rows, slice):
         start, stop, _ = rows.indices(len(offsets) - 1)

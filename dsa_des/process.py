@@ -20,7 +20,7 @@ from dsa_des.events import Bell, WakeUp
 from dsa_des.message import Message
 from dsa_des.processors import Processor
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.sorted_union import sorted_union
+from dsa_des.sorted_union import last_at_or_before, sorted_union
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -258,8 +258,9 @@ class Node:
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)
-            place = np.searchsorted(ticks, asked)
-            rows[demand.block] = place[ticks[np.minimum(place, len(ticks) - 1)] == asked]
+            place = last_at_or_before(ticks, asked)
+            here = ticks[np.maximum(place, 0)] == asked
+            rows[demand.block] = place if bool(here.all()) else place[here]
         return rows
 
     def receive(self) -> Wake:

@@ -6,6 +6,7 @@ import numpy as np
 
 from components.messages import Detections, FusedDetections, SensorOffer
 from dsa_des.component import Component
+from dsa_des.message import offsets_of
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Arrivals
@@ -114,7 +115,7 @@ class Fusion(Component):
                 _copy(values, ("range_m",), found[name], arrivals[name], entries[name])
         return FusedDetections(
             tick=ticks,
-            offsets=np.searchsorted(row, np.arange(len(ticks) + 1)),
+            offsets=offsets_of(row, len(ticks)),
             target=target,
             contributors=contributors,
             angle_source=angle_source,

@@ -8,6 +8,7 @@ from pydantic import Field
 from components.messages import FusedDetections, Tracks
 from components.true_entries import true_entries
 from dsa_des.component import Component, Parameters
+from dsa_des.message import offsets_of
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
 from dsa_des.wake import Wake
@@ -101,7 +102,7 @@ class TrackerStub(Component):
         entry = last[row, column]
         return Tracks(
             tick=ticks,
-            offsets=row.searchsorted(np.arange(len(ticks) + 1)),
+            offsets=offsets_of(row, len(ticks)),
             target=targets[column],
             azimuth_rad=pool["azimuth_rad"][entry],
             elevation_rad=pool["elevation_rad"][entry],
