@@ -15,6 +15,7 @@ from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
 from components.traffic.piece_search import PieceSearch
 from components.traffic.trajectory import (
+    CELLS_AT_ONCE,
     SampledTrajectory,
     TrajectoryState,
     evaluate_segments,
@@ -22,9 +23,6 @@ from components.traffic.trajectory import (
 )
 
 IntArray = npt.NDArray[np.int64]
-
-CELLS_AT_ONCE = 16_384
-"""Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
 
 
 class ScriptedFleet:

@@ -22,7 +22,7 @@ from components.traffic.leg_types import (
     require,
 )
 from components.traffic.normals import wrap_longitude_deg
-from components.traffic.trajectory import TrajectoryState
+from components.traffic.trajectory import CELLS_AT_ONCE, TrajectoryState
 
 __all__ = [
     "AnyLeg",
@@ -195,6 +195,11 @@ class ScriptedTrajectory:
         """
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
+        if len(flat) > CELLS_AT_ONCE:
+            cuts = range(CELLS_AT_ONCE, len(flat), CELLS_AT_ONCE)
+            parts = [self.at(part).arrays() for part in np.split(flat, cuts)]
+            whole = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
+            return TrajectoryState(*whole).reshaped(times.shape)
         present = (flat >= self.start_time_s) & (flat <= self.end_time_s)
         elapsed = np.where(flat > self.start_time_s, flat, self.start_time_s)
         elapsed = np.where(elapsed < self.evaluated_until_s, elapsed, self.evaluated_until_s)

@@ -38,6 +38,10 @@ _PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 21, 22, 23, 24
 _ROWS = 25
 
 
+CELLS_AT_ONCE = 8192
+"""Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
+
+
 class SampledTrajectory:
     """An aircraft known at samples in time, interpolated between them and nowhere else.
 
