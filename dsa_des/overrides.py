@@ -72,6 +72,8 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
             container[step] = value
         elif isinstance(container, dict) and step not in container:
             container[step] = {}
+        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[step])):
+            container[step] = table
         elif not isinstance(container[step], dict | list):
             return [Problem(source, text, f"{'.'.join(parts[: position + 1])} is no table")]
         container = container[step]
@@ -107,6 +109,12 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
 
 def _type_key(name: str) -> Key:
     return ("blocks", name, "type")
+
+
+def _wire_table(entry: Any) -> dict[str, str] | None:
+    """Return the table of a wire written as ``"a -> b"``, so that its options can be set."""
+    ends = [end.strip() for end in entry.split("->")] if isinstance(entry, str) else []
+    return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
 
 
 def _step(container: Any, part: str) -> str | int:

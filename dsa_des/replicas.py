@@ -101,6 +101,17 @@ def run_replicas(
     return [next(ran) if one is None else one for one in found]
 
 
+def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
+    """Return why replicas cannot run in lock step, as far as it shows before they run."""
+    try:
+        LockStep([scene_of(scene, replica) for replica in replicas])
+    except NotInLockStep as reason:
+        return str(reason)
+    except (SceneError, BlockFailure):  # a failing replica says so itself
+        return None
+    return None
+
+
 def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
     """Run scenes in lock step; None where they cannot, or where one of them fails."""
     if len(scenes) < 2:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.clock_coincidence import coincidence_share
+from components.jittered_coincidence import mean_coincidence_share
 from components.metrics.rows import (
     FUSED,
     SensorParameters,
@@ -17,6 +18,7 @@ from components.metrics.rows import (
     sensors_of,
     with_trials,
 )
+from dsa_des.clock import ClockSpec
 from dsa_des.message import Text
 from dsa_des.scene import Scene
 from dsa_des.studies.metric import SHARE, Group, Metric, Result, recorded_by
@@ -76,36 +78,63 @@ class FusedShare(Metric):
         return found
 
     def expected(self, scene: Scene) -> Mapping[str, float]:
-        """Return the exact share of two periodic clocks, if every scan detects.
+        """Return the share of two periodic clocks, if every scan detects.
 
-        A detection waits for a partner as long as the fusion's ``coincidence_s``, and no longer
-        than to the sensor's next scan.
+        Exact clocks are counted in rational numbers, in the long run; of clocks that jitter or
+        drift it is the expected share of this run.
         """
-        gate = getattr(scene.blocks[self.fusion].parameters, "coincidence_s", None)
-        if gate is None or any(w.jitter_s or w.drop_probability for w in scene.wires):
+        fusion = scene.blocks[self.fusion].parameters
+        gate = getattr(fusion, "coincidence_s", getattr(fusion, "time_gate_s", None))
+        faulty = any(w.jitter_s or w.drop_probability or w.queued for w in scene.wires)
+        if gate is None or faulty:
             return {}
         arrives = {w.source: w.total_delay_s for w in scene.wires if w.target == self.fusion}
         clocks = {}
         for name in {name for pair in self.pairs for name in pair}:
             clock = scene.blocks[name].cls.clock_of(scene.blocks[name].parameters)
-            if clock is None or clock.jitter_s or clock.rate_error_ppm:
+            if clock is None:
                 return {}
             clocks[name] = clock
         found = {}
         for a, b in self.pairs:
-            one, other = clocks[a], clocks[b]
-            # Just short of the next scan: half of the smallest step in which phases can differ.
-            step = Fraction(1, 2 * scene.ticks_per_s)
-            share = coincidence_share(
-                one.rate_hz,
-                other.rate_hz,
-                offset_s=one.offset_s + arrives[a],
-                other_offset_s=other.offset_s + arrives[b],
-                before_s=gate,
-                after_s=min(gate, one.period_s - step),
-            )
-            found[_name(a, b)] = float(share)
+            share = _expected_share(scene, gate, (clocks[a], arrives[a]), (clocks[b], arrives[b]))
+            if share is not None:
+                found[_name(a, b)] = share
         return found
+
+
+def _expected_share(
+    scene: Scene,
+    gate: Fraction,
+    one: tuple[ClockSpec, Fraction],
+    other: tuple[ClockSpec, Fraction],
+) -> float | None:
+    """Return the share of one clock's scans that meet the other's; each with its delay (s)."""
+    (own, delay_s), (theirs, other_delay_s) = one, other
+    if any(clock.jitter_s or clock.rate_error_ppm for clock in (own, theirs)):
+        if scene.duration_s is None:
+            return None
+        return mean_coincidence_share(
+            own,
+            theirs,
+            ticks_per_s=scene.ticks_per_s,
+            end_tick=int(scene.duration_s * scene.ticks_per_s),
+            gate_ticks=int(gate * scene.ticks_per_s),
+            delay_ticks=int(delay_s * scene.ticks_per_s),
+            other_delay_ticks=int(other_delay_s * scene.ticks_per_s),
+        )
+    # A detection waits for a partner as long as the gate, and no longer than to the sensor's next
+    # scan: just short of it is half of the smallest step in which phases can differ.
+    step = Fraction(1, 2 * scene.ticks_per_s)
+    share = coincidence_share(
+        own.rate_hz,
+        theirs.rate_hz,
+        offset_s=own.offset_s + delay_s,
+        other_offset_s=theirs.offset_s + other_delay_s,
+        before_s=gate,
+        after_s=min(gate, own.period_s - step),
+    )
+    return float(share)
 
 
 def _name(a: str, b: str) -> str:

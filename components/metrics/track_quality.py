@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
 from components.metrics.rows import FUSED, TargetParameters, chosen, name_ranks, of_target
+from components.metrics.single_sensor import only_feed
 from dsa_des.message import Text
 from dsa_des.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
@@ -99,6 +101,20 @@ class AgeOfInformation(Metric):
             "age_of_information_p95_s": _ramp_quantiles(lines.of_gap, low, high, span, 0.95),
         }
 
+    def expected(self, scene: Scene) -> Mapping[str, float]:
+        """Return both for a single sensor that detects in every scan that is not lost."""
+        feed = only_feed(scene, self.fusion)
+        if feed is None:
+            return {}
+        period_s = float(feed.clock.period_s / (1 + feed.clock.rate_error_ppm / 1_000_000))
+        jitter_s = feed.clock.jitter_s
+        mean = mean_age_s(period_s, feed.through, jitter_s)
+        found = {"age_of_information_mean_s": feed.delay_s + mean}
+        if jitter_s == 0.0:
+            p95 = age_quantile_s(period_s, feed.through, 0.95)
+            found["age_of_information_p95_s"] = feed.delay_s + p95
+        return found
+
     def _delays(self, column: Any) -> FloatArray:
         assert isinstance(column, Text)
         shortest = [
@@ -187,6 +203,16 @@ class TrackUpdates(Metric):
             "track_continuity": continuity,
             "track_breaks": np.where(has, breaks, np.nan),
         }
+
+    def expected(self, scene: Scene) -> Mapping[str, float]:
+        """Return the mean interval for a single sensor that detects in every scan not lost."""
+        fusion = recorded_by(scene, FUSED)
+        feed = only_feed(scene, fusion[0]) if len(fusion) == 1 else None
+        onward = [wire for wire in scene.wires if wire.source in fusion]
+        if feed is None or any(wire.jitter_s or wire.drop_probability for wire in onward):
+            return {}
+        period_s = float(feed.clock.period_s / (1 + feed.clock.rate_error_ppm / 1_000_000))
+        return {"track_update_interval_s": mean_interval_s(period_s, feed.through)}
 
 
 class PositionError(Metric):

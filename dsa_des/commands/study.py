@@ -14,7 +14,7 @@ from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import StudyFolder, description
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import show
-from dsa_des.studies.runner import Clock, Stopped, results_of, run_study
+from dsa_des.studies.runner import Clock, Stopped, results_of, run_study, why_one_by_one
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study, study_again
 
@@ -102,6 +102,8 @@ def finish(
         show(console, tables, only)
         for path in figures:
             click.echo(f"wrote {path}")
+        if reason := why_one_by_one(study):
+            click.echo(f"replicas ran one by one where they cannot run in lock step: {reason}")
         click.echo(f'\npandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
     return tables
 
@@ -122,8 +124,8 @@ def read_study_of(folder: StudyFolder) -> Study:
     study = study_again(Path(about["study"]), about["tables"])
     if description(study)["study_sha256"] != about["study_sha256"]:
         raise UsageError(
-            f"{folder.path}: the scene {about['scene']} or dsa_des has changed since the study was "
-            "run; run it again"
+            f"{folder.path}: the scene {about['scene']}, a file that it names, or dsa_des "
+            "has changed since the study was run; run it again"
         )
     return study
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,7 +49,8 @@ class StudyFolder:
         if known is not None and known["study_sha256"] != about["study_sha256"]:
             raise UsageError(
                 f"{self.path}: holds another study or another version of it "
-                f"(made of {known['study']}); results of the two cannot be mixed"
+                f"(made of {known['study']}), or an encounter file has changed since; results of "
+                "the two cannot be mixed"
             )
         if known is None and self.path.exists() and any(self.path.iterdir()):
             raise UsageError(f"{self.path}: is a folder that holds something other than a study")
@@ -177,6 +178,8 @@ def description(study: Study) -> dict[str, Any]:
         "stop_when": None if study.stop_when is None else vars(study.stop_when),
         "version": __version__,
     }
+    files = _files_in([study.base.data, study.sets, [axis.sets for axis in study.axes]])
+    identity["files"] = {str(path): _sha256(path) for path in sorted(files)}
     text = json.dumps(identity, sort_keys=True, default=as_text)
     return {
         "study": str(study.path.resolve()),
@@ -193,3 +196,26 @@ def description(study: Study) -> dict[str, Any]:
         "version": __version__,
         "tables": study.tables,
     }
+
+
+def _files_in(value: Any) -> set[Path]:
+    """Return the files that values name: encounters, terrain, tables.
+
+    Their content fixes results as much as the values do.
+    """
+    if isinstance(value, Mapping):
+        return _files_in(list(value.values()))
+    if isinstance(value, list | tuple):
+        return set().union(*map(_files_in, value))
+    if not isinstance(value, str):
+        return set()
+    path = getattr(value, "folder", Path()) / Path(value)
+    try:
+        return {path.resolve()} if path.is_absolute() and path.is_file() else set()
+    except (OSError, ValueError):  # a text that can be no path
+        return set()
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,6 +1,5 @@
 """The tables of a study on the terminal."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -93,9 +92,13 @@ def _difference_table(tables: Tables, names: set[str]) -> Any:
     return table
 
 
+#: Intervals that shrink more than this rest on the rounding of equal numbers.
+_ROUNDING = 1e9
+
+
 def times(ratio: float) -> str:
-    """Return how many times narrower for a table; empty where nothing differs."""
-    return f"{ratio:.1f} times" if math.isfinite(ratio) else ""
+    """Return how many times narrower for a table; empty where nothing but rounding differs."""
+    return f"{ratio:.1f} times" if ratio < _ROUNDING else ""
 
 
 def short(value: Any) -> str:

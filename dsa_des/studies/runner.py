@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dsa_des.errors import SceneError
+from dsa_des.replicas import why_apart
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.metric import Result
@@ -30,6 +32,21 @@ def results_of(study: Study) -> list[Result]:
     """Return the results that a study's metrics give."""
     scene = study.scene(0)
     return [result for spec in study.metrics for result in spec.build(scene).results()]
+
+
+def why_one_by_one(study: Study) -> str | None:
+    """Return why replicas of the first or the last cell cannot run in lock step, if so."""
+    replicas = [study.replica(number) for number in range(min(2, study.replicas))]
+    if len(replicas) < 2:
+        return None
+    for cell in sorted({0, len(study.cells) - 1}):
+        try:
+            reason = why_apart(study.scene(cell), replicas)
+        except SceneError:  # its rows say so
+            continue
+        if reason is not None:
+            return reason
+    return None
 
 
 def run_study(

@@ -7,10 +7,15 @@ from typing import Any
 from dsa_des.component import SourcedText
 from dsa_des.studies.draws import KINDS
 
+#: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
+_NAMING_RESULTS = ("figures", "compare", "over", "stop_when")
+
 
 def resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) -> dict[str, Any]:
     """Return a study's tables with absolute paths, and further swap axes."""
-    tables: dict[str, Any] = _absolute(data)
+    tables = {
+        key: value if key in _NAMING_RESULTS else _absolute(value) for key, value in data.items()
+    }
     for block, types in swaps:
         tables.setdefault("axes", {})[f"swap.{block}"] = types
     return tables
