@@ -121,8 +121,8 @@ def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    headings = ["scene", "target-scans/s", "x yardstick", "wanted", "CPU", "per simulated s"]
-    headings += ["peak memory", "Parquet adds", *(["speed since"] if before else [])]
+    headings = ["scene", "per s", "x plain", "wanted", "CPU", "build", "per sim. s", "memory"]
+    headings += ["Parquet", *(["since"] if before else [])]
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "scene" else "right")
     for case, row in zip(cases, rows, strict=True):
@@ -132,6 +132,7 @@ def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]
             f"{row['ratio_to_yardstick']:.1f}",
             f"{case.wanted:g}",
             f"{row['cpu_s']:.3f} s",
+            f"{row['build_s']:.2f} s",
             f"{row['cpu_ms_per_simulated_s']:.2f} ms",
             f"{row['peak_memory_mb']:.0f} MB",
             f"{row['parquet_adds']:+.0%}",
