@@ -52,7 +52,8 @@ def check_times(
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
     specs = {name: block.cls.clock_of(block.parameters) for name, block in blocks.items()}
     clocks = {name: spec for name, spec in specs.items() if spec is not None}
-    times = [wire.total_delay_s for wire in wires]
+    late = [wire for wire in wires if wire.total_delay_s or wire.jitter_s]
+    times = [wire.total_delay_s for wire in late]
     for spec in clocks.values():
         times += spec.exact_times()
     ticks_per_s = resolution(times)
@@ -69,7 +70,7 @@ def check_times(
     if duration_s is not None and 1 + duration_s >= longest_s:
         value = scene.data.get("duration_s")
         problems.append(scene.problem(("duration_s",), limit, value))
-    for wire in wires:
+    for wire in late:
         if wire.total_delay_s + wire.jitter_s >= longest_s:
             problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
     for name, spec in clocks.items():
@@ -81,7 +82,7 @@ def _check_clock(
     scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int, problems: list[Problem]
 ) -> None:
     longest_s = Fraction(MAX_TICK, ticks_per_s)
-    speed = 1 + spec.rate_error_ppm / 1_000_000
+    speed = 1 + spec.rate_error_ppm / 1_000_000 if spec.rate_error_ppm else 1
     if speed <= 0:
         message = "must be greater than -1000000: a clock cannot stand still or run backwards"
         problems.append(scene.problem((*key, "rate_error_ppm"), message, str(spec.rate_error_ppm)))

@@ -70,7 +70,8 @@ class Wire:
     @property
     def total_delay_s(self) -> Fraction:
         """Time on the wire and, before it, in the sending block."""
-        return self.delay_s + self.latency_s
+        # Studies ask this of every wire of every replica, and sums of fractions are slow.
+        return self.delay_s + self.latency_s if self.latency_s else self.delay_s
 
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"

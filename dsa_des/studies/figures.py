@@ -93,7 +93,16 @@ def draw_axis(
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
                 note = f"analytic{', ' + label if label else ''}"
-                top.plot(x, y, color=colour, ls=":", marker="_", ms=9, label=note, zorder=1)
+                top.plot(
+                    x,
+                    y,
+                    color=colour,
+                    ls=":" if numeric else "",
+                    marker="_",
+                    ms=9,
+                    label=note,
+                    zorder=1,
+                )
         top.set_ylabel(readable(metric))
         top.set_title(title, loc="left")
         if len(series) > 1 or any(line.expected is not None for line in places.of(metric)):
@@ -165,8 +174,9 @@ def _differences(
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
-                axes.annotate(f"{_signed(e.value)} ± {_digits(e.half_width)}", (px, e.value),
-                              xytext=(7, 4), textcoords="offset points", fontsize=8)  # fmt: skip
+                width = "" if np.isnan(e.half_width) else f" ± {_digits(e.half_width)}"
+                text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
+                axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
     axes.set_ylabel(f"the same less that at {text}")
     axes.set_title(
         f"paired differences on the same units, {100 * confidence:g} % intervals", loc="left"

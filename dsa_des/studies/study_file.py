@@ -132,7 +132,7 @@ class _Reader:
             confidence=confidence,
             interval=interval,
             figures=self.figures(axes),
-            runs_per_chunk=self.whole("runs_per_chunk", max(1, min(256, -(-runs // 32))), low=1),
+            runs_per_chunk=self.whole("runs_per_chunk", max(1, min(128, -(-runs // 32))), low=1),
             base=base,
             tables=resolved(self.data, swaps),
         )
