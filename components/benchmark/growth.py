@@ -82,6 +82,8 @@ def _scenes(axis: str, value: float) -> tuple[Scene, list[Scene]]:
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Draw cost against what grows, and memory against simulated time."""
+    from matplotlib.ticker import NullFormatter, StrMethodFormatter
+
     from dsa_des.drawing import drawing
 
     with drawing(8.5, 6.0, path) as figure:
@@ -94,11 +96,14 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             panel.set_xlabel(axis)
             panel.set_ylabel("ns per target-scan")
             panel.grid(True, which="major", alpha=0.3)
+            for scale in (panel.xaxis, panel.yaxis):
+                scale.set_major_formatter(StrMethodFormatter("{x:g}"))
+                scale.set_minor_formatter(NullFormatter())
             if axis in ("simulated time, s", "replicas"):
                 other = panel.twinx()
                 memory = [row["peak_memory_mb"] for row in chosen]
                 other.semilogx(values, memory, "s--", color="tab:red", label="peak memory")
-                other.set_ylim(0, 1.5 * max(memory))
+                other.set_ylim(0, 1.6 * max(memory))
                 other.set_ylabel("peak memory, MB (writing Parquet)")
                 lines = [*panel.get_lines(), *other.get_lines()]
                 panel.legend(lines, [line.get_label() for line in lines], loc="upper right")

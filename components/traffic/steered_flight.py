@@ -88,8 +88,12 @@ class SteeredFlight:
         flat = times.reshape(-1)
         part = np.searchsorted([start for start, _ in self.parts], flat, side="right")
         flights: list[Any] = [self.flight, *(flight for _, flight in self.parts)]
-        chosen = [np.flatnonzero(part == number) for number in range(len(flights))]
-        states = [flight.at(flat[rows]) for flight, rows in zip(flights, chosen, strict=True)]
+        flown = np.flatnonzero(np.bincount(part, minlength=1)).tolist()
+        if len(flown) == 1:
+            state: TrajectoryState = flights[flown[0]].at(times)
+            return state
+        chosen = [np.flatnonzero(part == number) for number in flown]
+        states = [flights[k].at(flat[rows]) for k, rows in zip(flown, chosen, strict=True)]
         # In order of time, rows of one flight follow those of another; others are put in place.
         order = np.argsort(np.concatenate(chosen), kind="stable")
         columns = zip(*(state.arrays() for state in states), strict=True)
