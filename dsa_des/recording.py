@@ -206,8 +206,8 @@ def _values(values: Any, kind: str, count: int) -> AnyArray:
     return np.asarray(values, dtype=np.dtype(kind))
 
 
-class ColumnSink:
-    """Keeps all rows in memory, as they come; `tables` joins them."""
+class _Keeping:
+    """Keeps all rows in memory, as they come."""
 
     def __init__(self) -> None:
         self._schemas: Mapping[str, Schema] = {}
@@ -224,6 +224,10 @@ class ColumnSink:
 
     def close(self) -> None:
         """Nothing to do."""
+
+
+class ColumnSink(_Keeping):
+    """Keeps all rows in memory; `tables` gives them as columns."""
 
     def tables(self) -> dict[str, Columns]:
         """Return table name → column name → values."""
@@ -246,24 +250,8 @@ class ColumnSink:
         return joined
 
 
-class MemorySink:
+class MemorySink(_Keeping):
     """Keeps all rows in memory; `tables` gives them as Arrow tables."""
-
-    def __init__(self) -> None:
-        self._schemas: Mapping[str, Schema] = {}
-        self._parts: dict[str, list[Columns]] = {}
-
-    def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Learn the tables and columns of the run."""
-        self._schemas = schemas
-        self._parts = {table: [] for table in schemas}
-
-    def write(self, table: str, columns: Columns) -> None:
-        """Keep rows of one table."""
-        self._parts[table].append(columns)
-
-    def close(self) -> None:
-        """Nothing to do."""
 
     def tables(self) -> dict[str, Any]:
         """Return table name → ``pyarrow.Table``."""

@@ -96,19 +96,24 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             panel.set_xlabel(axis)
             panel.set_ylabel("ns per target-scan")
             panel.grid(True, which="major", alpha=0.3)
-            for scale in (panel.xaxis, panel.yaxis):
-                scale.set_major_formatter(StrMethodFormatter("{x:g}"))
-                scale.set_minor_formatter(NullFormatter())
             if axis in ("simulated time, s", "replicas"):
                 other = panel.twinx()
                 memory = [row["peak_memory_mb"] for row in chosen]
-                other.semilogx(values, memory, "s--", color="tab:red", label="peak memory")
+                other.plot(values, memory, "s--", color="tab:red", label="peak memory")
                 other.set_ylim(0, 1.6 * max(memory))
                 other.set_ylabel("peak memory, MB (writing Parquet)")
                 lines = [*panel.get_lines(), *other.get_lines()]
                 panel.legend(lines, [line.get_label() for line in lines], loc="upper right")
             else:
                 panel.legend(loc="upper right")
+            panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            panel.xaxis.set_minor_formatter(NullFormatter())
+            panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            # Where the axis holds no power of ten, its other marks must say where it is.
+            some = max(cost) > 10.0 * min(cost)
+            panel.yaxis.set_minor_formatter(
+                NullFormatter() if some else StrMethodFormatter("{x:g}")
+            )
         figure.suptitle("What a run costs as one thing grows")
         figure.tight_layout()
 
