@@ -103,8 +103,8 @@ class _Reader:
         if interval not in ("t", "bootstrap"):
             self.add(("interval",), "must be 't' or 'bootstrap'", interval)
         base, scene = self.scene()
-        self.stop_if_wrong()
-        assert base is not None and scene is not None
+        if base is None or scene is None:  # all else is said of this scene
+            raise SceneError(self.problems)
         axes = self.axes(scene, swaps)
         draws = self.draws(base)
         specs = self.metric_specs()
