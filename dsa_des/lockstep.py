@@ -156,7 +156,7 @@ class LockStep(Simulation):
         """Give windows that hold many whole replicas, or parts of one."""
         assert self.replicas is not None
         span, length = self.span_ticks, self.replicas.end_tick
-        together = self._window_ticks // length
+        together = self.window_ticks // length
         if together > 1:
             for first in range(0, self.replicas.replicas, together):
                 last = min(first + together, self.replicas.replicas) - 1

@@ -8,7 +8,7 @@ while nothing comes back.
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -21,7 +21,10 @@ from dsa_des.graph import in_cycles
 if TYPE_CHECKING:
     from dsa_des.process import Node
     from dsa_des.recording import Recorder
+    from dsa_des.simulation import Simulation
 
+# After something came back, a window starts at this part of its full length.
+_RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
@@ -67,6 +70,48 @@ def may_rewind(graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued
         and not queued
         and all(c.windowed and c.rewindable and c.process is None for c in classes.values())
     )
+
+
+def rewinding_windows(simulation: "Simulation", end: int) -> Iterator[tuple[int, int]]:
+    """Run and yield windows in which nothing came back unseen."""
+    feedback = [
+        channel
+        for node in simulation.nodes.values()
+        for wires in node.channels.values()
+        for channel in wires
+        if (channel.source, node.name) in simulation.cut_edges
+    ]
+    start, length = 0, simulation.window_ticks
+    came = 0  # when something came back last
+    while start < end:
+        stop = min(start + length, end, *(cut for cut in simulation.cuts if cut > start))
+        checkpoint = Checkpoint(simulation.nodes.values(), simulation.recorder, simulation.trace)
+        simulation.window = (start, stop)
+        simulation.run_window(start, stop)
+        early = checkpoint.earliest_since(feedback, stop)
+        if simulation.failure is not None and (early < stop or len(simulation.failed_at) > 1):
+            # What failed may never have happened: look less far.
+            simulation.failure = None
+            checkpoint.restore()
+            middle = int(simulation.failed_at[len(simulation.failed_at) // 2])
+            length = max(1, min(early, middle) - start)
+            continue
+        simulation.raise_failure()
+        if early < stop:
+            checkpoint.restore()
+            stop = early
+            simulation.window = (start, stop)
+            simulation.run_window(start, stop)
+            simulation.raise_failure()
+        coming = checkpoint.earliest_since(feedback, -1)
+        if coming < 0:
+            length = min(2 * length, simulation.window_ticks)
+        else:  # what comes back often comes regularly; at first, or after a hurry, start small
+            small = simulation.window_ticks // _RESTART
+            length = min(max(1, coming - came if came else small), simulation.window_ticks)
+            came = coming
+        yield start, stop
+        start = stop
 
 
 class Checkpoint:

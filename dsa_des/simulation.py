@@ -30,14 +30,12 @@ from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.rewind import Checkpoint, cut_loops, may_rewind
+from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
-# After something came back, a window starts at this part of its full length.
-_RESTART = 32
 
 
 @dataclass
@@ -119,15 +117,15 @@ class Simulation:
         self.ticks_per_s = scene.ticks_per_s
         self.env = simpy.Environment(initial_time=0)
         self.window = (0, 0)
-        self._failure: tuple[BlockFailure, BaseException] | None = None
+        self.failure: tuple[BlockFailure, BaseException] | None = None
         #: The instants of the call in which a block failed.
         self.failed_at = np.empty(0, dtype=np.int64)
         self._window = window
-        self._cuts = sorted(cuts)
+        self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
         queued = any(block.options.processor for block in scene.blocks.values())
         self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
-        self._cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
+        self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
         self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
@@ -136,7 +134,7 @@ class Simulation:
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
         connect(scene, self.nodes, self.replicas)
-        self._window_ticks = self._window_length(window)
+        self.window_ticks = self._window_length(window)
 
     #: Whether a failure inside a window is traced to its instant by running the scene again.
     pinpoints = True
@@ -246,7 +244,7 @@ class Simulation:
         windowed = set() if window == 1 else self.scene.look_ahead_blocks()
         if self._rewinds:
             windowed = set(self.components)
-        order = window_order(graph, windowed, self._cut_edges)
+        order = window_order(graph, windowed, self.cut_edges)
         processors = self._build_processors()
         shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
         nodes = {}
@@ -302,7 +300,7 @@ class Simulation:
     def limit_windows(self, longest_s: float) -> None:
         """Let no look-ahead window be longer than this simulated time; results stay the same."""
         longest = max(1, int(min(longest_s * self.ticks_per_s, self.end_tick)))
-        self._window_ticks = min(self._window_ticks, longest)
+        self.window_ticks = min(self.window_ticks, longest)
 
     # -- running -------------------------------------------------------------------------------
 
@@ -335,10 +333,10 @@ class Simulation:
             self.recorder.open(messages, self.ticks_per_s, self.span_ticks)
         for node in self.nodes.values():
             node.start()
-        for window in self._rewinding(end) if self._rewinds else self._windows(end):
+        for window in rewinding_windows(self, end) if self._rewinds else self._windows(end):
             if not self._rewinds:
                 self.window = window
-                self._run_window(*window)
+                self.run_window(*window)
             if self.recorder is not None:
                 self.recorder.advance(self.window[1])
             if progress is not None:
@@ -354,70 +352,31 @@ class Simulation:
 
     def _windows(self, end: int) -> Iterator[tuple[int, int]]:
         for number in count():
-            start = number * self._window_ticks
+            start = number * self.window_ticks
             if start >= end:
                 return
-            stop = min(start + self._window_ticks, end)
-            inner = [cut for cut in self._cuts if start < cut < stop]
+            stop = min(start + self.window_ticks, end)
+            inner = [cut for cut in self.cuts if start < cut < stop]
             yield from pairwise([start, *inner, stop])
 
-    def _rewinding(self, end: int) -> Iterator[tuple[int, int]]:
-        """Run and yield windows in which nothing came back unseen (`dsa_des.rewind`)."""
-        feedback = [
-            channel
-            for node in self.nodes.values()
-            for wires in node.channels.values()
-            for channel in wires
-            if (channel.source, node.name) in self._cut_edges
-        ]
-        start, length = 0, self._window_ticks
-        came = 0  # when something came back last
-        while start < end:
-            stop = min(start + length, end, *(cut for cut in self._cuts if cut > start))
-            checkpoint = Checkpoint(self.nodes.values(), self.recorder, self.trace)
-            self.window = (start, stop)
-            self._run_window(start, stop)
-            early = checkpoint.earliest_since(feedback, stop)
-            if self._failure is not None and (early < stop or len(self.failed_at) > 1):
-                # What failed may never have happened: look less far.
-                self._failure = None
-                checkpoint.restore()
-                middle = int(self.failed_at[len(self.failed_at) // 2])
-                length = max(1, min(early, middle) - start)
-                continue
-            self._raise_failure()
-            if early < stop:
-                checkpoint.restore()
-                stop = early
-                self.window = (start, stop)
-                self._run_window(start, stop)
-                self._raise_failure()
-            coming = checkpoint.earliest_since(feedback, -1)
-            if coming < 0:
-                length = min(2 * length, self._window_ticks)
-            else:  # what comes back often comes regularly; at first, or after a hurry, start small
-                small = self._window_ticks // _RESTART
-                length = min(max(1, coming - came if came else small), self._window_ticks)
-                came = coming
-            yield start, stop
-            start = stop
-
-    def _raise_failure(self) -> None:
-        if self._failure is not None:
-            failure, cause = self._failure
+    def raise_failure(self) -> None:
+        """Raise what a block raised in a window that may be rewound, if one did."""
+        if self.failure is not None:
+            failure, cause = self.failure
             raise failure from cause
 
-    def _run_window(self, start: int, end: int) -> None:
+    def run_window(self, start: int, end: int) -> None:
+        """Run every block over [start, end)."""
         for node in self.nodes.values():
             node.open_window(start, end)
         try:
             # A window that may be rewound leaves the clock at its start, where all of it runs.
             self.env.run(until=None if self._rewinds else end)
         except Abort:
-            if self._failure is None:
+            if self.failure is None:
                 raise
-            failure, cause = self._failure
-            if self.pinpoints and len(self.failed_at) > 1 and not self._cuts:
+            failure, cause = self.failure
+            if self.pinpoints and len(self.failed_at) > 1 and not self.cuts:
                 exact = pinpoint(self.scene, self._window, self.failed_at)
                 if exact is not None:
                     raise exact from exact.__cause__
@@ -425,12 +384,12 @@ class Simulation:
 
     def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
-        if self._failure is not None:
+        if self.failure is not None:
             return  # a window that may be rewound goes on; the first failure counts
         self.failed_at = ticks
         time_s = int(ticks[0]) / self.ticks_per_s
         failure = _failure(node.name, type(node.component), time_s, error, scan)
-        self._failure = (failure, error)
+        self.failure = (failure, error)
         if not self._rewinds:
             raise Abort
 

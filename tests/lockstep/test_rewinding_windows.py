@@ -45,9 +45,9 @@ def test_windows_are_few_when_what_comes_back_is_regular():
     windows = []
 
     class Counted(Simulation):
-        def _run_window(self, start, end):
+        def run_window(self, start, end):
             windows.append(end - start)
-            super()._run_window(start, end)
+            super().run_window(start, end)
 
     simulation = Counted(scene, recorder=Recorder([sink := MemorySink()]))
     simulation.run()
