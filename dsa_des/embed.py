@@ -346,7 +346,8 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
             found.append((f"blocks.{name}", message))
         if block.cls.process is not None:
             found.append((f"blocks.{name}", "it has a process of its own"))
-        if not block.cls.inputs and name != source:
+        fed = any(port.required for port in block.cls.inputs.values())
+        if not fed and name != source:
             found.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
     why = "; a host drives an open-loop scene only: every message at the instant of the call"
     return [Problem(str(scene.path), key, message + why) for key, message in found]
