@@ -125,6 +125,7 @@ class Transform(Component):
             own_alt_m=states.own_alt_m,
             roster=states.roster,
             columns=states.columns,
+            culled=states.culled,
             believed=self._believed(states),
             revisit=self._revisit(states.flights),
             **self._as_seen(own, states, states.present),

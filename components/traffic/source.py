@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, ClassVar, Protocol
 
@@ -142,6 +143,12 @@ class TrafficSource(Component):
         if self._culling is not None:
             columns, fleet = self._culling.active(float(time_s.min()), float(time_s.max()))
         states = fleet.at(time_s)
+        present = states.present & own.present[:, np.newaxis]
+        culled = None
+        if self._culling is not None:
+            near = self._culling.near(columns, time_s)
+            present &= near
+            culled = len(self._everybody) - near.sum(axis=1)
         return TrafficStates(
             tick=wake.ticks,
             own_lat_deg=own.lat_deg,
@@ -156,9 +163,10 @@ class TrafficSource(Component):
             yaw_rad=states.yaw_rad,
             pitch_rad=states.pitch_rad,
             roll_rad=states.roll_rad,
-            present=states.present & own.present[:, np.newaxis],
+            present=present,
             roster=self.roster,
             columns=columns,
+            culled=culled,
             flights=self.flights if self._flights_asked_for else None,
         )
 
@@ -181,9 +189,11 @@ class TrafficSource(Component):
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
             time_s = np.floor(time_s * rate) / rate
-        others = self.fleet.each(
-            np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
-        )
+        everyone, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        others = self.fleet.each(everyone, times)
+        if self._culling is not None:
+            near = self._culling.intervals.holds(everyone, times)
+            others = replace(others, present=others.present & near)
         return self.own.at(time_s), others.reshaped(time_s.shape)
 
     def _steer(self, new: Arrivals) -> None:
