@@ -71,6 +71,16 @@ class Culling:
             self._last = columns, self._fleet.subset(columns)
         return self._last
 
+    def cut(self, time_s: FloatArray) -> tuple[IntArray, Any, BoolArray]:
+        """Return the targets that may come in reach, a fleet of them, and at which times (rows, n).
+
+        Parameters
+        ----------
+        time_s : (rows,)
+        """
+        columns, fleet = self.active(float(time_s.min()), float(time_s.max()))
+        return columns, fleet, self.near(columns, time_s)
+
     def near(self, columns: IntArray, time_s: FloatArray) -> BoolArray:
         """Return which targets may come in reach during a look from each time on.
 
