@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.angles import sine_and_cosine, slope_angle, wrap_pi, wrap_pi_unchecked
+from components.geometry.angles import (
+    direction_angle,
+    sine_and_cosine,
+    slope_angle,
+    wrap_pi,
+    wrap_pi_unchecked,
+)
 from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
@@ -252,7 +258,7 @@ def sensor_angles_of_offsets(
     level = x * x
     level += y * y
     np.sqrt(level, out=level)
-    return _azimuth(x, y, z, level), slope_angle(0.0 - z, level)
+    return _azimuth(direction_angle(y, x), z, level), slope_angle(0.0 - z, level)
 
 
 def relative_attitude(
@@ -391,12 +397,11 @@ def _ned_to_body(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Tri
 def _body_angles(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """`body_angles` for contiguous arrays of one shape."""
     level = np.hypot(x, y)
-    return _azimuth(x, y, z, level), np.arctan2(0.0 - z, level)
+    return _azimuth(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
 
 
-def _azimuth(x: FloatArray, y: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
-    """Angle from x towards y in (-pi, pi], 0 for what points along z; level is hypot(x, y)."""
-    azimuth = np.arctan2(y, x)
+def _azimuth(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
+    """Put an azimuth into (-pi, pi], and to 0 for what points along z; level is hypot(x, y)."""
     azimuth[azimuth <= -np.pi] = np.pi
     azimuth[level <= _ZENITH_RAD * np.abs(z)] = 0.0
     azimuth += 0.0

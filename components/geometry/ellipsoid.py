@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from components.geometry.angles import (
     RAD_PER_DEG,
+    direction_angle,
     longitude_difference_rounded,
     positive_turn,
     slope_angle,
@@ -172,7 +173,7 @@ def spherical_from_enu(
     elevation = slope_angle(up, level)
     level_squared += up * up
     slant_range = np.sqrt(level_squared, out=level_squared)
-    return positive_turn(np.arctan2(east, north)), elevation, slant_range
+    return positive_turn(direction_angle(east, north)), elevation, slant_range
 
 
 def _north_east_up(

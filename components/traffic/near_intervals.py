@@ -61,6 +61,10 @@ class NearIntervals:
         (rows, targets) of bool
         """
         met = (self.start_s <= last_s[-1]) & (self.end_s >= first_s[0])
+        if len(columns) == np.count_nonzero(
+            met & (self.start_s <= last_s[0]) & (self.end_s >= first_s[-1])
+        ):
+            return np.ones((len(first_s), len(columns)), dtype=bool)  # all of them all the time
         column = np.searchsorted(columns, self.target[met])
         change = np.zeros((len(first_s) + 1, len(columns)), dtype=np.int8)
         np.add.at(change, (np.searchsorted(last_s, self.start_s[met]), column), 1)
