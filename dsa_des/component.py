@@ -68,7 +68,7 @@ class Parameters(BaseModel):
     """Parameters of a block: every field has its unit in its name, bounds and a description."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+        extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
     )
 
 
