@@ -359,7 +359,7 @@ def _counted(
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = everybody - reason.shape[1]
     if culled is None:
-        culled = np.full(len(reason), left_out)
+        culled = np.zeros(len(reason), dtype=np.int64) + left_out
     else:
         skipped["absent"] = skipped["absent"] + (left_out - culled)
     skipped[CULLED] = culled

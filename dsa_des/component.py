@@ -67,9 +67,7 @@ ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(str)
 class Parameters(BaseModel):
     """Parameters of a block: every field has its unit in its name, bounds and a description."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class ClockedParameters(Parameters):

@@ -229,11 +229,10 @@ def sensor_angles(
     return p, q
 
 
-@np.errstate(under="ignore")
 def sensor_angles_of_offsets(
     north_m: FloatArray,
     east_m: FloatArray,
-    down_m: FloatArray,
+    up_m: FloatArray,
     yaw_rad: FloatArray,
     pitch_rad: FloatArray,
     roll_rad: FloatArray,
@@ -242,8 +241,8 @@ def sensor_angles_of_offsets(
 
     Parameters
     ----------
-    north_m, east_m, down_m : ndarray
-        Offsets in the ownship's local NED frame, of the broadcast shape.
+    north_m, east_m, up_m : ndarray
+        Offsets in the ownship's local frame, of the broadcast shape.
     yaw_rad, pitch_rad, roll_rad : ndarray
         The ownship's attitude, ZYX. All six are contiguous arrays of finite doubles, at least one
         axis.
@@ -254,7 +253,7 @@ def sensor_angles_of_offsets(
         As from `sensor_angles`, to the last digit or two; at a third of its cost, because the
         direction need not be taken apart into angles first.
     """
-    x, y, z = _ned_to_body(north_m, east_m, down_m, yaw_rad, pitch_rad, roll_rad)
+    x, y, z = _ned_to_body(north_m, east_m, 0.0 - up_m, yaw_rad, pitch_rad, roll_rad)
     level = x * x
     level += y * y
     np.sqrt(level, out=level)

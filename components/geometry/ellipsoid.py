@@ -67,7 +67,7 @@ def line_of_sight(
     )
     # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
     with np.errstate(under="ignore"):
-        azimuth, elevation, slant_range = spherical_from_enu(*_north_east_up(*arrays))
+        azimuth, elevation, slant_range = spherical_from_enu(*north_east_up(*arrays))
     azimuth, elevation, slant_range = shaped(shape, azimuth, elevation, slant_range)
     return azimuth, elevation, slant_range
 
@@ -126,7 +126,7 @@ def line_of_sight_ned(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):
-        north, east, up = _north_east_up(*arrays)
+        north, east, up = north_east_up(*arrays)
     north, east, down = shaped(shape, north, east, 0.0 - up)
     return north, east, down
 
@@ -176,7 +176,7 @@ def spherical_from_enu(
     return positive_turn(direction_angle(east, north)), elevation, slant_range
 
 
-def _north_east_up(
+def north_east_up(
     lat1: FloatArray,
     lon1: FloatArray,
     alt1: FloatArray,
@@ -184,7 +184,13 @@ def _north_east_up(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Difference form of the WGS-84 line of sight; 1 is the observer, 2 the target."""
+    """Give the target's north, east and up offsets in m, without checks; see `line_of_sight_ned`.
+
+    Parameters
+    ----------
+    lat1, lon1, alt1, lat2, lon2, alt2 : ndarray
+        The observer and the target, in degrees and m: contiguous, at least one axis, in bounds.
+    """
     e2 = ECCENTRICITY_SQUARED
     sin1, cos1 = np.sin(lat1 * RAD_PER_DEG), _cos_deg(lat1)
     dlat = lat2 - lat1  # rounds, but relative to itself: nothing is wrapped afterwards

@@ -66,47 +66,12 @@ def line_of_sight(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
-        result = spherical_from_enu(*_north_east_up(*arrays))
+        result = spherical_from_enu(*north_east_up(*arrays))
     azimuth, elevation, slant_range = shaped(shape, *result)
     return azimuth, elevation, slant_range
 
 
-def line_of_sight_ned(
-    own_lat_deg: npt.ArrayLike,
-    own_lon_deg: npt.ArrayLike,
-    own_alt_m: npt.ArrayLike,
-    lat_deg: npt.ArrayLike,
-    lon_deg: npt.ArrayLike,
-    alt_m: npt.ArrayLike,
-    *,
-    validate: bool = True,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find the target's north, east and down offsets, with a constant length of a degree.
-
-    Parameters
-    ----------
-    own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
-        As for `line_of_sight`.
-
-    Returns
-    -------
-    north_m, east_m, down_m : ndarray
-        Metres in the ownship's local NED frame, the broadcast shape.
-
-    Raises
-    ------
-    ValueError
-        As for `line_of_sight`.
-    """
-    arrays, shape = positions(
-        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
-    )
-    north, east, up = _north_east_up(*arrays)
-    north, east, down = shaped(shape, north, east, 0.0 - up)
-    return north, east, down
-
-
-def _north_east_up(
+def north_east_up(
     lat1: FloatArray,
     lon1: FloatArray,
     alt1: FloatArray,
@@ -114,6 +79,13 @@ def _north_east_up(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Give the target's north, east and up offsets in m, without checks; see `line_of_sight`.
+
+    Parameters
+    ----------
+    lat1, lon1, alt1, lat2, lon2, alt2 : ndarray
+        The observer and the target, in degrees and m: contiguous, at least one axis, in bounds.
+    """
     north = (lat2 - lat1) * METRES_PER_DEGREE
     # cos(latitude) as the sine of the distance from the pole, exactly 0 at the pole
     shrink = np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG) * METRES_PER_DEGREE

@@ -36,9 +36,9 @@ LINES_OF_SIGHT: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
 }
 # Those that find offsets first; the directions' angles in body axes then need no sines of angles.
 OFFSETS: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
-    "flat_earth": flat_earth.line_of_sight_ned,
-    "local_radii": local_radii.line_of_sight_ned,
-    "ellipsoid": ellipsoid.line_of_sight_ned,
+    "flat_earth": flat_earth.north_east_up,
+    "local_radii": local_radii.north_east_up,
+    "ellipsoid": ellipsoid.north_east_up,
 }
 
 _PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
@@ -153,9 +153,10 @@ class Transform(Component):
                 azimuth, elevation, *attitude, model=self.rung.attitude, validate=False
             )
         else:
-            north, east, down = self._offsets(*places, validate=False)
-            azimuth, elevation, range_m = spherical_from_enu(north, east, 0.0 - down)
-            p, q = sensor_angles_of_offsets(north, east, down, *attitude)
+            with np.errstate(under="ignore"):  # what is too small for a double is zero
+                offsets = self._offsets(*places)
+                azimuth, elevation, range_m = spherical_from_enu(*offsets)
+                p, q = sensor_angles_of_offsets(*offsets, *attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - azimuth)
         _require_numbers(p, heading, other.pitch_rad, other.roll_rad)
         return {

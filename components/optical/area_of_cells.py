@@ -54,6 +54,9 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         cells.elevation_rad,
     )
     shown = {name: cells.of_target(column) for name, column in areas.items()}
+    if len(cells) <= CELLS_AT_ONCE:
+        small: FloatArray = compute(*view, model=silhouette, validate=False, **shown)
+        return small
     area = np.empty(len(cells))
     for start in range(0, len(cells), CELLS_AT_ONCE):
         block = slice(start, start + CELLS_AT_ONCE)
