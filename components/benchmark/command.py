@@ -49,6 +49,12 @@ def run_benchmark(
         console.print(f"rows written to {target}")
 
 
+_LEGEND = (
+    "M/s: million target-scans per s of CPU; x plain: times the plain loop; ms/s: CPU per simulated "
+    "s; MB: peak memory; Parquet: CPU that writing it adds"
+)
+
+
 def _measured_cases(
     console: Any, cases: list[Case], quick: bool, repeats: int | None, before: dict[str, Any]
 ) -> list[dict[str, Any]]:
@@ -57,6 +63,7 @@ def _measured_cases(
         console.print(f"{case.name}: {case.what} ...", style="dim")
         rows.append(_measured(case, quick, repeats or (2 if quick else 5)))
     console.print(_table(cases, rows, before))
+    console.print(_LEGEND, style="dim", soft_wrap=True)
     thesis = [row for row in rows if row["scene"] == "thesis"]
     for row in thesis:
         times = row["target_scans_per_s"] / _THESIS_PER_S
@@ -65,11 +72,9 @@ def _measured_cases(
 
 
 def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
-    """Measure times and memory in two fresh processes."""
-    row: dict[str, Any] = {}
-    for more in ([f"--repeats={repeats}"], ["--memory"]):
-        row.update(_fresh("measure", [case.name, *more, *(["--quick"] if quick else [])]))
-    return row
+    """Measure times and memory in a fresh process."""
+    options = [f"--repeats={repeats}", *(["--quick"] if quick else [])]
+    return _fresh("measure", [case.name, *options])
 
 
 def _measured_calls(quick: bool, repeats: int) -> dict[str, Any]:
@@ -120,21 +125,21 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
 def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
     from rich.table import Table
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    headings = ["scene", "per s", "x plain", "wanted", "CPU", "build", "per sim. s", "memory"]
-    headings += ["Parquet", *(["since"] if before else [])]
-    for heading in headings:
-        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    headings = ["scene", "M/s", "x plain", "wanted", "CPU s", "build s", "ms/s", "MB", "Parquet"]
+    for heading in [*headings, *(["since"] if before else [])]:
+        justify: Any = "left" if heading == "scene" else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
     for case, row in zip(cases, rows, strict=True):
         cells = [
             case.name,
-            f"{row['target_scans_per_s'] / 1e6:.2f} M",
+            f"{row['target_scans_per_s'] / 1e6:.2f}",
             f"{row['ratio_to_yardstick']:.1f}",
             f"{case.wanted:g}",
-            f"{row['cpu_s']:.3f} s",
-            f"{row['build_s']:.2f} s",
-            f"{row['cpu_ms_per_simulated_s']:.2f} ms",
-            f"{row['peak_memory_mb']:.0f} MB",
+            f"{row['cpu_s']:.3f}",
+            f"{row['build_s']:.2f}",
+            f"{row['cpu_ms_per_simulated_s']:.2f}",
+            f"{row['peak_memory_mb']:.0f}",
             f"{row['parquet_adds']:+.0%}",
         ]
         if before:
