@@ -50,8 +50,8 @@ def run_benchmark(
 
 
 _LEGEND = (
-    "M/s: million target-scans per s of CPU; x plain: times the plain loop; ms/s: CPU per simulated "
-    "s; MB: peak memory; Parquet: CPU that writing it adds"
+    "M/s: million target-scans per s of CPU; x plain: times the plain loop; ms/s: CPU per "
+    "simulated s; MB: peak memory; Parquet: CPU that writing it adds"
 )
 
 
