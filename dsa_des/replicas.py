@@ -216,7 +216,7 @@ def key_path(key: str) -> tuple[str | int, ...]:
 
 def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
     return Problem(
-        str(scene.path), key, message, str(value) if isinstance(value, Fraction) else value
+        str(scene.path), key, message, float(value) if isinstance(value, Fraction) else value
     )
 
 

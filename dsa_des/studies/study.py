@@ -30,6 +30,8 @@ class MetricSpec:
 
     name: str
     keys: Mapping[str, Any] = field(default_factory=dict)
+    #: Its place in the study's list, for messages.
+    place: int = 0
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene.
@@ -220,6 +222,4 @@ def changed_scene(
         problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
     for key, value in sets:
         problems += set_value(file, key, deepcopy(value), source)
-    if problems:
-        raise SceneError(problems)
-    return check_scene(file)
+    return check_scene(file, problems)

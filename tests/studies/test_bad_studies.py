@@ -54,6 +54,22 @@ def changed(old: str, new: str) -> None:
          "stop_when.metric = 'nothing': no metric of the study gives it"),
         ("[axes]", '[axes]\nswap.radra = ["radar.threshold"]', "did you mean 'radar'?"),
         ("[axes]", '[axes]\nblocks.traffic.file = {files = "nowhere/*.daa"}', "no file matches"),
+        ("uniform = [0, 0.2]", "uniform = [0, nan]", "uniform = [0, nan]: must be finite"),
+        ("uniform = [0, 0.2]", "uniform = [-0.2, 0.3]",
+         "study.toml: draws.blocks.radar.offset_s = -0.1"),
+        ("uniform = [0, 0.2]", 'choice = [0.1, "x"]', "offset_s = 'x': must be a number"),
+        ("blocks.radar.offset_s = {", "blocks.radar.ofset_s = {", "did you mean 'offset_s'?"),
+        ("blocks.radar.offset_s = { uniform = [0, 0.2]", "blocks.radar.scan_rate_hz = { choice = [2]",
+         "is set by the axis blocks.radar.scan_rate_hz"),
+        ("[1, 5]", '{ from = 1, to = 5, steps = 3, log = "yes" }', "log = 'yes': must be true"),
+        ('title = "small study"', 'stop_when = {metric = "track_breaks", half_width = nan}',
+         "stop_when.half_width = nan: must be a finite number above 0"),
+        ("[[figures]]", '[[figures]]\nkind = "pie"', "figures[0].kind = 'pie'"),
+        ("[[figures]]", '[[figures]]\nkind = ["axis"]', "figures[0].kind = ['axis']"),
+        ("[[figures]]", '[[figures]]\nkind = "heat"', "needs two axes; the study has 1"),
+        ('[[figures]]\nmetric = "first_detection_range_m.radar"',
+         '[[figures]]\nkind = "run"\ncell = 2\nreplica = "x"',
+         "figures[0].cell = 2: must be the number of a cell of this study: 0 to 1"),
     ],
 )  # fmt: skip
 def test_one_problem_is_named(small: Path, old: str, new: str, message: str) -> None:
@@ -83,6 +99,26 @@ def test_all_problems_come_at_once(small: Path) -> None:
     changed("uniform = [0, 0.2]", "uniform = [0]")
     output = refused("study.toml")
     assert "2 problems" in output and "is empty" in output and "uniform takes two" in output
+
+
+def test_problems_of_all_kinds_come_in_one_report(small: Path) -> None:
+    changed("[1, 5]", "[1, -5]")  # of the scene
+    changed("replicas = 24", "replicas = 0")  # of the study
+    changed('"first_detection", ', '"first_detecton", ')  # of a metric's name
+    changed('"well_clear"', '{ metric = "well_clear", sensors = ["rader"] }')  # against the scene
+    changed("uniform = [0, 0.2]", "uniform = [-2, -1]")  # of a draw
+    output = refused("study.toml")
+    assert "5 problems" in output
+    for key in ("blocks.radar.scan_rate_hz = -5", "replicas = 0", "metrics[0]", "metrics[2]",
+                "draws.blocks.radar.offset_s = -"):  # fmt: skip
+        assert f"study.toml: {key}" in output
+
+
+def test_what_a_scene_lacks_hides_nothing_else(small: Path) -> None:
+    changed("[axes]", '[set]\nduraton_s = 3\n[swap]\nfusion = "fusion.pick_bst"\n[axes]')
+    changed("[1, 5]", "{ from = 5, to = 1, step = 1 }")
+    output = refused("study.toml")
+    assert "3 problems" in output and "did you mean 'duration_s'?" in output
 
 
 def test_a_scheduler_that_does_not_answer(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
