@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from dsa_des.errors import Problem, SceneError
+from dsa_des.errors import Problem
 from dsa_des.overrides import apply_swap, set_value
 from dsa_des.replicas import Replica
 from dsa_des.scene import Scene, check_scene

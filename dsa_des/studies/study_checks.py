@@ -66,13 +66,37 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
     if whole:
         _check_names(study, [name for name in results if not name.endswith(TRIALS)], add)
     if not problems:
-        try:
-            Simulation(scene_of(first, study.replica(0)))
-        except SceneError as error:
-            problems += error.problems
-        except BlockFailure as error:
-            add((), str(error))
+        problems += _check_set_up(study, scenes, file)
     return problems
+
+
+def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
+    """Set up a run, and return what is wrong with it or with the metrics.
+
+    Where a metric needs something of the blocks, one scene of the study that has it is enough.
+    """
+    wrong: dict[int, str] = {}
+    for scene in scenes:
+        try:
+            blocks = Simulation(scene_of(scene, study.replica(0))).components
+        except (SceneError, BlockFailure) as error:
+            if scene is not scenes[0]:  # its rows say so
+                continue
+            if isinstance(error, SceneError):
+                return error.problems
+            return [file.problem((), str(error))]
+        refused: dict[int, str] = {}
+        for spec in study.metrics:
+            try:
+                if scene is scenes[0] or spec.place in wrong:
+                    spec.build(scene).check(blocks)
+            except ValueError as error:
+                refused[spec.place] = str(error)
+        wrong = refused
+        if not wrong:
+            break
+    names = {spec.place: spec.name for spec in study.metrics}
+    return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
 
 
 def _check_names(study: Study, names: list[str], add: Callable[..., None]) -> None:
