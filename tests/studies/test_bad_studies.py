@@ -131,6 +131,12 @@ def test_a_scheduler_that_does_not_answer(small: Path, monkeypatch: pytest.Monke
     assert "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there" in refused(*words)
 
 
+def test_an_address_of_no_scheduler(small: Path) -> None:
+    pytest.importorskip("distributed")
+    words = ("study.toml", "--executor", "dask", "--scheduler", "nowhere")
+    assert "--scheduler nowhere: must be an address such as" in refused(*words)
+
+
 def test_dask_must_be_there(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     words = ("study.toml", "--executor", "dask", "--scheduler", "tcp://127.0.0.1:9")
@@ -143,6 +149,10 @@ def test_folders_that_hold_something_else(small: Path) -> None:
     Path("full/precious.txt").write_text("mine")
     assert "holds something other than a study" in refused("study.toml", "--out", "full")
     assert "is not the folder of a study" in refused("show", "full")
+    Path("full/study.json").write_text("{")
+    assert "full/study.json: is damaged" in refused("show", "full")
+    assert "full/study.json: is damaged" in refused("study.toml", "--out", "full", "--resume")
+    assert "--out study.toml: is a file" in refused("study.toml", "--out", "study.toml")
     assert "give STUDY.toml" in refused()
     assert "there is no studies/study-NNN to continue" in refused("study.toml", "--resume")
     assert "must be 1 or more" in refused("study.toml", "--workers", "0")
