@@ -73,28 +73,36 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
 def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
     """Set up a run, and return what is wrong with it or with the metrics.
 
-    Where a metric needs something of the blocks, one scene of the study that has it is enough.
+    Where a metric needs something of the blocks, one scene of the study that has it is enough. Of
+    many files one may be damaged: its runs fail by themselves.
     """
-    wrong: dict[int, str] = {}
+    files = any(axis.files for axis in study.axes)
+    broken: list[Problem] = []
+    wrong: dict[int, str] | None = None
     for scene in scenes:
         try:
             blocks = Simulation(scene_of(scene, study.replica(0))).components
         except (SceneError, BlockFailure) as error:
-            if scene is not scenes[0]:  # its rows say so
-                continue
-            if isinstance(error, SceneError):
-                return error.problems
-            return [file.problem((), str(error))]
+            if wrong is None:
+                if isinstance(error, SceneError):
+                    broken += error.problems
+                else:
+                    broken.append(file.problem((), str(error)))
+                if not files:
+                    return broken
+            continue
         refused: dict[int, str] = {}
         for spec in study.metrics:
             try:
-                if scene is scenes[0] or spec.place in wrong:
+                if wrong is None or spec.place in wrong:
                     spec.build(scene).check(blocks)
             except ValueError as error:
                 refused[spec.place] = str(error)
         wrong = refused
         if not wrong:
             break
+    if wrong is None:
+        return broken
     names = {spec.place: spec.name for spec in study.metrics}
     return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
 

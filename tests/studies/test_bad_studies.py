@@ -6,6 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
+from dsa_des.errors import SceneError
+from dsa_des.studies.study_file import read_study
 
 
 def refused(*words: str) -> str:
@@ -156,3 +158,14 @@ def test_folders_that_hold_something_else(small: Path) -> None:
     assert "give STUDY.toml" in refused()
     assert "there is no studies/study-NNN to continue" in refused("study.toml", "--resume")
     assert "must be 1 or more" in refused("study.toml", "--workers", "0")
+
+
+def test_one_damaged_encounter_of_many_stops_no_study(tmp_path: Path, configs: Path) -> None:
+    good = (configs / "encounters" / "crossing.daa").read_text()
+    (tmp_path / "a.daa").write_text("damaged")
+    study = configs / "studies" / "folder_by_scan_rate.toml"
+    files = f'axes.blocks.traffic.file.files="{tmp_path}/*.daa"'
+    with pytest.raises(SceneError, match=r"a\.daa"):
+        read_study(study, sets=[files])
+    (tmp_path / "b.daa").write_text(good)
+    assert len(read_study(study, sets=[files]).axes[0].labels) == 2
