@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.replicas import Replica, scene_of
+from dsa_des.replicas import Replica, key_path, scene_of
 from dsa_des.scene import Scene
 from dsa_des.scene_file import Key, SceneFile
 from dsa_des.simulation import Simulation
@@ -41,6 +41,7 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
     def add(key: Key, message: str, *value: Any) -> None:
         problems.append(file.problem(key, message, *value))
 
+    _check_axes(study, add)
     scenes: list[Scene] = []
     for cell in _one_per_value(study):
         try:
@@ -119,12 +120,24 @@ def _check_names(study: Study, names: list[str], add: Callable[..., None]) -> No
             add(("figures", number, "metric"), message, str(figure["metric"]))
 
 
+def _check_axes(study: Study, add: Callable[..., None]) -> None:
+    """Report a key that two axes set: the second would win without a word."""
+    owner: dict[tuple[str | int, ...], str] = {}
+    for axis in study.axes:
+        for key in {key for sets in axis.sets for key, _ in sets}:
+            first = owner.setdefault(key_path(key), axis.key)
+            if first != axis.key:
+                add(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
+
+
 def _check_draws(study: Study, scene: Scene, add: Callable[..., None]) -> None:
     """Report draws of values that the scene does not allow, and of keys that are axes."""
-    on_axes = {key: axis.key for axis in study.axes for sets in axis.sets for key, _ in sets}
+    on_axes = {
+        key_path(key): axis.key for axis in study.axes for sets in axis.sets for key, _ in sets
+    }
     for draw in study.draws:
-        if draw.key in on_axes:
-            add(("draws", draw.key), f"is set by the axis {on_axes[draw.key]}: draw it, or vary it")
+        if axis := on_axes.get(key_path(draw.key)):
+            add(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
         for value in _worst(draw, study):
             try:
                 scene_of(scene, Replica(0, {draw.key: value}))

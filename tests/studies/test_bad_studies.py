@@ -64,6 +64,8 @@ def changed(old: str, new: str) -> None:
         ("blocks.radar.offset_s = { uniform = [0, 0.2]",
          "blocks.radar.scan_rate_hz = { choice = [2]",
          "is set by the axis blocks.radar.scan_rate_hz"),
+        ("[axes]", '[axes]\nboth = {values = [1, 2], set."blocks.radar.scan_rate_hz" = [1, 2]}',
+         "sets blocks.radar.scan_rate_hz, which the axis both sets as well"),
         ("[1, 5]", '{ from = 1, to = 5, steps = 3, log = "yes" }', "log = 'yes': must be true"),
         ('title = "small study"', 'stop_when = {metric = "track_breaks", half_width = nan}',
          "stop_when.half_width = nan: must be a finite number above 0"),
