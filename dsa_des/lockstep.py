@@ -123,7 +123,23 @@ class LockStep(Simulation):
                 raise NotInLockStep(f"block {face.name} asks for something else in some replica")
         for port in face.outputs:
             if component.offer(port) != face.offer(port):
-                raise NotInLockStep(f"block {face.name} offers something else in some replica")
+                raise NotInLockStep(
+                    f"what block {face.name} tells its neighbours, of its targets for example, "
+                    "differs between replicas"
+                )
+
+    def rehearse(self) -> None:
+        """Make what each replica has for itself, and let it go.
+
+        Raises
+        ------
+        NotInLockStep
+            If that shows that the replicas cannot run together.
+        """
+        for component in self.components.values():
+            if isinstance(component, SplitBlock):
+                for number in range(len(self._scenes)):
+                    component.make(number)
 
     def _finished(self, number: int, component: Component) -> None:
         if self._report is not None:

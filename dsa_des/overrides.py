@@ -4,6 +4,7 @@ They are two verbs: `--set` changes one value; `--swap` puts another type into a
 name, its wires and the parameters the new type knows, and lists those it dropped.
 """
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,10 @@ from dsa_des.block_options import BlockOptions
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.registry import UnknownType, find
-from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile
+from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, dotted
+
+#: An item of a list, ``[3]`` or ``3``, and what follows it.
+_ITEM = re.compile(r"\[?([^.\[\]]*)\]?\.?(.*)")
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
@@ -55,12 +59,11 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     source : str
         Where it was written, for messages.
     """
-    parts = text.replace("[", ".").replace("]", "").split(".")
     container: Any = scene.data
     key: list[str | int] = []
-    for position, part in enumerate(parts):
-        last = position == len(parts) - 1
-        step = _step(container, part)
+    rest = text.replace('"', "")
+    while True:
+        step, part, rest = _step(container, rest)
         if isinstance(step, str) and isinstance(container, list):
             message = f"there is no item {part!r}: the list has {len(container)} (from 0)"
             return [Problem(source, text, message)]
@@ -68,14 +71,15 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
             hint = did_you_mean(str(step), container)
             return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
         key.append(step)
-        if last:
+        if not rest:
             container[step] = value
-        elif isinstance(container, dict) and step not in container:
+            break
+        if isinstance(container, dict) and step not in container:
             container[step] = {}
         elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[step])):
             container[step] = table
         elif not isinstance(container[step], dict | list):
-            return [Problem(source, text, f"{'.'.join(parts[: position + 1])} is no table")]
+            return [Problem(source, text, f"{dotted(tuple(key))} is no table")]
         container = container[step]
     for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
         del scene.sources[source_key]
@@ -117,10 +121,21 @@ def _wire_table(entry: Any) -> dict[str, str] | None:
     return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
 
 
-def _step(container: Any, part: str) -> str | int:
-    if isinstance(container, list) and part.isdecimal() and int(part) < len(container):
-        return int(part)
-    return part
+def _step(container: Any, rest: str) -> tuple[str | int, str, str]:
+    """Return the next step into a container, as it was written, and what is left of the key.
+
+    A key that is already there is found whole, dots and brackets included: a study has axes of
+    names such as ``wires[4].drop_probability``.
+    """
+    if isinstance(container, list):
+        part, tail = _ITEM.match(rest).groups()  # type: ignore[union-attr]
+        inside = part.isdecimal() and int(part) < len(container)
+        return int(part) if inside else part, part, tail
+    there = [
+        name for name in container if rest == name or rest.startswith((f"{name}.", f"{name}["))
+    ]
+    part = max(there, key=len, default=rest.partition(".")[0])
+    return part, part, rest[len(part) :].removeprefix(".")
 
 
 def _sourced(value: Any) -> Any:

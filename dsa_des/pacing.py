@@ -12,6 +12,8 @@ from dsa_des.errors import UsageError
 
 #: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
 LONGEST_WAIT_S = 0.1
+#: Systems refuse to sleep for centuries, s.
+LONGEST_SLEEP_S = 3600.0
 
 
 def parse_factor(text: str) -> float:
@@ -68,9 +70,8 @@ class Pacer:
     def __call__(self, time_s: float) -> None:
         """Wait for the instant up to which the simulation has come."""
         due = self._started + time_s / self.factor
-        ahead_s = due - self.now()
-        if ahead_s > 0.0:
-            self.sleep(ahead_s)
+        while (ahead_s := due - self.now()) > 0.0:
+            self.sleep(min(ahead_s, LONGEST_SLEEP_S))
         # Waking up late counts as well: whoever waits for the results waits for that too.
         lag_s = max(0.0, self.now() - due)
         self.windows += 1

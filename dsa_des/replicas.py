@@ -104,7 +104,7 @@ def run_replicas(
 def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     """Return why replicas cannot run in lock step, as far as it shows before they run."""
     try:
-        LockStep([scene_of(scene, replica) for replica in replicas])
+        LockStep([scene_of(scene, replica) for replica in replicas]).rehearse()
     except NotInLockStep as reason:
         return str(reason)
     except (SceneError, BlockFailure):  # a failing replica says so itself
@@ -216,7 +216,7 @@ def key_path(key: str) -> tuple[str | int, ...]:
 
 def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
     return Problem(
-        str(scene.path), key, message, str(value) if isinstance(value, Fraction) else value
+        str(scene.path), key, message, float(value) if isinstance(value, Fraction) else value
     )
 
 

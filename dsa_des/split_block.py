@@ -43,7 +43,7 @@ class SplitBlock(Component):
         self.face = face
         self.inputs, self.outputs = face.inputs, face.outputs  # type: ignore[misc]
         self.windowed, self.clocked = True, face.clocked  # type: ignore[misc]
-        self._make, self._finished = make, finished
+        self.make, self._finished = make, finished
         self._instances: dict[int, Component] = {}
 
     @property
@@ -60,7 +60,7 @@ class SplitBlock(Component):
             number = int(replica[first])
             if number not in self._instances:
                 self._let_go(number)
-                self._instances[number] = self._make(number)
+                self._instances[number] = self.make(number)
             result = self._instances[number].run(_part(wake, slice(first, end), number))
             if isinstance(result, Message):
                 result = {next(iter(self.outputs)): result}

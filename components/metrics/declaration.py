@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from components.metrics.rows import (
     SensorParameters,
+    TargetMetric,
     first_rows,
     is_named,
     of_target,
@@ -15,7 +16,7 @@ from components.metrics.rows import (
     taken,
 )
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 from dsa_des.types import FloatArray, IntArray
 
 ANY = "any"
@@ -40,7 +41,7 @@ class DeclarationParameters(SensorParameters):
         return self
 
 
-class Declaration(Metric):
+class Declaration(TargetMetric):
     """Time and true slant range of the first declaration, per sensor and of any of them.
 
     Without `m` and `n` the sensors' own rules count (``declare_m``, ``declare_n``; a sensor

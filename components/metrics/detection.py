@@ -9,6 +9,7 @@ import numpy as np
 from components.metrics.rows import (
     FUSED,
     SensorParameters,
+    TargetMetric,
     first_rows,
     is_named,
     of_target,
@@ -17,13 +18,13 @@ from components.metrics.rows import (
     with_trials,
 )
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Result, recorded_by
 from dsa_des.types import FloatArray
 
 _ROWS = ("block", "target", "time_s", "true_range_m")
 
 
-class FirstDetection(Metric):
+class FirstDetection(TargetMetric):
     """Time and true slant range of the first detection, per sensor and of the fusion."""
 
     Parameters = SensorParameters
@@ -72,7 +73,7 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
     return [taken(columns, "time_s", first), taken(columns, "true_range_m", first)]
 
 
-class DetectionShare(Metric):
+class DetectionShare(TargetMetric):
     """Share of the looks at targets inside a sensor's reach that detect."""
 
     Parameters = SensorParameters

@@ -12,10 +12,10 @@ import numpy as np
 from pydantic import Field
 
 from components.metrics.declaration import ANY, DeclarationParameters, declarations
-from components.metrics.rows import sensors_of
+from components.metrics.rows import TargetMetric, sensors_of
 from components.separation import Separation, first_inside, separations, traffic_block
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 from dsa_des.types import FloatArray
 
 FOOT_M = 0.3048
@@ -31,7 +31,7 @@ class EncounterParameters(DeclarationParameters):
     )
 
 
-class _Encounter(Metric):
+class _Encounter(TargetMetric):
     Parameters = EncounterParameters
     tables = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
 

@@ -12,6 +12,7 @@ from components.jittered_coincidence import mean_coincidence_share
 from components.metrics.rows import (
     FUSED,
     SensorParameters,
+    TargetMetric,
     chosen,
     is_named,
     of_target,
@@ -21,11 +22,11 @@ from components.metrics.rows import (
 from dsa_des.clock import ClockSpec
 from dsa_des.message import Text
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import SHARE, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
-class FusedShare(Metric):
+class FusedShare(TargetMetric):
     """Share of one sensor's detections that were put together with one of another sensor.
 
     ``fused_share.ir_with_radar`` counts the detections of ir: those that occur, at their own

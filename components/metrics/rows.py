@@ -1,15 +1,17 @@
 """Array tools that metrics share: rows of a group of replicas, chosen and reduced by replica."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from dsa_des.component import Parameters
+from components.traffic.source import TrafficSource
+from dsa_des.component import Component, Parameters
+from dsa_des.errors import did_you_mean
 from dsa_des.message import Columns, Text
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import recorded_by
+from dsa_des.studies.metric import Metric, recorded_by
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 
 FUSED = "fused"
@@ -31,6 +33,18 @@ class SensorParameters(TargetParameters):
     )
 
 
+class TargetMetric(Metric):
+    """A metric that can be told which target counts."""
+
+    def check(self, blocks: Mapping[str, Component]) -> None:
+        """Refuse a target that the traffic does not have."""
+        sources = [block for block in blocks.values() if isinstance(block, TrafficSource)]
+        names = [target.name for source in sources for target in source.targets]
+        if sources and self.p.target is not None and self.p.target not in names:
+            hint = did_you_mean(self.p.target, names)
+            raise ValueError(f"target: there is no {self.p.target!r}{hint}")
+
+
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
     """Return the sensors to measure: those chosen, or all, and `extra` names.
 
@@ -39,8 +53,6 @@ def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] 
     ValueError
         If one of those chosen is not there.
     """
-    from dsa_des.errors import did_you_mean
-
     known = [*recorded_by(scene, "detections"), *extra]
     for name in chosen or ():
         if name not in known:

@@ -8,11 +8,18 @@ import numpy as np
 from pydantic import Field
 
 from components.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
-from components.metrics.rows import FUSED, TargetParameters, chosen, name_ranks, of_target
+from components.metrics.rows import (
+    FUSED,
+    TargetMetric,
+    TargetParameters,
+    chosen,
+    name_ranks,
+    of_target,
+)
 from components.metrics.single_sensor import only_feed
 from dsa_des.message import Text
 from dsa_des.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import NUMBER, Group, Result, recorded_by
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
@@ -55,7 +62,7 @@ def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) 
     return found
 
 
-class AgeOfInformation(Metric):
+class AgeOfInformation(TargetMetric):
     """Age of the newest detection that the fusion holds of a target, over its time in view.
 
     Between two arrivals the age grows with time; the mean and the 95th percentile are over time,
@@ -167,7 +174,7 @@ class TrackParameters(TargetParameters):
     )
 
 
-class TrackUpdates(Metric):
+class TrackUpdates(TargetMetric):
     """How often tracks are updated, and how much of the time they are not broken.
 
     A track is broken from `break_after_s` after an update until the next one.
@@ -215,7 +222,7 @@ class TrackUpdates(Metric):
         return {"track_update_interval_s": mean_interval_s(period_s, feed.through)}
 
 
-class PositionError(Metric):
+class PositionError(TargetMetric):
     """How far fused positions lie from the true ones, root mean square over all of a run."""
 
     Parameters = TargetParameters

@@ -33,8 +33,8 @@ def make() -> Made:
     relative = "the range goes with the square root of the area, whatever the range (errata 26)"
     denominator = "1 to 3 m² mean 1.8 to 3.1 km, nearer than any detection of Table 4.4 (errata 26)"
     rows = [
-        Row(f"error in range for +20 % area, {name}", error_m(area, 0.2), "m", why, "600", 50.0,
-            everywhere)
+        Row(f"error in range for +20 % area, {name}", error_m(area, 0.2), "m",
+            why[:-1] + '; "approximately" 600 m allow 50 m.', "600", 50.0, everywhere)
         for name, area in (
             (f"detection at {range_km(head_on):.2f} km", head_on),
             (f"detection at {range_km(abeam):.2f} km", abeam),

@@ -46,7 +46,7 @@ def refined() -> Made:
             Row(f"abeam range, refined over first, {CLASSES[name][0]}", float(ratio), "",
                 f"Printed: from {old} % and {new} % too far against the same curve.", printed,
                 0.02, "halving the side explains part only; the printed errors need another common "
-                "factor of about 0.8, so P or a was lowered without saying so (errata 23c)")
+                "factor of about 0.8, as if P or a had been lowered as well (errata 23c)")
         )  # fmt: skip
     fighter = ranges["small_fighter"][90] / before["small_fighter"][90]
     why = "Its errors are printed without a sign: no ratio follows from them."

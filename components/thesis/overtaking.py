@@ -28,7 +28,8 @@ def make() -> Made:
     rows = [
         Row("range within which the EO camera joins", joins_km, "km",
             "The thesis prints neither aircraft nor flight: a King Air 1300 m to the left and "
-            "400 m above, in round numbers; sensor and aircraft files unchanged.", "5.1", 0.15,
+            "400 m above, in round numbers, with sensor and aircraft files unchanged; 0.15 km, two "
+            "scans, are allowed for.", "5.1", 0.15,
             "the flight is not printed, and the range follows from the area it shows"),
         Row("share of fused detections with a range", float(np.isfinite(errors_m).mean()), "",
             "The radar determines the range throughout.", "1", 0.0),

@@ -1,56 +1,83 @@
 """Running a scene of ``configs`` in memory and reading what was recorded."""
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from components.display.flights import Flights
 from components.thesis.project_files import configs
 from dsa_des.errors import UsageError
-from dsa_des.recording import MemorySink, Recorder
+from dsa_des.message import Columns, Text
+from dsa_des.recording import ColumnSink, Recorder
+from dsa_des.replicas import Failed, Replica, run_replicas
 from dsa_des.scene import Scene, load_scene
 from dsa_des.simulation import Simulation
 from dsa_des.types import AnyArray
 
 
 @dataclass
-class SceneRun:
-    """A run of one scene.
+class Recording:
+    """What a run of a scene recorded.
 
     Parameters
     ----------
-    simulation : Simulation
     tables : dict
-        Recorded tables, Arrow.
+        Table name → column name → values.
+    """
+
+    tables: Mapping[str, Columns]
+
+    def rows(self, table: str, **where: str) -> dict[str, AnyArray]:
+        """Return the columns of a recorded table, of those rows whose columns have these texts."""
+        columns = {name: _values(column) for name, column in self.tables[table].items()}
+        keep = np.ones(len(columns["tick"]), dtype=bool)
+        for name, text in where.items():
+            keep &= columns[name] == text
+        return {name: values[keep] for name, values in columns.items()}
+
+
+@dataclass
+class SceneRun(Recording):
+    """A run of one scene, with what ran.
+
+    Parameters
+    ----------
+    tables : dict
+    simulation : Simulation
     wall_s : float
         Time that building and running took.
     """
 
     simulation: Simulation
-    tables: dict[str, Any]
     wall_s: float
-
-    def rows(self, table: str, **where: str) -> dict[str, AnyArray]:
-        """Return the columns of a recorded table, of those rows whose columns have these texts."""
-        found = self.tables[table]
-        columns = {name: np.asarray(found[name].to_pylist()) for name in where}
-        keep = np.ones(found.num_rows, dtype=bool)
-        for name, text in where.items():
-            keep &= columns[name] == text
-        return {
-            name: found[name].to_numpy(zero_copy_only=False)[keep] for name in found.schema.names
-        }
 
     @cached_property
     def flights(self) -> Flights:
         """Where everybody was."""
-        found = Flights.of(self.simulation, {})
-        if found is None:
-            raise UsageError(f"{self.simulation.scene.path}: has no traffic")
-        return found
+        return flights_of(self.simulation)
+
+
+def _values(column: AnyArray | Text) -> AnyArray:
+    if isinstance(column, Text):
+        return np.array([*column.names, None], dtype=object)[column.codes]
+    return column
+
+
+def flights_of(simulation: Simulation) -> Flights:
+    """Return where everybody is.
+
+    Raises
+    ------
+    UsageError
+        If the scene has no traffic.
+    """
+    found = Flights.of(simulation, {})
+    if found is None:
+        raise UsageError(f"{simulation.scene.path}: has no traffic")
+    return found
 
 
 def scene(name: str, *sets: str) -> Scene:
@@ -67,13 +94,24 @@ def scene(name: str, *sets: str) -> Scene:
 def run(loaded: Scene) -> SceneRun:
     """Run a scene in memory."""
     started = time.perf_counter()
-    sink = MemorySink()
+    sink = ColumnSink()
     simulation = Simulation(loaded, recorder=Recorder([sink]))
     simulation.run()
     wall_s = time.perf_counter() - started
-    return SceneRun(simulation, sink.tables(), wall_s)
+    return SceneRun(sink.tables(), simulation, wall_s)
 
 
-def monte_carlo(loaded: Scene, replicas: int) -> list[SceneRun]:
-    """Run a scene with the seeds 0, 1, ...; the draws of each run are its own."""
-    return [run(replace(loaded, seed=seed)) for seed in range(replicas)]
+def monte_carlo(loaded: Scene, replicas: int) -> list[Recording]:
+    """Run a scene with the seeds 0, 1, ...; the draws of each run are its own.
+
+    Raises
+    ------
+    ValueError
+        If one of them failed.
+    """
+    done = []
+    for outcome in run_replicas(loaded, [Replica(seed) for seed in range(replicas)]):
+        if isinstance(outcome, Failed):
+            raise ValueError(f"{loaded.path}: {outcome.error}")
+        done.append(Recording(outcome.tables))
+    return done

@@ -64,9 +64,12 @@ def make() -> Made:
         with panels(path) as (axes,):
             for name, (_, colour) in sensors.items():
                 axes.plot(range_km, curves[name], color=colour, label=f"calibrated to: {name}")
-            for km, text in ((STATUTE_KM, "3.5 sm"), (NAUTICAL_KM, "3.5 NM")):
+            for km, text, side in (
+                (STATUTE_KM, "3.5 sm ", "right"),
+                (NAUTICAL_KM, " 3.5 NM", "left"),
+            ):
                 axes.axvline(km, color=GREY, linewidth=0.8, linestyle=":")
-                axes.annotate(f" {text}", (km, 0.03), fontsize=8)
+                axes.annotate(text, (km, 0.03), fontsize=8, ha=side)
             axes.plot([first_km], [0.9], "kx", markersize=7,
                       label="threshold radar set to 6.48 km: first detection")  # fmt: skip
             axes.set_xlabel("range [km]")

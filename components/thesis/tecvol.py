@@ -10,7 +10,8 @@ from components.geometry.ellipsoid import line_of_sight_ned
 from components.thesis.made import Columns, Picture
 from components.thesis.plotting import BLUE, GREEN, ORANGE, legend_below, panels
 from components.thesis.row import Row
-from components.thesis.scene_run import SceneRun, monte_carlo, scene
+from components.thesis.scene_run import Recording, flights_of, monte_carlo, scene
+from dsa_des.simulation import Simulation
 from dsa_des.types import FloatArray
 
 REPLICAS = 100
@@ -37,8 +38,9 @@ class Errors:
 
 def make() -> tuple[list[Row], Picture, Columns]:
     """Return rows, the figure and its data."""
-    runs = monte_carlo(scene("systems/tecvol"), REPLICAS)
-    errors = {name: _errors(runs, name) for name in ("radar", "eo")}
+    loaded = scene("systems/tecvol")
+    runs, flights = monte_carlo(loaded, REPLICAS), flights_of(Simulation(loaded))
+    errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
     eo, radar = errors["eo"], errors["radar"]
     rows = [
         Row("Monte Carlo runs of TECVOL", len(runs), "", "Seeds 0 to 99 of systems/tecvol.toml.",
@@ -103,7 +105,7 @@ def make() -> tuple[list[Row], Picture, Columns]:
     return rows, Picture("table_2_4_tecvol", caption, draw), data
 
 
-def _errors(runs: list[SceneRun], name: str) -> Errors:
+def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     """Return the errors of what a sensor reports, the ownship flying level to the north."""
     parts = [run.rows("detections", block=name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
@@ -111,7 +113,6 @@ def _errors(runs: list[SceneRun], name: str) -> Errors:
                         "true_elevation_rad", "true_range_m", "range_m", "own_lat_deg",
                         "own_lon_deg", "own_alt_m")}  # fmt: skip
     turned = seen["ned_azimuth_rad"] - seen["true_azimuth_rad"]
-    flights = runs[0].flights
     return Errors(
         range_km=seen["true_range_m"] / 1000.0,
         azimuth_deg=np.degrees(np.arctan2(np.sin(turned), np.cos(turned))),

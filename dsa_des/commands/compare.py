@@ -8,7 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from dsa_des.commands.study import finish, read_study_of, run_into, show_study
+from dsa_des.commands.study import finish, known_results, read_study_of, run_into, show_study
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.run_folder import new_folder_name
@@ -48,9 +48,18 @@ def compare_command(
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    found = [_tables(Path(path), replicas, workers, home) for path in paths]
-    for other, path in zip(found[1:], paths[1:], strict=True):
-        _compare(found[0], other, (paths[0], path), results, home)
+    if home.exists() and (not home.is_dir() or any(home.iterdir())):
+        raise UsageError(f"--out {home}: is there already; a new folder is needed")
+    studies = [_study_at(Path(path), replicas) for path in paths]
+    for study in studies:
+        known_results(study, results)
+    found = [
+        _tables(Path(path), study, workers, home)
+        for path, study in zip(paths, studies, strict=True)
+    ]
+    for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
+        stem = "scatter" if len(found) == 2 else f"scatter-{number}"
+        _compare(found[0], other, (paths[0], path), results, home / stem)
 
 
 def _compare_swap(
@@ -76,6 +85,7 @@ def _compare_swap(
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
+    known_results(study, results)
     folder = run_into(study, home, workers, resume=False)
     tables = finish(study, folder, only=results)
     axis = f"swap.{chosen[0][0]}"
@@ -127,22 +137,21 @@ def _applicable(path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]
     return found
 
 
-def _tables(path: Path, replicas: int, workers: int | None, home: Path) -> Tables:
+def _study_at(path: Path, replicas: int) -> Study:
+    """Return the study of a folder, a study file or a scene."""
+    return read_study_of(StudyFolder(path)) if path.is_dir() else _read(path, replicas)
+
+
+def _tables(path: Path, study: Study, workers: int | None, home: Path) -> Tables:
     """Return the tables of a study's folder, or run the study or scene first."""
     if path.is_dir():
-        folder = StudyFolder(path)
-        return Tables(read_study_of(folder), folder)
-    study = _read(path, replicas)
+        return Tables(study, StudyFolder(path))
     number = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:6]
     folder = run_into(study, home / f"{path.stem}-{number}", workers, resume=False)
     return Tables(study, folder)
 
 
 def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
-    names = [result.name for result in tables.results]
-    for name in only:
-        if name not in names:
-            raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, names)}")
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
@@ -188,7 +197,7 @@ def _farthest_apart(
 
 
 def _compare(
-    one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], home: Path
+    one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], stem: Path
 ) -> None:
     """Print paired differences of two studies over the places and units that both have."""
     if one.rows.axes != other.rows.axes or one.rows.over != other.rows.over:
@@ -230,9 +239,12 @@ def _compare(
             together.setdefault(metric, []).append(pair)
             _farthest_apart(metric, sides, names, (one.study, other.study))
     Console(width=160).print(table)
-    home.mkdir(parents=True, exist_ok=True)
+    try:
+        stem.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {stem.parent}: cannot be written: {error.strerror}") from error
     for metric, pairs in together.items():
-        path = home / f"scatter-{metric}.png"
+        path = stem.with_name(f"{stem.name}-{metric}.png")
         x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
         draw_scatter(path, x, y, names, metric, "compared")
         click.echo(f"wrote {path}")

@@ -134,11 +134,22 @@ def show_study(path: Path, only: Sequence[str] = ()) -> None:
     """Print all tables of a study's folder, or those of some results; draw its figures again."""
     folder = StudyFolder(path)
     study = read_study_of(folder)
+    finish(study, folder, only=only or known_results(study, only))
+
+
+def known_results(study: Study, only: Sequence[str]) -> list[str]:
+    """Return the names of all results of a study.
+
+    Raises
+    ------
+    UsageError
+        If one of `only` is none of them.
+    """
     every = [result.name for result in results_of(study)]
     for name in only:
         if name not in every:
             raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")
-    finish(study, folder, only=only or every)
+    return every
 
 
 @contextmanager

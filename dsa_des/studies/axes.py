@@ -184,11 +184,14 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
     if "from" not in spec or "to" not in spec or ("step" in spec) == ("steps" in spec):
         raise ValueError("a range needs from, to, and either step or steps")
     low, high = parse_rational(spec["from"]), parse_rational(spec["to"])
+    log = spec.get("log", False)
+    if not isinstance(log, bool):
+        raise ValueError(f"log = {log!r}: must be true or false")
     if high < low:
         raise ValueError(f"the range from {spec['from']} to {spec['to']} is empty")
     if "step" in spec:
         step = parse_rational(spec["step"])
-        if step <= 0 or spec.get("log"):
+        if step <= 0 or log:
             raise ValueError("step must be greater than 0, and a logarithmic range needs steps")
         count = int((high - low) / step) + 1
     else:
@@ -199,7 +202,7 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
         step = (high - low) / (count - 1) if count > 1 else Fraction(0)
     if count > _MOST_VALUES:
         raise ValueError(f"has {count} values; at most {_MOST_VALUES} are allowed")
-    if not spec.get("log"):
+    if not log:
         return [as_written(low + k * step) for k in range(count)]
     if low <= 0:
         raise ValueError("a logarithmic range must start above 0")

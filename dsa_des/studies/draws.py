@@ -5,6 +5,7 @@ numbers. Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millih
 exact.
 """
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -132,4 +133,6 @@ def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
         isinstance(value, bool) or not isinstance(value, int | float) for value in values
     ):
         raise ValueError(f"{kind} takes two numbers")
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f"{kind} = {values}: must be finite")
     return float(values[0]), float(values[1])

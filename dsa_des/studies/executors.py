@@ -190,10 +190,17 @@ class Dask:
     def __init__(self, scheduler: str) -> None:
         try:
             from distributed import Client
+            from distributed.comm.addressing import get_address_host_port
         except ImportError:
             raise UsageError(
                 "--executor dask needs the extra 'dask': pip install 'dsa-des[dask]'"
             ) from None
+        try:
+            get_address_host_port(scheduler, strict=True)
+        except ValueError as error:
+            raise UsageError(
+                f"--scheduler {scheduler}: must be an address such as tcp://localhost:8786: {error}"
+            ) from error
         try:
             self._client: Any = Client(scheduler, timeout=_CONNECT_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:

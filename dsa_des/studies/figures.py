@@ -20,13 +20,15 @@ _MOST_LINES = 12
 def readable(name: str) -> str:
     """Return ``declaration range (radar), m`` for ``declaration_range_m.radar``."""
     words, _, who = name.partition(".")
-    unit = ""
-    for ending in ("s", "m", "deg", "rad", "hz", "km"):
-        if words.endswith(f"_{ending}"):
-            words, unit = words.removesuffix(f"_{ending}"), f", {ending}"
-            break
-    who = who.replace("_", " ")
-    return f"{words.replace('_', ' ')}{f' ({who})' if who else ''}{unit}"
+    unit = unit_of(words)
+    words, who = words.removesuffix(f"_{unit}").replace("_", " "), who.replace("_", " ")
+    return f"{words}{f' ({who})' if who else ''}{f', {unit}' if unit else ''}"
+
+
+def unit_of(name: str) -> str:
+    """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
+    ending = name.partition(".")[0].rpartition("_")[2]
+    return ending if ending in ("s", "m", "deg", "rad", "hz", "km") else ""
 
 
 class Places:
@@ -88,7 +90,9 @@ def draw_axis(
             colour, marker = _STYLES[number % len(_STYLES)]
             shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
             x = np.array([where[line.at[place]] for line in lines]) + shift
-            _points(top, x, lines, colour, marker, label, join=numeric)
+            known = any(not np.isnan(line.estimate.half_width) for line in lines)
+            seen = label or "simulated" + f", {100 * confidence:g} % interval" * known
+            _points(top, x, lines, colour, marker, seen, join=numeric)
             expected = [line.expected for line in lines]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
@@ -105,8 +109,7 @@ def draw_axis(
                 )
         top.set_ylabel(readable(metric))
         top.set_title(title, loc="left")
-        if len(series) > 1 or any(line.expected is not None for line in places.of(metric)):
-            top.legend()
+        top.legend()
         if shown:
             _differences(grid[1], shown, where, places.axes, axis, confidence)
         bottom = grid[-1]
@@ -177,7 +180,8 @@ def _differences(
                 width = "" if np.isnan(e.half_width) else f" ± {_digits(e.half_width)}"
                 text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
-    axes.set_ylabel(f"the same less that at {text}")
+    unit = unit_of(shown[0].result.name)
+    axes.set_ylabel(f"difference from that at {text}{f', {unit}' if unit else ''}")
     axes.set_title(
         f"paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
     )

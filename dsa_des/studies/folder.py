@@ -52,6 +52,8 @@ class StudyFolder:
                 f"(made of {known['study']}), or an encounter file has changed since; results of "
                 "the two cannot be mixed"
             )
+        if self.path.exists() and not self.path.is_dir():
+            raise UsageError(f"--out {self.path}: is a file; a folder is needed")
         if known is None and self.path.exists() and any(self.path.iterdir()):
             raise UsageError(f"{self.path}: is a folder that holds something other than a study")
         try:
@@ -78,7 +80,13 @@ class StudyFolder:
             raise UsageError(
                 f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}"
             ) from None
-        content: dict[str, Any] = json.loads(text)
+        try:
+            content: Any = json.loads(text)
+        except ValueError:
+            content = None
+        needed = {"study", "scene", "study_sha256", "tables"}
+        if not isinstance(content, dict) or not needed <= set(content):
+            raise UsageError(f"{self.path / STUDY_JSON}: is damaged, or not of a study")
         return content
 
     @contextmanager
@@ -145,7 +153,13 @@ class StudyFolder:
         files = sorted(self.parts.glob("*.parquet"))
         if not files:
             raise UsageError(f"{self.path}: holds no results yet")
-        table = pa.concat_tables([pq.ParquetFile(file).read() for file in files])
+        try:
+            table = pa.concat_tables([pq.ParquetFile(file).read() for file in files])
+        except (OSError, pa.ArrowInvalid):
+            damaged = ", ".join(file.name for file in files if not self.has(file.stem))
+            raise UsageError(
+                f"{self.parts}: cannot be read: {damaged}; --resume writes damaged parts anew"
+            ) from None
         return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
 
 

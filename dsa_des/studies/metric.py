@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from dsa_des.component import Parameters
+from dsa_des.component import Component, Parameters
 from dsa_des.entry_points import registered
 from dsa_des.errors import did_you_mean
 from dsa_des.message import Columns, Text
@@ -159,6 +159,12 @@ class Metric:
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return result name → values, shape (replicas,); NaN where a run has no value."""
         raise NotImplementedError
+
+    def check(self, blocks: Mapping[str, Component]) -> None:
+        """Raise ValueError for what is wrong and only blocks that are set up can tell.
+
+        Called before a study runs, never during it.
+        """
 
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return the analytic answer for a scene, for results that have one."""

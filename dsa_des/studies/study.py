@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from dsa_des.errors import Problem, SceneError
+from dsa_des.errors import Problem
 from dsa_des.overrides import apply_swap, set_value
 from dsa_des.replicas import Replica
 from dsa_des.scene import Scene, check_scene
@@ -30,6 +30,8 @@ class MetricSpec:
 
     name: str
     keys: Mapping[str, Any] = field(default_factory=dict)
+    #: Its place in the study's list, for messages.
+    place: int = 0
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene.
@@ -220,6 +222,4 @@ def changed_scene(
         problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
     for key, value in sets:
         problems += set_value(file, key, deepcopy(value), source)
-    if problems:
-        raise SceneError(problems)
-    return check_scene(file)
+    return check_scene(file, problems)

@@ -1,62 +1,115 @@
 """Checks of a study that need its scenes: every value of every axis, its draws and its metrics."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.replicas import scene_of
+from dsa_des.replicas import Replica, key_path, scene_of
 from dsa_des.scene import Scene
 from dsa_des.scene_file import Key, SceneFile
 from dsa_des.simulation import Simulation
+from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import TRIALS, Metric, Result
 from dsa_des.studies.study import Study
 
+#: How many replicas the ends of a range are looked for in.
+_MOST_DRAWN = 10_000
 
-def check_cells(study: Study, file: SceneFile) -> None:
+
+def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    Raises
-    ------
-    SceneError
-        With every problem found.
+    Parameters
+    ----------
+    study : Study
+        What could be read of it.
+    file : SceneFile
+        The study file, for messages.
+    scene : Scene
+        Without axes: what else is wrong is said of it where no cell has a scene that fits.
+    whole : bool
+        Whether all of it could be read; names of results are checked only then.
+
+    Returns
+    -------
+    list of Problem
+        Everything that is wrong.
     """
     problems: list[Problem] = []
 
     def add(key: Key, message: str, *value: Any) -> None:
         problems.append(file.problem(key, message, *value))
 
+    _check_axes(study, add)
     scenes: list[Scene] = []
-    seen: set[str] = set()
     for cell in _one_per_value(study):
         try:
             scenes.append(study.scene(cell))
         except SceneError as error:
-            for problem in error.problems:
-                if str(problem) not in seen:
-                    seen.add(str(problem))
-                    problems.append(problem)
-    _stop_if_wrong(problems)
+            problems += error.problems
+    scenes = scenes or [scene]
     first = scenes[0]
-    try:
-        Simulation(scene_of(first, study.replica(0)))
-    except SceneError as error:
-        problems += error.problems
-    except BlockFailure as error:
-        add((), str(error))
+    _check_draws(study, first, add)
     results: dict[str, Result] = {}
-    for scene in _different(scenes):
-        where = "" if scene is first else f" (with {_types(scene, first)})"
-        for metric in _build_metrics(study, scene, where, add):
-            if scene is first:
+    for one in _different(scenes):
+        where = "" if one is first else f" (with {_types(one, first)})"
+        built = _build_metrics(study, one, where, add)
+        if one is first:
+            for metric in built:
                 for result in metric.results():
                     if result.name in results:
-                        message = f"two metrics give the result {result.name}"
-                        add(("metrics",), message)
+                        add(("metrics",), f"two metrics give the result {result.name}")
                     results[result.name] = result
-        if problems:
+        if len(built) < len(study.metrics):
+            whole = False
             break
-    _stop_if_wrong(problems)
-    names = [name for name in results if not name.endswith(TRIALS)]
+    if whole:
+        _check_names(study, [name for name in results if not name.endswith(TRIALS)], add)
+    if not problems:
+        problems += _check_set_up(study, scenes, file)
+    return problems
+
+
+def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
+    """Set up a run, and return what is wrong with it or with the metrics.
+
+    Where a metric needs something of the blocks, one scene of the study that has it is enough. Of
+    many files one may be damaged: its runs fail by themselves.
+    """
+    files = any(axis.files for axis in study.axes)
+    broken: list[Problem] = []
+    wrong: dict[int, str] | None = None
+    for scene in scenes:
+        try:
+            blocks = Simulation(scene_of(scene, study.replica(0))).components
+        except (SceneError, BlockFailure) as error:
+            if wrong is None:
+                if isinstance(error, SceneError):
+                    broken += error.problems
+                else:
+                    broken.append(file.problem((), str(error)))
+                if not files:
+                    return broken
+            continue
+        refused: dict[int, str] = {}
+        for spec in study.metrics:
+            try:
+                if wrong is None or spec.place in wrong:
+                    spec.build(scene).check(blocks)
+            except ValueError as error:
+                refused[spec.place] = str(error)
+        wrong = refused
+        if not wrong:
+            break
+    if wrong is None:
+        return broken
+    names = {spec.place: spec.name for spec in study.metrics}
+    return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
+
+
+def _check_names(study: Study, names: list[str], add: Callable[..., None]) -> None:
+    """Report names of results that no metric gives."""
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
@@ -65,12 +118,47 @@ def check_cells(study: Study, file: SceneFile) -> None:
             message = "no metric of the study gives it"
             message += did_you_mean(str(figure["metric"]), names)
             add(("figures", number, "metric"), message, str(figure["metric"]))
-    _stop_if_wrong(problems)
 
 
-def _stop_if_wrong(problems: list[Problem]) -> None:
-    if problems:
-        raise SceneError(problems)
+def _check_axes(study: Study, add: Callable[..., None]) -> None:
+    """Report a key that two axes set: the second would win without a word."""
+    owner: dict[tuple[str | int, ...], str] = {}
+    for axis in study.axes:
+        for key in {key for sets in axis.sets for key, _ in sets}:
+            first = owner.setdefault(key_path(key), axis.key)
+            if first != axis.key:
+                add(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
+
+
+def _check_draws(study: Study, scene: Scene, add: Callable[..., None]) -> None:
+    """Report draws of values that the scene does not allow, and of keys that are axes."""
+    on_axes = {
+        key_path(key): axis.key for axis in study.axes for sets in axis.sets for key, _ in sets
+    }
+    for draw in study.draws:
+        if axis := on_axes.get(key_path(draw.key)):
+            add(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
+        for value in _worst(draw, study):
+            try:
+                scene_of(scene, Replica(0, {draw.key: value}))
+            except SceneError as error:
+                for problem in error.problems:
+                    shown = float(value) if isinstance(value, Fraction) else value
+                    add(("draws", draw.key), problem.message, shown)
+                if draw.kind != "choice":
+                    break
+
+
+def _worst(draw: Draw, study: Study) -> list[Any]:
+    """Return the values of a draw that show whether it is allowed.
+
+    Those of a normal distribution have no ends: a replica that draws too far out fails by itself.
+    """
+    if draw.kind == "choice":
+        return list(draw.values)
+    count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
+    drawn = [draw.value(study.seed, number, study.batch) for number in range(count)]
+    return list(dict.fromkeys([min(drawn), max(drawn)]))
 
 
 def _build_metrics(
@@ -78,11 +166,11 @@ def _build_metrics(
 ) -> list[Metric]:
     """Return the study's metrics for a scene; what the scene lacks is a problem."""
     built: list[Metric] = []
-    for number, spec in enumerate(study.metrics):
+    for spec in study.metrics:
         try:
             built.append(spec.build(scene))
         except ValueError as error:
-            add(("metrics", number), f"{error}{where}", spec.name)
+            add(("metrics", spec.place), f"{error}{where}", spec.name)
     return built
 
 

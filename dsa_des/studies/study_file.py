@@ -1,5 +1,6 @@
 """From a study file to a study that can be run, every problem reported before anything runs."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -15,21 +16,16 @@ from dsa_des.scene import Scene
 from dsa_des.scene_file import Key, SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
+from dsa_des.studies.figure_tables import read_figures
 from dsa_des.studies.metric import METRICS, find_metric
 from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
-from dsa_des.studies.study_checks import check_cells
+from dsa_des.studies.study_checks import cell_problems
 from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
     "figures", "stop_when", "compare", "over", "confidence", "interval", "runs_per_chunk",
 )  # fmt: skip
-FIGURES = {
-    "axis": ("metric", "axis", "lines"),
-    "heat": ("metric", "x", "y"),
-    "polar": ("metric", "axis"),
-    "run": ("cell", "replica"),
-}
 _MOST_RUNS = 100_000_000
 
 
@@ -88,6 +84,8 @@ class _Reader:
         self.file = file
         self.data = file.data
         self.problems: list[Problem] = []
+        #: Columns of axes that are wrong in themselves.
+        self.unread: list[str] = []
 
     def add(self, key: Key, message: str, *value: Any) -> None:
         self.problems.append(self.file.problem(key, message, *value))
@@ -102,19 +100,19 @@ class _Reader:
         interval = self.data.get("interval", "t")
         if interval not in ("t", "bootstrap"):
             self.add(("interval",), "must be 't' or 'bootstrap'", interval)
+        draws = self.draws()
+        specs = self.metric_specs()
+        stop_when = self.stop_when(replicas)
         base, scene = self.scene()
         if base is None or scene is None:  # all else is said of this scene
             raise SceneError(self.problems)
         axes = self.axes(scene, swaps)
-        draws = self.draws(base)
-        specs = self.metric_specs()
-        self.stop_if_wrong()
-        stop_when = self.stop_when(replicas)
         runs = replicas
         for axis in axes:
             runs *= len(axis.labels)
         if runs > _MOST_RUNS:
             self.add(("axes",), f"make {runs:,} runs; at most {_MOST_RUNS:,} are allowed")
+            raise SceneError(self.problems)
         study = Study(
             path=Path(self.file.path),
             scene_path=Path(base.path),
@@ -131,18 +129,17 @@ class _Reader:
             stop_when=stop_when,
             confidence=confidence,
             interval=interval,
-            figures=self.figures(axes),
+            figures=read_figures(
+                self.data.get("figures", []), axes, replicas, self.column, self.add
+            ),
             runs_per_chunk=self.whole("runs_per_chunk", max(1, min(128, -(-runs // 32))), low=1),
             base=base,
             tables=resolved(self.data, swaps),
         )
-        self.stop_if_wrong()
-        check_cells(study, self.file)
-        return study
-
-    def stop_if_wrong(self) -> None:
+        self.problems += cell_problems(study, self.file, scene, whole=not self.problems)
         if self.problems:
-            raise SceneError(self.problems)
+            raise SceneError({str(problem): problem for problem in self.problems}.values())
+        return study
 
     # -- plain values ----------------------------------------------------------------------
 
@@ -186,10 +183,15 @@ class _Reader:
             path = getattr(name, "folder", Path()) / path
         try:
             base = read_scene_file(path)
-            return base, changed_scene(base, self.swaps(), self.sets(), str(self.file.path))
         except SceneError as error:
             self.problems += error.problems
             return None, None
+        for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
+            try:
+                return base, changed_scene(base, swaps, sets, str(self.file.path))
+            except SceneError as error:  # what else is wrong is then said of the scene as it is
+                self.problems += error.problems
+        return None, None
 
     # -- axes and draws --------------------------------------------------------------------
 
@@ -201,9 +203,10 @@ class _Reader:
                 found.append(parse_axis(key, spec, scene))
             except ValueError as error:
                 self.add(("axes", key), str(error))
+                self.unread.append(key.removeprefix("blocks."))
         return tuple(found)
 
-    def draws(self, base: SceneFile) -> tuple[Draw, ...]:
+    def draws(self) -> tuple[Draw, ...]:
         found = []
         for key, spec in flat_draws(self.table("draws")).items():
             try:
@@ -218,6 +221,8 @@ class _Reader:
         wanted = str(name).removeprefix("blocks.")
         if wanted in columns:
             return wanted
+        if wanted in self.unread:
+            return None
         hint = did_you_mean(wanted, columns)
         self.add(key, f"the study has no such axis{hint}", str(name))
         return None
@@ -274,7 +279,7 @@ class _Reader:
             except ValueError as error:
                 self.add(key, str(error), name)
                 continue
-            found.append(MetricSpec(name, keys))
+            found.append(MetricSpec(name, keys, number))
         return tuple(found)
 
     def stop_when(self, replicas: int) -> StopWhen | None:
@@ -286,39 +291,11 @@ class _Reader:
             self.add(("stop_when",), "must be {metric = RESULT, half_width = NUMBER, batch = N}")
             return None
         width, batch = table["half_width"], table.get("batch", max(10, -(-replicas // 20)))
-        if isinstance(width, bool) or not isinstance(width, int | float) or width <= 0:
-            self.add(("stop_when", "half_width"), "must be a number above 0", width)
+        number = isinstance(width, int | float) and not isinstance(width, bool)
+        if not number or not 0 < width < math.inf:
+            self.add(("stop_when", "half_width"), "must be a finite number above 0", width)
             return None
         if isinstance(batch, bool) or not isinstance(batch, int) or batch < 2:
             self.add(("stop_when", "batch"), "must be a whole number of 2 or more", batch)
             return None
         return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
-
-    # -- figures ---------------------------------------------------------------------------
-
-    def figures(self, axes: tuple[Axis, ...]) -> tuple[dict[str, Any], ...]:
-        items = self.data.get("figures", [])
-        if not isinstance(items, list):
-            self.add(("figures",), "must be a list of tables ([[figures]])")
-            return ()
-        found: list[dict[str, Any]] = []
-        for number, item in enumerate(items):
-            key: Key = ("figures", number)
-            kind = item.get("kind", "axis") if isinstance(item, dict) else None
-            if kind not in FIGURES:
-                self.add(key, f"kind must be one of {', '.join(sorted(FIGURES))}")
-                continue
-            figure = {"kind": str(kind)}
-            for name, value in item.items():
-                allowed = ("kind", "title", *FIGURES[kind])
-                if name not in allowed:
-                    hint = did_you_mean(name, allowed)
-                    self.add((*key, name), f"unknown key of a {kind} figure{hint}")
-                elif name in ("axis", "lines", "x", "y"):
-                    figure[name] = self.column((*key, name), value, axes) or ""
-                elif name != "kind":
-                    figure[name] = value
-            if kind != "run" and "metric" not in figure:
-                self.add(key, "needs a metric: the name of a result")
-            found.append(figure)
-        return tuple(found)

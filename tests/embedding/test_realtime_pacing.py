@@ -83,3 +83,14 @@ def test_a_paced_run_leaves_the_same_bytes(configs, tmp_path):
     assert timings["realtime"]["windows"] == 2
     assert timings["wall_s"] >= 0.12
     assert 0.0 <= timings["realtime"]["mean_lag_s"] <= timings["realtime"]["max_lag_s"]
+
+
+def test_no_wait_is_longer_than_a_system_can_sleep() -> None:
+    now, slept = [0.0], []
+
+    def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        now[0] += seconds
+
+    Pacer(1e-4, lambda: now[0], sleep)(1.0)
+    assert slept == [3600.0, 3600.0, 2800.0]

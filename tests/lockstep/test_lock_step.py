@@ -111,7 +111,7 @@ def test_aircraft_that_differ_are_refused_not_mixed():
     scene = load_scene(FIRST_LIGHT, duration_s="20")
     changes = [{}, {"blocks.traffic.intruders[0].rcs_dbsm": 20.0}]
     scenes = [scene_of(scene, Replica(1, change)) for change in changes]
-    with pytest.raises(NotInLockStep, match="offers something else"):
+    with pytest.raises(NotInLockStep, match="differs between replicas"):
         recorded(LockStep, scenes)
     # They run all the same, one by one.
     outcomes = run_replicas(scene, [Replica(1, change) for change in changes])

@@ -110,3 +110,18 @@ def test_all_cells_share_seeds_and_draws(small: Path) -> None:
     ]
     assert runs == [(cell, k) for cell in (0, 1) for k in range(24)]
     assert [len(chunk) for chunk in study.chunks(0, [0, 1])] == [8] * 6
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_an_axis_whose_name_holds_dots_and_brackets_can_be_changed(
+    configs: Path, quote: str
+) -> None:
+    name = configs / "studies/latency_and_loss.toml"
+    study = read_study(name, sets=[f"axes.{quote}wires[4].drop_probability{quote}=[0, 0.3]"])
+    assert [axis.key for axis in study.axes] == [
+        "blocks.radar.latency_s",
+        "wires[4].drop_probability",
+    ]
+    assert study.axes[1].labels == (0, 0.3)
+    added = read_study(name, sets=["axes.wires[4].jitter_s=[0, 0.01]"])
+    assert added.axes[2].key == "wires[4].jitter_s"

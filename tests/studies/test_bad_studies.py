@@ -6,6 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
+from dsa_des.errors import SceneError
+from dsa_des.studies.study_file import read_study
 
 
 def refused(*words: str) -> str:
@@ -54,6 +56,27 @@ def changed(old: str, new: str) -> None:
          "stop_when.metric = 'nothing': no metric of the study gives it"),
         ("[axes]", '[axes]\nswap.radra = ["radar.threshold"]', "did you mean 'radar'?"),
         ("[axes]", '[axes]\nblocks.traffic.file = {files = "nowhere/*.daa"}', "no file matches"),
+        ("uniform = [0, 0.2]", "uniform = [0, nan]", "uniform = [0, nan]: must be finite"),
+        ("uniform = [0, 0.2]", "uniform = [-0.2, 0.3]",
+         "study.toml: draws.blocks.radar.offset_s = -0.1"),
+        ("uniform = [0, 0.2]", 'choice = [0.1, "x"]', "offset_s = 'x': must be a number"),
+        ("blocks.radar.offset_s = {", "blocks.radar.ofset_s = {", "did you mean 'offset_s'?"),
+        ("blocks.radar.offset_s = { uniform = [0, 0.2]",
+         "blocks.radar.scan_rate_hz = { choice = [2]",
+         "is set by the axis blocks.radar.scan_rate_hz"),
+        ("[axes]", '[axes]\nboth = {values = [1, 2], set."blocks.radar.scan_rate_hz" = [1, 2]}',
+         "sets blocks.radar.scan_rate_hz, which the axis both sets as well"),
+        ("[1, 5]", '{ from = 1, to = 5, steps = 3, log = "yes" }', "log = 'yes': must be true"),
+        ('title = "small study"', 'stop_when = {metric = "track_breaks", half_width = nan}',
+         "stop_when.half_width = nan: must be a finite number above 0"),
+        ('"first_detection", ', '{ metric = "first_detection", target = "on" }, ',
+         "metrics[0] = 'first_detection': target: there is no 'on'; did you mean 'one'?"),
+        ("[[figures]]", '[[figures]]\nkind = "pie"', "figures[0].kind = 'pie'"),
+        ("[[figures]]", '[[figures]]\nkind = ["axis"]', "figures[0].kind = ['axis']"),
+        ("[[figures]]", '[[figures]]\nkind = "heat"', "needs two axes; the study has 1"),
+        ('[[figures]]\nmetric = "first_detection_range_m.radar"',
+         '[[figures]]\nkind = "run"\ncell = 2\nreplica = "x"',
+         "figures[0].cell = 2: must be the number of a cell of this study: 0 to 1"),
     ],
 )  # fmt: skip
 def test_one_problem_is_named(small: Path, old: str, new: str, message: str) -> None:
@@ -85,11 +108,37 @@ def test_all_problems_come_at_once(small: Path) -> None:
     assert "2 problems" in output and "is empty" in output and "uniform takes two" in output
 
 
+def test_problems_of_all_kinds_come_in_one_report(small: Path) -> None:
+    changed("[1, 5]", "[1, -5]")  # of the scene
+    changed("replicas = 24", "replicas = 0")  # of the study
+    changed('"first_detection", ', '"first_detecton", ')  # of a metric's name
+    changed('"well_clear"', '{ metric = "well_clear", sensors = ["rader"] }')  # against the scene
+    changed("uniform = [0, 0.2]", "uniform = [-2, -1]")  # of a draw
+    output = refused("study.toml")
+    assert "5 problems" in output
+    for key in ("blocks.radar.scan_rate_hz = -5", "replicas = 0", "metrics[0]", "metrics[2]",
+                "draws.blocks.radar.offset_s = -"):  # fmt: skip
+        assert f"study.toml: {key}" in output
+
+
+def test_what_a_scene_lacks_hides_nothing_else(small: Path) -> None:
+    changed("[axes]", '[set]\nduraton_s = 3\n[swap]\nfusion = "fusion.pick_bst"\n[axes]')
+    changed("[1, 5]", "{ from = 5, to = 1, step = 1 }")
+    output = refused("study.toml")
+    assert "3 problems" in output and "did you mean 'duration_s'?" in output
+
+
 def test_a_scheduler_that_does_not_answer(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("dsa_des.studies.executors._CONNECT_TIMEOUT_S", 0.3)
     words = ("study.toml", "--executor", "dask", "--scheduler", "tcp://127.0.0.1:9")
     assert "--scheduler tcp://127.0.0.1:9: no Dask scheduler answers there" in refused(*words)
+
+
+def test_an_address_of_no_scheduler(small: Path) -> None:
+    pytest.importorskip("distributed")
+    words = ("study.toml", "--executor", "dask", "--scheduler", "nowhere")
+    assert "--scheduler nowhere: must be an address such as" in refused(*words)
 
 
 def test_dask_must_be_there(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,6 +153,21 @@ def test_folders_that_hold_something_else(small: Path) -> None:
     Path("full/precious.txt").write_text("mine")
     assert "holds something other than a study" in refused("study.toml", "--out", "full")
     assert "is not the folder of a study" in refused("show", "full")
+    Path("full/study.json").write_text("{")
+    assert "full/study.json: is damaged" in refused("show", "full")
+    assert "full/study.json: is damaged" in refused("study.toml", "--out", "full", "--resume")
+    assert "--out study.toml: is a file" in refused("study.toml", "--out", "study.toml")
     assert "give STUDY.toml" in refused()
     assert "there is no studies/study-NNN to continue" in refused("study.toml", "--resume")
     assert "must be 1 or more" in refused("study.toml", "--workers", "0")
+
+
+def test_one_damaged_encounter_of_many_stops_no_study(tmp_path: Path, configs: Path) -> None:
+    good = (configs / "encounters" / "crossing.daa").read_text()
+    (tmp_path / "a.daa").write_text("damaged")
+    study = configs / "studies" / "folder_by_scan_rate.toml"
+    files = f'axes.blocks.traffic.file.files="{tmp_path}/*.daa"'
+    with pytest.raises(SceneError, match=r"a\.daa"):
+        read_study(study, sets=[files])
+    (tmp_path / "b.daa").write_text(good)
+    assert len(read_study(study, sets=[files]).axes[0].labels) == 2

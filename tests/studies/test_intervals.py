@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dsa_des.studies import statistics
+from dsa_des.studies.figures import readable, unit_of
 
 
 @pytest.mark.parametrize(
@@ -83,3 +84,10 @@ def test_few_values_are_marked() -> None:
     one = statistics.mean(np.array([4.0]), 0.95)
     assert one.value == 4.0 and math.isnan(one.low) and one.few
     assert statistics.share(np.array([3.0]), np.array([5.0]), 0.95).few
+
+
+def test_axes_of_figures_carry_units() -> None:
+    assert readable("declaration_range_m.radar") == "declaration range (radar), m"
+    assert readable("track_breaks") == "track breaks"
+    assert readable("fused_share.ir_with_radar") == "fused share (ir with radar)"
+    assert unit_of("declaration_time_s.any") == "s" and unit_of("track_breaks") == ""

@@ -9,7 +9,7 @@ import pytest
 from dsa_des.errors import SceneError
 from dsa_des.message import Text
 from dsa_des.recording import ColumnSink, Recorder
-from dsa_des.replicas import Failed, Recorded, Replica, run_replicas, scene_of
+from dsa_des.replicas import Failed, Recorded, Replica, run_replicas, scene_of, why_apart
 from dsa_des.scene import Scene, load_scene
 from dsa_des.simulation import Simulation
 
@@ -86,3 +86,11 @@ def test_a_wrong_change_fails_its_own_replica(
     assert message in bad.error
     with pytest.raises(SceneError):
         scene_of(base, Replica(1, {key: value}))
+
+
+def test_drawn_targets_run_one_by_one_and_it_is_said(small: Path) -> None:
+    base = load_scene("small.toml")
+    rcs = [Replica(k, {"blocks.traffic.intruders[0].rcs_dbsm": float(k)}) for k in (1, 2)]
+    assert "what block traffic tells its neighbours" in (why_apart(base, rcs) or "")
+    where = [Replica(k, {"blocks.traffic.intruders[0].east_m": float(k)}) for k in (1, 2)]
+    assert why_apart(base, where) is None

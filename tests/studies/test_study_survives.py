@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dsa_des.commands.study import finish, run_into
+from dsa_des.errors import UsageError
 from dsa_des.studies.executors import Dask
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.runner import Stopped, run_study
@@ -251,3 +252,13 @@ def test_a_cell_stops_when_its_interval_is_narrow_enough(small: Path) -> None:
 def half_width(values: list[float]) -> float:
     low, high = wilson(sum(values), len(values), 0.95)
     return (high - low) / 2
+
+
+def test_a_damaged_part_is_named_and_written_anew(small: Path) -> None:
+    whole = undisturbed("whole")
+    part = Path("whole/parts/part-000-000001.parquet")
+    part.write_bytes(part.read_bytes()[:100])
+    with pytest.raises(UsageError, match=r"part-000-000001\.parquet; --resume writes"):
+        StudyFolder(Path("whole")).results()
+    run_into(read_study("study.toml"), Path("whole"), 1, True)
+    assert part.read_bytes() == whole["parts/part-000-000001.parquet"]

@@ -1,0 +1,24 @@
+"""What is allowed for, and what follows from a printed value, is said in the row itself."""
+
+import pytest
+
+from components.thesis import area_error, eo_ranges, flight_tests, overtaking
+from components.thesis.row import AGREES, Row
+
+
+def half_a_digit(row: Row) -> float:
+    return 0.5 * 10.0 ** -len((row.printed or "").partition(".")[2])
+
+
+@pytest.mark.parametrize("module", [area_error, eo_ranges, flight_tests, overtaking])
+def test_more_than_the_last_digit_is_said(module) -> None:
+    for row in module.make().rows:
+        if row.status == AGREES and abs(row.difference or 0.0) > half_a_digit(row):
+            assert "allow" in row.why, row.quantity
+
+
+def test_a_climb_that_follows_from_a_cell_says_so() -> None:
+    rows = {row.quantity: row for row in eo_ranges.make().rows}
+    for name in ("King Air", "Convair"):
+        why = rows[f"Ascending head-on, {name}, thesis's eq. 9-13"].why
+        assert "follows from the Convair's cell" in why and "cuts" not in why
