@@ -174,7 +174,7 @@ class HostDriven:
         """
         if isinstance(time_s, float):  # numpy.float64 as well: the usual case, without a Fraction
             ticks = float(time_s) * self.ticks_per_s
-            if not math.isfinite(ticks):
+            if not math.isfinite(time_s):
                 raise ValueError(f"time_s is {time_s}: it must be a finite number of seconds")
             # A float of seconds is meant as the decimal it was written as; above 2^53 ticks the
             # product is no longer whole ticks and Python's integers decide.
