@@ -207,6 +207,11 @@ class Component:
             return parameters.clock_spec()
         return None
 
+    @classmethod
+    def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
+        """Return the ladders on which a block with these parameters stands."""
+        return cls.ladders
+
     def request(self, port: str) -> Any:
         """Return what this block asks of whoever feeds `port`, or None."""
         return None
