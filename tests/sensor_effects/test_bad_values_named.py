@@ -47,6 +47,11 @@ from dsa_des.scene import load_scene
             "blocks.eo.elevation_deg = [5, 5]: must hold two angles in [-90, 90], the lower one "
             "first",
         ),
+        (
+            ["blocks.radar.false_alarm_probability=0.3", "blocks.radar.reference_pd=0.2"],
+            "blocks.radar.reference_pd = 0.2: it must be above false_alarm_probability, 0.3, "
+            "which noise alone reaches",
+        ),
         *(
             (
                 [f"blocks.eo.azimuth_deg={field}"],
