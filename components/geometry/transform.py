@@ -7,6 +7,7 @@ and the target's attitude relative to that line of sight.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -17,7 +18,9 @@ from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi_unchecked
 from components.geometry.attitude import sensor_angles
 from components.geometry.ladder import ATTITUDE, EARTH
+from components.geometry.rung_choice import REFERENCE
 from components.geometry.rung_planning import Rung, pick_rung
+from components.geometry.true_reach import true_reach_m
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
 from components.target_messages import Flights, RelativeTargets, Revisit, TrafficStates
@@ -88,8 +91,10 @@ class Transform(Component):
         self._line_of_sight = LINES_OF_SIGHT[self.rung.earth]
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that somebody downstream may look at."""
-        return farthest_look(consumer.request for consumer in self.context.consumers)
+        """Ask for the targets that somebody downstream may look at, by their true ranges."""
+        look = farthest_look(consumer.request for consumer in self.context.consumers)
+        earth = REFERENCE[0] if self.rung is None else self.rung.earth
+        return replace(look, range_m=true_reach_m(self.context, earth, look))
 
     def left_out(self) -> list[str]:
         """Say which models were picked, and why."""
