@@ -48,6 +48,12 @@ class Gate(Component):
             return None
         decisions = {}
         width = targets.range_m.shape[1]
+        where = [
+            targets.body_azimuth_rad,
+            targets.body_elevation_rad,
+            targets.range_m,
+            targets.present,
+        ]
         for sensor, reach in self._reach.items():
             rows = wake.demand.get(sensor)
             if rows is not None and len(rows) == 0:
@@ -56,13 +62,10 @@ class Gate(Component):
                 continue
             if rows is None or len(rows) == len(targets):
                 place = np.arange(len(targets))
-                part = targets
+                seen = where
             else:
                 place = np.full(len(targets), -1, dtype=np.int64)
                 place[rows] = np.arange(len(rows))
-                part = targets.take(rows)
-            reason = reach.decide(
-                part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
-            )
-            decisions[sensor] = Decision(place, reason)
+                seen = [values[rows] for values in where]
+            decisions[sensor] = Decision(place, reach.decide(*seen))
         return GatedTargets(**vars(targets), decisions=decisions)

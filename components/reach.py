@@ -21,7 +21,7 @@ SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "r
 #: is off may take them to be in reach.
 REACH_MARGIN = 1.05
 _field_of_view = lru_cache(maxsize=256)(FieldOfView)
-_EVALUATE, _FIELD_OF_VIEW = np.uint8(EVALUATE), np.uint8(FIELD_OF_VIEW)
+_EVALUATE, _ABSENT, _OFF, _FIELD_OF_VIEW = map(np.uint8, (EVALUATE, ABSENT, OFF, FIELD_OF_VIEW))
 #: Targets that were not even moved, because no sensor could have looked at them.
 CULLED = "culled"
 
@@ -71,7 +71,7 @@ class Reach:
             finite.
         """
         if not self.enabled:
-            return np.full(range_m.shape, OFF, dtype=np.uint8)
+            return np.where(present, _OFF, _ABSENT)
         seen = self._field.holds(p_rad, q_rad)
         reason = np.where(seen, _EVALUATE, _FIELD_OF_VIEW)
         if self.range_max_m < math.inf:

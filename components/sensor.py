@@ -221,7 +221,8 @@ class Sensor(Component):
                 look = judge(cells, look)
             self._idle = None if len(cells) else look
         found = look.detected.nonzero()[0]
-        evaluated, skipped = _counted(reason, len(targets.roster))
+        culled = None if targets.culled is None else targets.culled[rows]
+        evaluated, skipped = _counted(reason, len(targets.roster), culled)
         if len(wake) == 1:
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
@@ -342,13 +343,24 @@ class Sensor(Component):
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
-def _counted(reason: ReasonArray, everybody: int) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return how many targets were evaluated at each scan, and skipped by reason."""
+def _counted(
+    reason: ReasonArray, everybody: int, culled: IntArray | None
+) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return how many targets were evaluated at each scan, and skipped by reason.
+
+    Which of the culled ones the arrays hold, as absent, depends on the window that they came in:
+    what is counted does not.
+    """
     if len(reason) == 1:  # one pass instead of one for each reason
         count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
         of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
         of = {code: (reason == code).sum(axis=1) for code in (EVALUATE, *SKIP_REASONS.values())}
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    skipped[CULLED] = np.array([everybody - reason.shape[1]] * len(reason), dtype=np.int64)
+    left_out = everybody - reason.shape[1]
+    if culled is None:
+        culled = np.full(len(reason), left_out)
+    else:
+        skipped["absent"] = skipped["absent"] + (left_out - culled)
+    skipped[CULLED] = culled
     return of[EVALUATE], skipped

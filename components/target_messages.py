@@ -39,6 +39,9 @@ class TrafficStates(Message):
         What all targets of the run are.
     columns : (targets,) of int
         Which of them the arrays hold, ascending; the others are out of everybody's reach.
+    culled : (rows,) of int, or None
+        How many of the roster are out of everybody's reach at each instant; those among the
+        columns are not `present`. None where all are moved.
     flights : Flights or None
         For whoever must know them at other instants: a beam that sweeps. None where nobody does.
     """
@@ -58,6 +61,7 @@ class TrafficStates(Message):
     present: BoolArray
     roster: Roster = static()
     columns: IntArray = static()
+    culled: IntArray | None = per_row(default=None, kw_only=True)
     flights: Flights | None = static(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
@@ -88,6 +92,8 @@ class RelativeTargets(Message):
     roster : Roster
     columns : (targets,) of int
         Which targets of the roster the arrays hold.
+    culled : (rows,) of int, or None
+        As in `TrafficStates`.
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
         ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
@@ -108,6 +114,7 @@ class RelativeTargets(Message):
     present: BoolArray
     roster: Roster = static()
     columns: IntArray = static()
+    culled: IntArray | None = per_row(default=None, kw_only=True)
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: Revisit | None = static(default=None, kw_only=True)
 

@@ -7,9 +7,10 @@ group ``dsa_des.embed``.
 """
 
 import math
-from collections.abc import Iterable, Set
+from collections.abc import Container, Iterable, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ class _Runner:
         self.name = component.name
         self.component = component
         self.cursor = cursor
-        self.demands = dict.fromkeys(demands, _NO_ROW)
+        self.demands = demands
         self.ports: list[_Port] = []
         self.only_output = next(iter(component.outputs)) if len(component.outputs) == 1 else None
 
@@ -285,8 +286,7 @@ class HostDriven:
                 self.ticks_per_s,
                 held,
                 _collected(runner.ports) if waiting else {},
-                runner.demands
-                and {name: _FIRST_ROW if name in scans else _NO_ROW for name in runner.demands},
+                partial(_rows_of, runner.demands, scans) if runner.demands else None,
             )
             try:
                 result = runner.component.run(wake)
@@ -311,6 +311,11 @@ class HostDriven:
 def _last_row(message: Message) -> IntArray:
     count = len(message.tick)
     return _FIRST_ROW if count == 1 else np.array([count - 1])
+
+
+def _rows_of(blocks: Iterable[str], scanning: Container[str]) -> dict[str, IntArray]:
+    """Return for each block the one row of a step where it scans, and none where it does not."""
+    return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}
 
 
 def _collected(ports: list[_Port]) -> dict[str, list[Arrivals]]:

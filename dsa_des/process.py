@@ -230,7 +230,7 @@ class Node:
             self.simulation.ticks_per_s,
             held,
             arrived,
-            self._rows_asked_for(ticks),
+            partial(self._rows_asked_for, ticks),
             self.simulation.span_ticks,
         )
         if self.simulation.trace is not None:

@@ -93,7 +93,10 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         port: [part for new in arrivals if (part := _arrivals(new, begin, scan, wake.span_ticks))]
         for port, arrivals in wake._arrived.items()
     }
-    demand = {block: _within(asked, rows) for block, asked in wake.demand.items()}
+
+    def demand() -> dict[str, IntArray]:
+        return {block: _within(asked, rows) for block, asked in wake.demand.items()}
+
     own = np.where(scans >= 0, scans - scan, -1)
     return Wake(ticks, own, wake.ticks_per_s, held, arrived, demand)
 

@@ -1,7 +1,8 @@
 """What a block sees when it runs: its instants and its inputs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,8 +42,9 @@ class Wake:
         For sampled and trigger inputs: ``(message, rows)`` as `Channel.sample` gives them.
     arrived : mapping
         For queued inputs, and for inputs with many writers: the new rows of each wire.
-    demand : mapping
-        For each clocked block downstream: the rows of this wake at which it scans.
+    demand : callable, or None
+        Gives the attribute of this name when it is first asked for: a mapping from each clocked
+        block downstream to the rows of this wake at which it scans.
     span_ticks : int
         When replicas run in lock step: ticks from the start of one to the start of the next
         (`dsa_des.replica_time`); 0 otherwise.
@@ -55,7 +57,7 @@ class Wake:
         ticks_per_s: int,
         held: Mapping[str, tuple[Any, IntArray]],
         arrived: Mapping[str, list[Arrivals]],
-        demand: Mapping[str, IntArray] | None = None,
+        demand: Callable[[], Mapping[str, IntArray]] | None = None,
         span_ticks: int = 0,
     ) -> None:
         self.ticks = ticks
@@ -63,11 +65,16 @@ class Wake:
         self.ticks_per_s = ticks_per_s
         self._held = held
         self._arrived = arrived
-        self.demand = demand or {}
+        self._demand = demand
         self.span_ticks = span_ticks
 
     def __len__(self) -> int:
         return len(self.ticks)
+
+    @cached_property
+    def demand(self) -> Mapping[str, IntArray]:
+        """The rows at which each clocked block downstream scans."""
+        return {} if self._demand is None else self._demand()
 
     @property
     def time_s(self) -> FloatArray:

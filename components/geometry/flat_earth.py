@@ -62,14 +62,59 @@ def line_of_sight(
     by 0.0045 degrees per km, and meridians converge; at 80 degrees of latitude azimuth errs by
     1.4 degrees at 50 km. Useless at the poles. 20 ns per pair in blocks of 10,000.
     """
-    (lat1, lon1, alt1, lat2, lon2, alt2), shape = positions(
+    arrays, shape = positions(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
-        north = (lat2 - lat1) * METRES_PER_DEGREE
-        # cos(latitude) as the sine of the distance from the pole, exactly 0 at the pole
-        shrink = np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG) * METRES_PER_DEGREE
-        east = longitude_difference_rounded(lon1, lon2) * shrink
-        result = spherical_from_enu(north, east, alt2 - alt1)
+        result = spherical_from_enu(*_north_east_up(*arrays))
     azimuth, elevation, slant_range = shaped(shape, *result)
     return azimuth, elevation, slant_range
+
+
+def line_of_sight_ned(
+    own_lat_deg: npt.ArrayLike,
+    own_lon_deg: npt.ArrayLike,
+    own_alt_m: npt.ArrayLike,
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    *,
+    validate: bool = True,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Find the target's north, east and down offsets, with a constant length of a degree.
+
+    Parameters
+    ----------
+    own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+        As for `line_of_sight`.
+
+    Returns
+    -------
+    north_m, east_m, down_m : ndarray
+        Metres in the ownship's local NED frame, the broadcast shape.
+
+    Raises
+    ------
+    ValueError
+        As for `line_of_sight`.
+    """
+    arrays, shape = positions(
+        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+    )
+    north, east, up = _north_east_up(*arrays)
+    north, east, down = shaped(shape, north, east, 0.0 - up)
+    return north, east, down
+
+
+def _north_east_up(
+    lat1: FloatArray,
+    lon1: FloatArray,
+    alt1: FloatArray,
+    lat2: FloatArray,
+    lon2: FloatArray,
+    alt2: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    north = (lat2 - lat1) * METRES_PER_DEGREE
+    # cos(latitude) as the sine of the distance from the pole, exactly 0 at the pole
+    shrink = np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG) * METRES_PER_DEGREE
+    return north, longitude_difference_rounded(lon1, lon2) * shrink, alt2 - alt1

@@ -58,14 +58,60 @@ def line_of_sight(
     meridians, which grows with tan(latitude): 1.4 degrees in azimuth at 50 km and 80 degrees of
     latitude. Useless at the poles. 30 ns per pair in blocks of 10,000.
     """
-    (lat1, lon1, alt1, lat2, lon2, alt2), shape = positions(
+    arrays, shape = positions(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
-        meridian, prime_vertical = radii_of_curvature(lat1)
-        north = (lat2 - lat1) * RAD_PER_DEG * (meridian + alt1)
-        parallel = (prime_vertical + alt1) * np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG)
-        east = longitude_difference_rounded(lon1, lon2) * RAD_PER_DEG * parallel
-        result = spherical_from_enu(north, east, alt2 - alt1)
+        result = spherical_from_enu(*_north_east_up(*arrays))
     azimuth, elevation, slant_range = shaped(shape, *result)
     return azimuth, elevation, slant_range
+
+
+def line_of_sight_ned(
+    own_lat_deg: npt.ArrayLike,
+    own_lon_deg: npt.ArrayLike,
+    own_alt_m: npt.ArrayLike,
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    *,
+    validate: bool = True,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Find the target's north, east and down offsets, with the degrees' length at the ownship.
+
+    Parameters
+    ----------
+    own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+        As for `line_of_sight`.
+
+    Returns
+    -------
+    north_m, east_m, down_m : ndarray
+        Metres in the ownship's local NED frame, the broadcast shape.
+
+    Raises
+    ------
+    ValueError
+        As for `line_of_sight`.
+    """
+    arrays, shape = positions(
+        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
+    )
+    north, east, up = _north_east_up(*arrays)
+    north, east, down = shaped(shape, north, east, 0.0 - up)
+    return north, east, down
+
+
+def _north_east_up(
+    lat1: FloatArray,
+    lon1: FloatArray,
+    alt1: FloatArray,
+    lat2: FloatArray,
+    lon2: FloatArray,
+    alt2: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    meridian, prime_vertical = radii_of_curvature(lat1)
+    north = (lat2 - lat1) * RAD_PER_DEG * (meridian + alt1)
+    parallel = (prime_vertical + alt1) * np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG)
+    east = longitude_difference_rounded(lon1, lon2) * RAD_PER_DEG * parallel
+    return north, east, alt2 - alt1

@@ -16,7 +16,8 @@ from pydantic import Field
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi_unchecked
-from components.geometry.attitude import sensor_angles
+from components.geometry.attitude import sensor_angles, sensor_angles_of_offsets
+from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.ladder import ATTITUDE, EARTH
 from components.geometry.rung_choice import REFERENCE
 from components.geometry.rung_planning import Rung, pick_rung
@@ -36,7 +37,12 @@ LINES_OF_SIGHT: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
     "geodesic": geodesic.line_of_sight,
     "ellipsoid": ellipsoid.line_of_sight,
 }
-
+# Those that find offsets first; the directions' angles in body axes then need no sines of angles.
+OFFSETS: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
+    "flat_earth": flat_earth.line_of_sight_ned,
+    "local_radii": local_radii.line_of_sight_ned,
+    "ellipsoid": ellipsoid.line_of_sight_ned,
+}
 
 _PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 
@@ -89,6 +95,8 @@ class Transform(Component):
         )
         self.rung = pick_rung(self)
         self._line_of_sight = LINES_OF_SIGHT[self.rung.earth]
+        exact = self.rung.attitude == "exact"
+        self._offsets = OFFSETS.get(self.rung.earth) if exact else None
 
     def request(self, port: str) -> FarthestLook:
         """Ask for the targets that somebody downstream may look at, by their true ranges."""
@@ -122,6 +130,7 @@ class Transform(Component):
             own_alt_m=states.own_alt_m,
             roster=states.roster,
             columns=states.columns,
+            culled=states.culled,
             believed=self._believed(states),
             revisit=self._revisit(states.flights),
             **self._as_seen(own, states, states.present),
@@ -141,14 +150,17 @@ class Transform(Component):
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         assert self.rung is not None
-        azimuth, elevation, range_m = self._line_of_sight(
-            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
-            validate=False,
-        )  # fmt: skip
-        p, q = sensor_angles(
-            azimuth, elevation, own.yaw_rad, own.pitch_rad, own.roll_rad,
-            model=self.rung.attitude, validate=False,
-        )  # fmt: skip
+        places = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
+        attitude = own.yaw_rad, own.pitch_rad, own.roll_rad
+        if self._offsets is None:
+            azimuth, elevation, range_m = self._line_of_sight(*places, validate=False)
+            p, q = sensor_angles(
+                azimuth, elevation, *attitude, model=self.rung.attitude, validate=False
+            )
+        else:
+            north, east, down = self._offsets(*places, validate=False)
+            azimuth, elevation, range_m = spherical_from_enu(north, east, 0.0 - down)
+            p, q = sensor_angles_of_offsets(north, east, down, *attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - azimuth)
         _require_numbers(p, heading, other.pitch_rad, other.roll_rad)
         return {

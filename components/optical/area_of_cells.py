@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from components.aircraft import Roster
 from components.optical.infrared_area import infrared_area
 from components.optical.sampled_silhouette import body_mesh, sampled_table
@@ -9,6 +11,9 @@ from components.optical.silhouette import visible_area
 from components.optical.tabulated_area import area_by_table, table_of_targets
 from components.sensor import Cells
 from dsa_des.types import FloatArray
+
+# Cells worked on together, so that what is in flight stays in the processor's cache.
+CELLS_AT_ONCE = 8192
 
 _BODIES = ("front_m2", "side_m2", "horizontal_m2")
 
@@ -78,13 +83,20 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         meshes = [body_mesh(*map(float, body)) for body in bodies]
         return area_by_table(cells, {"mesh": meshes}, "convex_hull")
     compute: Any = infrared_area if band == "ir" else visible_area
-    area: FloatArray = compute(
+    view = (
         cells.relative_heading_rad,
         cells.target_pitch_rad,
         cells.target_roll_rad,
         cells.elevation_rad,
-        model=silhouette,
-        validate=False,
-        **{name: cells.of_target(column) for name, column in areas.items()},
     )
+    shown = {name: cells.of_target(column) for name, column in areas.items()}
+    area = np.empty(len(cells))
+    for start in range(0, len(cells), CELLS_AT_ONCE):
+        block = slice(start, start + CELLS_AT_ONCE)
+        area[block] = compute(
+            *(angle[block] for angle in view),
+            model=silhouette,
+            validate=False,
+            **{name: values[block] for name, values in shown.items()},
+        )
     return area

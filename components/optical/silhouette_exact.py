@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from components.checks import FloatArray
+from components.geometry.angles import sine_and_cosine
 
 
 def line_of_sight_in_target_axes(
@@ -27,8 +28,9 @@ def line_of_sight_in_target_axes(
 
     m cancels when we look along the target's long axis, so it is evaluated as
     sin(pitch - elevation) - 2 sin(pitch) cos(elevation) sin²(yaw/2), or with the sum and the
-    cosine when the target comes towards us. The sine of the angle off the nose, hypot(m, n), then
-    keeps full relative accuracy down to 0.
+    cosine when the target comes towards us. The sine of the angle off the nose, sqrt(m² + n²), then
+    keeps full relative accuracy down to 0. The yaw's own sine and cosine are those of twice its
+    half; of a flight that holds its pitch and roll these are taken once.
 
     Parameters
     ----------
@@ -45,25 +47,24 @@ def line_of_sight_in_target_axes(
     -----
     Replaces the small-angle subtraction of thesis eq. 6 (errata 4 and 9).
     """
-    sin_yaw, cos_yaw = np.sin(relative_heading_rad), np.cos(relative_heading_rad)
-    sin_pitch, cos_pitch = np.sin(pitch_rad), np.cos(pitch_rad)
-    sin_roll, cos_roll = np.sin(roll_rad), np.cos(roll_rad)
+    half_yaw = 0.5 * relative_heading_rad
+    sin_half, cos_half = np.sin(half_yaw), np.cos(half_yaw)
+    sin_yaw = 2.0 * sin_half * cos_half
+    cos_yaw = (cos_half - sin_half) * (cos_half + sin_half)
+    sin_pitch, cos_pitch = sine_and_cosine(pitch_rad)
+    sin_roll, cos_roll = sine_and_cosine(roll_rad)
     sin_elevation, cos_elevation = np.sin(elevation_rad), np.cos(elevation_rad)
 
-    half_yaw = 0.5 * relative_heading_rad
-    leaving = np.sin(pitch_rad - elevation_rad) - (
-        2.0 * sin_pitch * cos_elevation * np.square(np.sin(half_yaw))
-    )
-    approaching = 2.0 * sin_pitch * cos_elevation * np.square(np.cos(half_yaw)) - np.sin(
-        pitch_rad + elevation_rad
-    )
-    m = np.where(cos_yaw >= 0.0, leaving, approaching)
+    leaving = cos_yaw >= 0.0
+    tilt = np.sin(np.where(leaving, pitch_rad - elevation_rad, pitch_rad + elevation_rad))
+    side = 2.0 * sin_pitch * cos_elevation
+    m = np.where(leaving, tilt - side * np.square(sin_half), side * np.square(cos_half) - tilt)
     n = sin_yaw * cos_elevation
 
     u_x = cos_pitch * cos_yaw * cos_elevation + sin_pitch * sin_elevation
     u_y = sin_roll * m - cos_roll * n
     u_z = cos_roll * m + sin_roll * n
-    return u_x, u_y, u_z, np.hypot(m, n)
+    return u_x, u_y, u_z, np.sqrt(m * m + n * n)
 
 
 def front_and_back_area(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.traffic.near_intervals import NearIntervals, near_intervals
-from dsa_des.types import IntArray
+from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
 class Culling:
@@ -37,7 +37,7 @@ class Culling:
         end_s: float,
         lasts_s: float = 0.0,
     ) -> None:
-        self._fleet, self._lasts_s = fleet, lasts_s
+        self._fleet, self.lasts_s = fleet, lasts_s
         self.reach_m = reach_m
         there = np.array([target.interval_present() for target in targets]).reshape(-1, 2)
         first, last = own.interval_present()
@@ -66,7 +66,40 @@ class Culling:
             Indices into the targets, ascending.
         fleet : object with `at(time_s)`
         """
-        columns = self.intervals.during(first_s, last_s + self._lasts_s)
+        columns = self.intervals.during(first_s, last_s + self.lasts_s)
         if self._last is None or not np.array_equal(columns, self._last[0]):
             self._last = columns, self._fleet.subset(columns)
         return self._last
+
+    def cut(self, time_s: FloatArray) -> tuple[IntArray, Any, BoolArray]:
+        """Return the targets that may come in reach, a fleet of them, and at which times (rows, n).
+
+        Parameters
+        ----------
+        time_s : (rows,)
+        """
+        columns, fleet = self.active(float(time_s.min()), float(time_s.max()))
+        return columns, fleet, self.near(columns, time_s)
+
+    def near(self, columns: IntArray, time_s: FloatArray) -> BoolArray:
+        """Return which targets may come in reach during a look from each time on.
+
+        A window holds targets that are near at some of its instants; this says at which, so that
+        what is counted does not depend on the window.
+
+        Parameters
+        ----------
+        columns : (targets,) of int
+            As from `active`.
+        time_s : (rows,)
+
+        Returns
+        -------
+        (rows, targets) of bool
+        """
+        if bool((time_s[1:] >= time_s[:-1]).all()):
+            return self.intervals.at_each(columns, time_s, time_s + self.lasts_s)
+        order = np.argsort(time_s, kind="stable")  # replicas, one after the other
+        near: BoolArray = np.empty((len(time_s), len(columns)), dtype=bool)
+        near[order] = self.near(columns, time_s[order])
+        return near

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
 from components.traffic.normals import (
     DEG_PER_RAD,
@@ -171,15 +172,15 @@ def geodesic_state(
     sin_az0 = table[_SIN_AZ0]
     cos_beta = np.sqrt(along * along + sin_az0 * sin_az0)
     cos_beta *= 1.0 - FLATTENING
-    lat = np.arctan2(sin_beta, cos_beta)
+    lat = slope_angle(sin_beta, cos_beta)
     lat *= DEG_PER_RAD
-    lon = np.arctan2(sin_az0 * sin_sigma, cos_sigma)
+    lon = direction_angle(sin_az0 * sin_sigma, cos_sigma)
     sigma += _sine_series(table, _LONGITUDE, _LONGITUDE_TERMS, sin_sigma, cos_sigma)
     sigma *= table[_LON_SLOPE]
     lon -= sigma
     lon += table[_LON_RAD]
     lon *= DEG_PER_RAD
-    yaw = np.arctan2(sin_az0 + np.zeros_like(along), along)
+    yaw = direction_angle(sin_az0 + np.zeros_like(along), along)
     return lat, wrap_longitude_deg(lon), table[_ALT] + climbed, wrap_heading_rad(yaw)
 
 

@@ -46,6 +46,44 @@ class NearIntervals:
         met = (self.start_s <= last_s) & (self.end_s >= first_s)
         return np.unique(self.target[met])
 
+    def at_each(self, columns: IntArray, first_s: FloatArray, last_s: FloatArray) -> BoolArray:
+        """Return which targets may be near at some time of each of several looks.
+
+        Parameters
+        ----------
+        columns : (targets,) of int
+            Ascending; all that are near at any time of the looks.
+        first_s, last_s : (rows,)
+            When each look starts and ends, both in order.
+
+        Returns
+        -------
+        (rows, targets) of bool
+        """
+        met = (self.start_s <= last_s[-1]) & (self.end_s >= first_s[0])
+        if len(columns) == np.count_nonzero(
+            met & (self.start_s <= last_s[0]) & (self.end_s >= first_s[-1])
+        ):
+            return np.ones((len(first_s), len(columns)), dtype=bool)  # all of them all the time
+        column = np.searchsorted(columns, self.target[met])
+        change = np.zeros((len(first_s) + 1, len(columns)), dtype=np.int8)
+        np.add.at(change, (np.searchsorted(last_s, self.start_s[met]), column), 1)
+        ends = np.searchsorted(first_s, self.end_s[met], side="right")
+        np.subtract.at(change, (ends, column), 1)
+        near: BoolArray = np.cumsum(change[:-1], axis=0, dtype=np.int8) > 0
+        return near
+
+    def holds(self, target: IntArray, time_s: FloatArray) -> BoolArray:
+        """Return whether each of some targets (n,) may be near at a time (n,) of its own."""
+        first = np.searchsorted(self.target, target)
+        count = np.searchsorted(self.target, target, side="right") - first
+        inside: BoolArray = np.zeros(len(target), dtype=bool)
+        for k in range(int(count.max(initial=0))):
+            rest = np.flatnonzero(count > k)
+            one, time = first[rest] + k, time_s[rest]
+            inside[rest] |= (self.start_s[one] <= time) & (time <= self.end_s[one])
+        return inside
+
     def most_at_once(self) -> int:
         """Return the largest number of targets that may be near at one time."""
         times = np.concatenate([self.start_s, self.end_s])

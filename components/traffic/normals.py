@@ -78,8 +78,10 @@ def normal_to_degrees(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[Floa
 
 def wrap_longitude_deg(lon_deg: FloatArray) -> FloatArray:
     """Wrap degrees into [-180, 180); a value already there keeps its bits."""
-    wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
     inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
+    if inside.all():
+        return lon_deg
+    wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
     wrapped = np.where(inside, lon_deg, wrapped)
     return np.where(wrapped >= 180.0, -180.0, np.where(wrapped < -180.0, -180.0, wrapped))
 
@@ -91,7 +93,10 @@ def wrap_difference_rad(angle: FloatArray) -> FloatArray:
 
 def wrap_heading_rad(angle: FloatArray) -> FloatArray:
     """Wrap radians into [0, 2 pi); a value already there keeps its bits."""
+    inside = (angle >= 0.0) & (angle < TWO_PI)
+    if inside.all():
+        return angle
     wrapped = angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI))
-    wrapped = np.where((angle >= 0.0) & (angle < TWO_PI), angle, wrapped)
+    wrapped = np.where(inside, angle, wrapped)
     # A tiny negative angle plus 2 pi rounds to 2 pi; the direction meant is 0.
     return np.where((wrapped >= TWO_PI) | (wrapped < 0.0), 0.0, wrapped)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, ClassVar, Protocol
 
@@ -11,12 +12,13 @@ from pydantic import Field
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.known_targets import KnownTraffic
-from components.reach import farthest_look
+from components.reach import FarthestLook, farthest_look
 from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.state import TrajectoryState
+from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain
 from dsa_des.clock import ClockSpec
@@ -42,6 +44,10 @@ class Trajectory(Protocol):
     """The flight of one aircraft."""
 
     name: str
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along its path."""
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return its state at some times."""
@@ -106,16 +112,27 @@ class TrafficSource(Component):
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
         self._everybody = np.arange(len(self.roster))
         self._culling: Culling | None = None
-        self._steered = bool(self.context.producers)
-        if self._steered:
-            self.own = SteeredFlight(self.own)
+        self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
         self._flights_asked_for = look.lasts_s > 0.0
-        known = self.clock_of(self.p) is None and not self._steered
-        if math.isfinite(look.range_m) and known and not self.context.simulate_everything:
+        if not self.context.simulate_everything and self.clock_of(self.p) is None:
+            self._cull(look)
+        if self.context.producers:
+            self.own = SteeredFlight(self.own)
+
+    def _cull(self, look: FarthestLook) -> None:
+        """Learn which targets matter, where somebody knows how far anybody looks."""
+        if not math.isfinite(look.range_m):
+            return
+        if not self.context.producers:
             end_s = float(self.context.duration_s)
             self._culling = Culling(
                 self.own, self.targets, self.fleet, look.range_m, end_s, look.lasts_s
+            )
+        elif not self._flights_asked_for:
+            speed_mps: float = self.own.max_speed_mps
+            self._steered_culling = SteeredCulling(
+                speed_mps, self.targets, self.fleet, look.range_m
             )
 
     @property
@@ -127,9 +144,10 @@ class TrafficSource(Component):
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
-        if self._culling is None:
+        culling = self._culling or self._steered_culling
+        if culling is None:
             return []
-        reach_km = self._culling.reach_m / 1000.0
+        reach_km = culling.reach_m / 1000.0
         return [f"targets beyond {reach_km:.2f} km: not moved, no sensor looks farther"]
 
     def run(self, wake: Wake) -> Message:
@@ -138,10 +156,17 @@ class TrafficSource(Component):
             self._steer(new)
         time_s = wake.time_s
         own = self.own.at(time_s)
-        columns, fleet = self._everybody, self.fleet
+        columns, fleet, near = self._everybody, self.fleet, None
         if self._culling is not None:
-            columns, fleet = self._culling.active(float(time_s.min()), float(time_s.max()))
+            columns, fleet, near = self._culling.cut(time_s)
+        elif self._steered_culling is not None:
+            columns, fleet, near = self._steered_culling.cut(self.own, time_s)
         states = fleet.at(time_s)
+        present = states.present & own.present[:, np.newaxis]
+        culled = None
+        if near is not None:
+            present &= near
+            culled = len(self._everybody) - near.sum(axis=1)
         return TrafficStates(
             tick=wake.ticks,
             own_lat_deg=own.lat_deg,
@@ -156,9 +181,10 @@ class TrafficSource(Component):
             yaw_rad=states.yaw_rad,
             pitch_rad=states.pitch_rad,
             roll_rad=states.roll_rad,
-            present=states.present & own.present[:, np.newaxis],
+            present=present,
             roster=self.roster,
             columns=columns,
+            culled=culled,
             flights=self.flights if self._flights_asked_for else None,
         )
 
@@ -181,9 +207,11 @@ class TrafficSource(Component):
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
             time_s = np.floor(time_s * rate) / rate
-        others = self.fleet.each(
-            np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
-        )
+        everyone, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        others = self.fleet.each(everyone, times)
+        if self._culling is not None:
+            near = self._culling.intervals.holds(everyone, times)
+            others = replace(others, present=others.present & near)
         return self.own.at(time_s), others.reshaped(time_s.shape)
 
     def _steer(self, new: Arrivals) -> None:

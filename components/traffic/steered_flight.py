@@ -20,6 +20,10 @@ class Flight(Protocol):
 
     name: str
 
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along its path."""
+
     def at(self, time_s: Any) -> TrajectoryState:
         """Return the state at some times."""
 
@@ -41,6 +45,11 @@ class SteeredFlight:
         self, flight: Flight, parts: tuple[tuple[float, ScriptedTrajectory], ...] = ()
     ) -> None:
         self.name, self.flight, self.parts = flight.name, flight, parts
+
+    @property
+    def max_speed_mps(self) -> float:
+        """Largest speed along the path as it is now."""
+        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
 
     def turned(self, time_s: float, turn_rad: float, rate_rad_s: float) -> SteeredFlight:
         """Return the flight that turns at a time, levels off and flies on.

@@ -1,0 +1,93 @@
+"""Who is left out around an ownship that is steered: nobody in reach, and nothing else changes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from components.geometry.ellipsoid import line_of_sight
+from components.target_messages import TrafficStates
+from components.traffic.fleet import ScriptedFleet
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.steered_culling import SHORTEST_EPOCH_S, SteeredCulling
+from components.traffic.steered_flight import SteeredFlight
+from dsa_des.recording import MemorySink, Recorder
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+
+SCENE = "configs/benchmark/manoeuvres.toml"
+
+
+def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
+    return ScriptedTrajectory(
+        name, lat_deg=lat_deg, lon_deg=lon_deg, alt_m=1000.0, heading_deg=heading_deg,
+        speed_mps=speed_mps,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])
+def test_whoever_is_in_reach_is_near(seed, reach_m):
+    draw = np.random.default_rng(seed)
+    targets = [
+        flight(f"t{i}", 52 + draw.uniform(-0.4, 0.4), 4 + draw.uniform(-0.6, 0.6),
+               draw.uniform(0, 360), draw.uniform(0, 250))
+        for i in range(60)
+    ]  # fmt: skip
+    fleet = ScriptedFleet(targets)
+    own = SteeredFlight(flight("own", 52.0, 4.0, 20.0, 70.0))
+    culling = SteeredCulling(own.max_speed_mps, targets, fleet, reach_m)
+    assert culling.epoch_s >= SHORTEST_EPOCH_S
+    in_reach = left_out = 0
+    now = 0.0
+    for _ in range(12):
+        later = now + draw.uniform(1.0, 60.0)
+        times = np.sort(draw.uniform(now, later, 40))
+        columns, some, near = culling.cut(own, times)
+        assert near.shape == (len(times), len(columns))
+        assert len(some.at(times).lat_deg[0]) == len(columns)
+        here, there = own.at(times), fleet.at(times)
+        _, _, range_m = line_of_sight(
+            here.lat_deg[:, None], here.lon_deg[:, None], here.alt_m[:, None],
+            there.lat_deg, there.lon_deg, there.alt_m,
+        )  # fmt: skip
+        whole = np.zeros(range_m.shape, dtype=bool)
+        whole[:, columns] = near
+        assert not (~whole & (range_m <= reach_m)).any()
+        in_reach += (range_m <= reach_m).sum()
+        left_out += (~whole).sum()
+        for row in (0, 17):  # an instant alone says the same
+            alone, _, at_once = culling.cut(own, times[row : row + 1])
+            assert alone[at_once[0]].tolist() == columns[near[row]].tolist()
+        own = own.turned(later, math.radians(draw.uniform(-170, 170)), math.radians(3.0))
+        assert own.max_speed_mps < 70.0 * 1.01
+        now = later
+    assert in_reach > 0
+    assert left_out > 0
+
+
+def test_leaving_out_changes_nothing_but_the_counts():
+    sets = ["blocks.avoidance.pause_s=20", "blocks.traffic.radius_km=30"]
+    scene = load_scene(SCENE, sets=sets, duration_s="150")
+
+    def run(**options):
+        sink, moved = MemorySink(), [0]
+
+        class Counting(Recorder):
+            def record(self, block, message):
+                if isinstance(message, TrafficStates):
+                    moved[0] += message.lat_deg.size
+                super().record(block, message)
+
+        Simulation(scene, recorder=Counting([sink]), **options).run()
+        return sink.tables(), moved[0]
+
+    planned, cells = run()
+    whole, all_cells = run(simulate_everything=True)
+    assert cells < 0.7 * all_cells
+    assert planned["manoeuvres"].num_rows > 2
+    for name in ("detections", "fused", "tracks", "manoeuvres"):
+        assert planned[name].equals(whole[name]), name
+    counts = [c for c in whole["scans"].column_names if c.startswith("skipped_")]
+    for tables in (planned, whole):
+        total = sum(np.array(tables["scans"][c]) for c in [*counts, "evaluated"])
+        assert (total == 100).all()
