@@ -194,6 +194,8 @@ class Component:
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
+    needs_host: ClassVar[str] = ""
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
