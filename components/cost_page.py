@@ -45,6 +45,10 @@ at the boundary stands for it. The Gram-Charlier series holds for steady targets
 sampled cross-section and compared with the exact Pd of the same sample. Fusion is compared with the
 truth at each instant, which includes the sensors' grids.
 
+## Where each model of the Earth is good enough
+
+{error_map}
+
 ## The thesis's scene
 
 `dsa-des cost configs/first_light.toml --all`
@@ -84,6 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     images: Path = options.docs / "images"
     images.mkdir(parents=True, exist_ok=True)
 
+    from components.error_map_page import error_map_section
     from dsa_des.commands.cost import comparison, ladders_to_climb
     from dsa_des.costs.chain import draw_chain, run_chain
     from dsa_des.costs.output import draw_costs
@@ -109,6 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
     page = _PAGE.format(
         **_numbers(first, second),
+        error_map=error_map_section(images),
         first_light=_tables(first),
         chain=_chain(chain),
         encounter=_tables(second),

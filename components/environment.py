@@ -3,9 +3,9 @@
 They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dsa_des.component import Parameters
 
@@ -36,6 +36,15 @@ class Weather(Parameters):
         gt=0,
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
     )
+
+    @model_validator(mode="after")
+    def _fog_has_a_thickness(self) -> Self:
+        if self.fog_top_m < self.fog_base_m:
+            raise ValueError(
+                f"fog_top_m is {self.fog_top_m:g}: it must be at least fog_base_m, "
+                f"{self.fog_base_m:g}"
+            )
+        return self
 
 
 class Accuracy(Parameters):

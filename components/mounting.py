@@ -28,6 +28,10 @@ class BodyAxes:
         """Return what the sensor reports in body axes of directions in its own axes."""
         return azimuth_rad, elevation_rad
 
+    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Return where directions in the sensor's axes truly point, in body axes."""
+        return azimuth_rad, elevation_rad
+
 
 class MountedAxes(BodyAxes):
     """The axes of a sensor that is turned against the ownship's body axes.
@@ -58,8 +62,17 @@ class MountedAxes(BodyAxes):
 
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Rotate back by the believed mounting."""
-        direction = unit_vector(azimuth_rad, elevation_rad)
-        return body_angles(*body_to_ned(*direction, *self.believed_rad))
+        return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
+
+    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Rotate back by the true mounting."""
+        return _to_body(azimuth_rad, elevation_rad, self.true_rad)
+
+
+def _to_body(
+    azimuth_rad: FloatArray, elevation_rad: FloatArray, mounting_rad: tuple[float, float, float]
+) -> Angles:
+    return body_angles(*body_to_ned(*unit_vector(azimuth_rad, elevation_rad), *mounting_rad))
 
 
 @dataclass(frozen=True)

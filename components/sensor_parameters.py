@@ -12,11 +12,13 @@ from dsa_des.component import ClockedParameters
 def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
     if not all(-360 <= angle <= 360 for angle in value):
         raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
+    if value[0] == value[1] or not -360 < value[1] - value[0] <= 360:
+        raise ValueError("must hold a field above 0 and up to 360 deg wide; all round is -180, 180")
     return value
 
 
 def _elevations(value: tuple[float, float]) -> tuple[float, float]:
-    if not -90 <= value[0] <= value[1] <= 90:
+    if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
     return value
 

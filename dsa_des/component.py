@@ -192,6 +192,8 @@ class Component:
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
+    needs_host: ClassVar[str] = ""
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -204,6 +206,11 @@ class Component:
         if isinstance(parameters, ClockedParameters):
             return parameters.clock_spec()
         return None
+
+    @classmethod
+    def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
+        """Return the ladders on which a block with these parameters stands."""
+        return cls.ladders
 
     def request(self, port: str) -> Any:
         """Return what this block asks of whoever feeds `port`, or None."""

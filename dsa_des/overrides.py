@@ -76,6 +76,7 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
             break
         if isinstance(container, dict) and step not in container:
             container[step] = {}
+            scene.sources[tuple(key)] = source
         elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[step])):
             container[step] = table
         elif not isinstance(container[step], dict | list):

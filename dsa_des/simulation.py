@@ -320,9 +320,18 @@ class Simulation:
 
         Raises
         ------
+        SceneError
+            If a block waits for a host program.
         BlockFailure
             If a block raised an exception.
         """
+        hosted = [
+            self._problem(f"blocks.{name}.type", component.needs_host)
+            for name, component in self.components.items()
+            if component.needs_host
+        ]
+        if hosted:
+            raise SceneError(hosted)
         started = time.process_time()
         end = self.end_tick
         if self.recorder is not None:

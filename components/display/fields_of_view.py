@@ -28,17 +28,29 @@ class Outline:
     closed: bool
 
 
-def outline_of(yaw_rad: float, reach: Any) -> Outline:
-    """Return a reach from above, for an ownship at the origin with its nose at `yaw_rad`."""
+def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
+    """Return a reach from above, for a level ownship at the origin with its nose at `yaw_rad`.
+
+    Parameters
+    ----------
+    yaw_rad : float
+    reach : Reach
+        In the sensor's axes; drawn as its plane of elevation 0, which a tilted sensor foreshortens.
+    axes : BodyAxes
+        How the sensor is mounted.
+    """
     low, high = reach.azimuth_rad
     width = high - low if high >= low else high - low + 2 * math.pi
     everywhere = width >= 2 * math.pi - 1e-9
     closed = math.isfinite(reach.range_max_m)
-    angle = yaw_rad + low + np.linspace(0.0, min(width, 2 * math.pi), 181)
+    angle = low + np.linspace(0.0, min(width, 2 * math.pi), 181)
     if not closed:
         angle = angle[:0] if everywhere else angle[[0, -1]]
     radius_km = reach.range_max_m / 1000 if closed else 1.0
-    corners = np.column_stack((np.sin(angle), np.cos(angle))) * radius_km
+    azimuth, elevation = axes.pointing(angle, np.zeros(len(angle)))
+    bearing = yaw_rad + azimuth
+    level_km = radius_km * np.cos(elevation) if closed else np.ones(len(angle))
+    corners = np.column_stack((np.sin(bearing), np.cos(bearing))) * level_km[:, np.newaxis]
     if closed and not everywhere:
         corners = np.vstack((corners, [[0.0, 0.0]]))
     return Outline(corners, radius_km, closed)
@@ -74,12 +86,18 @@ def draw_outline(axes: Any, outline: Outline, sensors: list[str], name: str, far
         )  # fmt: skip
 
 
-def reach_text(reach: Any) -> str:
-    """Return a reach in words."""
+def reach_text(reach: Any, axes: Any) -> str:
+    """Return a reach in words, round the boresight where that is not the nose."""
     if not reach.enabled:
         return "switched off"
     low, high = (math.degrees(angle) for angle in reach.azimuth_rad)
     field = f"±{high:.4g}°" if low == -high else f"{low:.4g}° to {high:.4g}°"
+    azimuth, elevation = (
+        round(math.degrees(angle[0]), 6) for angle in axes.pointing(*np.zeros((2, 1)))
+    )
+    if azimuth or elevation:
+        field += f"\nround {azimuth:.4g}°"
+        field += f", {abs(elevation):.4g}° {'up' if elevation > 0 else 'down'}" if elevation else ""
     if math.isfinite(reach.range_max_m):
         return f"field of view {field},\nto {reach.range_max_m / 1000:g} km"
     return f"field of view {field},\nno range limit (dashed)"

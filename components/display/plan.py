@@ -14,6 +14,7 @@ from components.display.marks import Detected
 from components.display.positions import positions
 from components.display.terminal import distance_text
 from components.display.thinning import evenly, staggered
+from components.mounting import BodyAxes
 from components.reach import Reach
 from dsa_des.types import FloatArray
 
@@ -55,8 +56,9 @@ def draw_plan(
         for name in detected.sensors
     }
     reaches = {name: reach for name, reach in looks.items() if isinstance(reach, Reach)}
+    mounted = {name: getattr(simulation.components[name], "axes", BodyAxes()) for name in reaches}
     outlines = {
-        name: outline_of(flights.start_yaw_rad, reach)
+        name: outline_of(flights.start_yaw_rad, reach, mounted[name])
         for name, reach in reaches.items()
         if reach.enabled
     }
@@ -87,7 +89,8 @@ def draw_plan(
         if view.cropped:
             title += "; flights go on outside"
         axes.set_title(plain(title), loc="left")
-        handles = _legend(reaches, detected, drawn, summary)
+        texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
+        handles = _legend(texts, detected, drawn, summary)
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
             frameon=False, labelspacing=0.9, borderaxespad=0.0,
@@ -211,7 +214,7 @@ def _nearest_first(flights: Flights) -> list[tuple[float, str, float, float, flo
 
 
 def _legend(
-    reaches: dict[str, Reach], detected: Detected, drawn: dict[str, int], summary: dict[str, Any]
+    reaches: dict[str, str], detected: Detected, drawn: dict[str, int], summary: dict[str, Any]
 ) -> list[Any]:
     from matplotlib.lines import Line2D
 
@@ -229,7 +232,7 @@ def _legend(
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
-            text += f"\n{reach_text(reaches[name])}"
+            text += f"\n{reaches[name]}"
         handles.append(
             Line2D([], [], **mark_of(style_of(detected.sensors, name)), label=plain(text))
         )

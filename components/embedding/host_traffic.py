@@ -9,7 +9,6 @@ from components.aircraft import Aircraft, Roster
 from components.target_messages import TrafficStates
 from dsa_des.component import Component, Parameters
 from dsa_des.ports import Output
-from dsa_des.wake import Wake
 
 # A host says itself when it ends; effects that ask for the length of the run are told a year.
 _NO_END_S = Fraction(365 * 86400)
@@ -37,6 +36,10 @@ class HostTraffic(Component):
     Parameters = HostTrafficParameters
     windowed = True
     clocked = "demand"
+    needs_host = (
+        "positions come from a host program: drive this scene with dsa_des.embed.Simulator, or "
+        "swap its traffic for one that flies by itself"
+    )
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -54,10 +57,3 @@ class HostTraffic(Component):
     def width(self) -> int:
         """Number of targets."""
         return len(self.roster)
-
-    def run(self, wake: Wake) -> None:
-        """Refuse to run by itself."""
-        raise TypeError(
-            "positions come from a host program: drive this scene with dsa_des.embed.Simulator, "
-            "or swap its traffic for one that flies by itself"
-        )

@@ -7,6 +7,7 @@ and the target's attitude relative to that line of sight.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -18,7 +19,9 @@ from components.geometry.angles import wrap_pi_unchecked
 from components.geometry.attitude import sensor_angles, sensor_angles_of_offsets
 from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.ladder import ATTITUDE, EARTH
+from components.geometry.rung_choice import REFERENCE
 from components.geometry.rung_planning import Rung, pick_rung
+from components.geometry.true_reach import true_reach_m
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
 from components.target_messages import Flights, RelativeTargets, Revisit, TrafficStates
@@ -96,8 +99,10 @@ class Transform(Component):
         self._offsets = OFFSETS.get(self.rung.earth) if exact else None
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that somebody downstream may look at."""
-        return farthest_look(consumer.request for consumer in self.context.consumers)
+        """Ask for the targets that somebody downstream may look at, by their true ranges."""
+        look = farthest_look(consumer.request for consumer in self.context.consumers)
+        earth = REFERENCE[0] if self.rung is None else self.rung.earth
+        return replace(look, range_m=true_reach_m(self.context, earth, look))
 
     def left_out(self) -> list[str]:
         """Say which models were picked, and why."""

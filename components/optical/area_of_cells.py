@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from components.aircraft import Roster
 from components.optical.infrared_area import infrared_area
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
-from components.optical.tabulated_area import area_by_table, tabulated_area
+from components.optical.tabulated_area import area_by_table, table_of_targets
 from components.sensor import Cells
 from dsa_des.types import FloatArray
 
@@ -15,6 +16,37 @@ from dsa_des.types import FloatArray
 CELLS_AT_ONCE = 8192
 
 _BODIES = ("front_m2", "side_m2", "horizontal_m2")
+
+
+def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
+    """Check that every target has what a camera's silhouette needs.
+
+    Parameters
+    ----------
+    roster : Roster
+    band, silhouette
+        As for `area_of_cells`.
+
+    Raises
+    ------
+    ValueError
+        If a target lacks it.
+    """
+    if silhouette == "aspect_table":
+        table_of_targets(roster, f"{band}.silhouette_table")
+    elif silhouette == "mesh":
+        for name, craft in zip(roster.names, roster.aircraft, strict=True):
+            of: Any = getattr(craft, band)
+            for key in _BODIES:
+                if getattr(of, key) <= 0.0:
+                    raise ValueError(
+                        f"{band}.{key} of target {name!r} is 0: silhouette 'mesh' needs every body"
+                    )
+            if band == "ir" and of.back_m2 != of.front_m2:
+                raise ValueError(
+                    f"target {name!r} has ir.back_m2 {of.back_m2:g} and ir.front_m2 "
+                    f"{of.front_m2:g}: silhouette 'mesh' needs them alike, a mesh has one shape"
+                )
 
 
 def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
@@ -38,14 +70,18 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         If a target lacks what the silhouette needs, whether in sight or not.
     """
     if silhouette == "aspect_table":
-        return tabulated_area(cells, f"{band}.silhouette_table")
+        tables = table_of_targets(cells.roster, f"{band}.silhouette_table")
+        return area_by_table(cells, {"table": tables}, "aspect_table")
     names = (*_BODIES, "back_m2") if band == "ir" else _BODIES
     areas = {name: cells.roster.column(f"{band}.{name}") for name in names}
     if silhouette == "sampled_table":
         tables = [sampled_table(*map(float, row)) for row in zip(*areas.values(), strict=True)]
         return area_by_table(cells, {"table": tables}, "aspect_table")
     if silhouette == "mesh":
-        return area_by_table(cells, {"mesh": _meshes(cells, areas)}, "convex_hull")
+        check_silhouette(cells.roster, band, silhouette)
+        bodies = zip(*(areas[key] for key in _BODIES), strict=True)
+        meshes = [body_mesh(*map(float, body)) for body in bodies]
+        return area_by_table(cells, {"mesh": meshes}, "convex_hull")
     compute: Any = infrared_area if band == "ir" else visible_area
     view = (
         cells.relative_heading_rad,
@@ -67,16 +103,3 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
             **{name: values[block] for name, values in shown.items()},
         )
     return area
-
-
-def _meshes(cells: Cells, areas: dict[str, FloatArray]) -> list[object]:
-    meshes: list[object] = []
-    for target, name in enumerate(cells.roster.names):
-        front, side, horizontal = (float(areas[key][target]) for key in _BODIES)
-        if "back_m2" in areas and areas["back_m2"][target] != front:
-            raise ValueError(
-                f"target {name!r} has ir.back_m2 {areas['back_m2'][target]:g} and ir.front_m2 "
-                f"{front:g}: silhouette 'mesh' needs them alike, a mesh has one shape"
-            )
-        meshes.append(body_mesh(front, side, horizontal))
-    return meshes

@@ -7,6 +7,8 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from components.known_targets import known_targets
+from components.optical.area_of_cells import check_silhouette
 from components.optical.dynamic_signature import DynamicSignature
 from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
@@ -83,7 +85,9 @@ class Camera(Sensor):
         self._signatures: list[CellValues] = []
 
     def setup(self) -> None:
-        """Take what the scene's effects add to areas and signatures, and do to the contrast."""
+        """Check the targets' silhouettes, and take what effects do to area, signature, contrast."""
+        for roster in known_targets(self.context) if self.areas else ():
+            check_silhouette(roster, self.areas, self.p.silhouette)
         self._areas = self.built("area")
         self._contrast_factors = self.built("contrast")
         self._signatures = self.built("signature")

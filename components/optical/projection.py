@@ -7,8 +7,9 @@ import numpy as np
 from pydantic import Field
 
 from components.optical.camera import Camera, CameraParameters
-from components.optical.ladder import VISIBLE
+from components.optical.ladder import INFRARED, VISIBLE
 from components.sensor import Cells
+from dsa_des.ladder import Ladder
 from dsa_des.types import FloatArray
 
 
@@ -30,6 +31,11 @@ class Projection(Camera):
 
     Parameters = ProjectionParameters
     ladders = (VISIBLE,)
+
+    @classmethod
+    def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
+        """Return the ladder of the cameras of its band."""
+        return (INFRARED,) if parameters.band == "ir" else cls.ladders
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

@@ -5,37 +5,35 @@ from typing import Any
 
 import numpy as np
 
+from components.aircraft import Roster
 from components.optical.silhouette import visible_area
 from components.sensor import Cells
 from dsa_des.types import FloatArray
 
 
-def tabulated_area(cells: Cells, path: str) -> FloatArray:
-    """Look each cell's area up in its aircraft's table over aspect.
+def table_of_targets(roster: Roster, path: str) -> list[Any]:
+    """Return every target's own table over aspect.
 
     Parameters
     ----------
-    cells : Cells
+    roster : Roster
     path : {"eo.silhouette_table", "ir.silhouette_table"}
-
-    Returns
-    -------
-    (cells,) array, m²
 
     Raises
     ------
     ValueError
-        If a target has no such table, whether in sight or not.
+        If a target has none.
     """
-    tables, place = cells.roster.tables(path)
+    tables, place = roster.tables(path)
     missing = np.flatnonzero(place < 0)
     if missing.size:
-        name = cells.roster.names[missing[0]]
+        name = roster.names[missing[0]]
+        more = f" (and of {missing.size - 1} more)" if missing.size > 1 else ""
         raise ValueError(
-            f"{path} of target {name!r} is None: silhouette 'aspect_table' needs a table of every "
-            "target"
+            f"{path} of target {name!r}{more} is None: silhouette 'aspect_table' needs a table of "
+            "every target"
         )
-    return area_by_table(cells, {"table": [tables[index] for index in place]}, "aspect_table")
+    return [tables[index] for index in place]
 
 
 def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: str) -> FloatArray:

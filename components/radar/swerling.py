@@ -46,6 +46,11 @@ class SwerlingParameters(LinkBudgetParameters):
 
     @model_validator(mode="after")
     def _covered(self) -> Self:
+        if self.reference_pd <= self.false_alarm_probability:
+            raise ValueError(
+                f"reference_pd is {self.reference_pd:g}: it must be above false_alarm_probability, "
+                f"{self.false_alarm_probability:g}, which noise alone reaches"
+            )
         if self.model == "auto" and self.detection != "exact":
             raise ValueError(
                 f"model is 'auto' and detection is {self.detection!r}: leave one of them out"

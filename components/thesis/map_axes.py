@@ -25,8 +25,8 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
 
     flights = run.flights
     for name, colour in zip(fields_of_view, (GREEN, BLUE, RED), strict=False):
-        reach = run.simulation.components[name].stated_reach  # type: ignore[attr-defined]
-        outline = outline_of(flights.start_yaw_rad, reach)
+        sensor: Any = run.simulation.components[name]
+        outline = outline_of(flights.start_yaw_rad, sensor.stated_reach, sensor.axes)
         if outline.closed:
             shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
             axes.add_patch(

@@ -41,6 +41,8 @@ def cost_of_accuracy(
 ) -> None:
     """Climb the ladders of a scene's blocks, write tables and figures, and print the rows."""
     if map_name is not None:
+        if whole_chain or block is not None:
+            raise UsageError("--map draws no scene's blocks: leave out --block and --all")
         _draw_maps(map_name, out)
         return
     if scene is None:
@@ -101,7 +103,11 @@ def ladders_to_climb(
             f"--block {block}: the scene has no such block{did_you_mean(block, blocks)}"
         )
     names = list(blocks) if block is None else [block]
-    declared = [(name, ladder) for name in names for ladder in blocks[name].cls.ladders]
+    declared = [
+        (name, ladder)
+        for name in names
+        for ladder in blocks[name].cls.ladders_for(blocks[name].parameters)
+    ]
     if not declared:
         who = "no block of this scene declares" if block is None else f"{block} declares no"
         raise UsageError(f"{who} ladder; dsa-des components TYPE shows them")

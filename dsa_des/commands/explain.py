@@ -10,6 +10,8 @@ from dsa_des.effects import Planned
 from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
 
+_WIDE = 300
+
 
 def explain_scene(
     scene: str,
@@ -29,6 +31,8 @@ def explain_scene(
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = Console()
+    if not console.is_terminal:  # a reader that is no terminal gets every sentence on one line
+        console = Console(width=_WIDE)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("block", "effect", "largest influence"):
         table.add_column(heading, no_wrap=heading == "block")

@@ -134,9 +134,13 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     rows = max(1, math.ceil(len(panels) / columns))
     with png_figure(path, 4.3 * columns, 3.5 * rows + 0.5) as figure:
         figure.suptitle(f"{title}: what each model costs and what it gets wrong")
+        drawn = []
         for number, rungs in enumerate(panels):
-            _draw_panel(figure.add_subplot(rows, columns, number + 1), rungs)
+            axes = figure.add_subplot(rows, columns, number + 1)
+            drawn.append((axes, _draw_panel(axes, rungs)))
         figure.tight_layout()
+        for axes, labels in drawn:  # where points are is known only now
+            _put_labels(axes, labels)
 
 
 @contextmanager
@@ -151,14 +155,20 @@ def png_figure(path: Path, width_in: float, height_in: float) -> Iterator[Any]:
     figure.savefig(path, metadata={"Software": None})
 
 
-def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
+#: What is written, at which point, how far its error bar reaches, in which colour.
+_Label = tuple[str, tuple[float, float], float, str]
+
+
+def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
+    """Draw a ladder's points and front, and return their labels."""
     first, quantity = rungs[0], rungs[0].ladder.quantities[0]
     others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
     known = [error for error in others if error > 0.0]
     # Errors of rounding, of 0 and unknown ones stand on the floor, open, with their number: on a
     # true scale they would press all others together, and a log axis has no zero.
     floor = 0.1 * min(known) if known else 1e-3
-    points, labels = [], []
+    points: list[tuple[tuple[float, float], bool]] = []
+    labels: list[_Label] = []
     for cost in sorted(rungs, key=lambda c: c.cpu_us_per_target_scan):
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
@@ -170,7 +180,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
             *at, xerr=cost.cpu_spread_us, fmt="o", color=colour, capsize=2, zorder=3,
             markerfacecolor="white" if on_floor else colour,
         )  # fmt: skip
-        labels.append((label, at, colour))
+        labels.append((label, at, cost.cpu_spread_us, colour))
         points.append((at, cost.pareto))
     front = [at for at, pareto in points if pareto]
     axes.plot(*zip(*front, strict=True), color="#D55E00", linewidth=1, zorder=2)
@@ -184,27 +194,44 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> None:
     axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
     axes.tick_params(which="both", labelsize=7)
     axes.minorticks_off()
-    _put_labels(axes, labels)
+    return labels
 
 
-def _put_labels(axes: Any, labels: Sequence[tuple[str, tuple[float, float], str]]) -> None:
-    """Write each label beside its point, moved down or up until it covers no other one."""
-    high, wide = 11.0, 5.2  # of a line and of a letter, in pixels
-    put: list[tuple[float, float, float]] = []
-    for label, at, colour in sorted(labels, key=lambda item: -item[1][1]):
-        x, y = axes.transData.transform(at)
+def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
+    """Write each label beside its point, moved until it covers no point and no other label."""
+    high, wide, gap, mark = 11.0, 6.0, 5.0, 5.0  # a line, a letter, a gap, half a point; pixels
+    places = []
+    for label, (cost, error), spread, colour in labels:
+        x, y = axes.transData.transform((cost, error))
+        bar = max(mark, axes.transData.transform((cost + spread, error))[0] - x)
+        places.append((y, x, bar, label, (cost, error), colour))
+    put = [(x - bar, x + bar, y) for y, x, bar, *_ in places]
+    edge, end = axes.bbox.x0, axes.bbox.x1
+    for y, x, bar, label, at, colour in sorted(places, reverse=True):
+        width = wide * len(label)
 
-        def free(drop: float, x: float = x, y: float = y, width: float = wide * len(label)) -> bool:
-            return all(
-                abs(y - drop - other_y) >= high or x + width < other_x or other_end < x
-                for other_x, other_end, other_y in put
+        def free(place: tuple[float, float], width: float = width) -> bool:
+            left, middle = place
+            return (
+                edge < left
+                and left + width < end
+                and all(
+                    abs(middle - other_y) >= high or left + width < other_x or other_end < left
+                    for other_x, other_end, other_y in put
+                )
             )
 
-        drop = next((d for d in (4.0, 15.0, -8.0, 26.0, -19.0, 37.0) if free(d)), 4.0)
-        put.append((x, x + wide * len(label), y - drop))
+        tries = [
+            (x + left, y + up)
+            for up in (0.0, -12.0, 12.0, -24.0, 24.0, -36.0, 36.0)
+            for left in (bar + gap, -bar - gap - width, -width / 2)
+        ]
+        left, middle = next(filter(free, tries), tries[0])
+        put.append((left, left + width, middle))
         axes.annotate(
-            label, at, xytext=(9, -drop), textcoords="offset pixels", fontsize=7, color=colour
-        )
+            label, at, xytext=(left - x, middle - y), textcoords="offset pixels", fontsize=7,
+            color=colour, va="center_baseline",
+        )  # fmt: skip
 
 
 def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:

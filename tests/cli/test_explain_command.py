@@ -32,6 +32,13 @@ def test_measuring_shows_a_share_for_every_effect_that_calculates() -> None:
     assert "share" in result.stdout and "%" in result.stdout
 
 
+def test_a_sentence_is_one_line_for_who_reads_a_pipe() -> None:
+    lines = call("explain", SCENE).stdout.splitlines()
+    assert any("rain: not simulated, [weather] rain_rate_mm_h is 0" in line for line in lines)
+    assert all(line.split()[0] in {"block", "eo", "ir", "radar", "transform", "traffic"}
+               for line in lines)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

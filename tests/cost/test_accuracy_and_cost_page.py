@@ -1,10 +1,12 @@
 """docs/accuracy-and-cost.md holds what is computed: its errors, which no machine changes."""
 
+import math
 import re
 
 import pytest
 
 from components.cost_page import DOCS, main
+from components.error_map_page import error_map_section
 from components.geometry.ladder import EARTH
 from components.optical.ladder import VISIBLE
 from dsa_des.commands.cost import comparison
@@ -54,3 +56,19 @@ def test_errors_and_effects_are_those_that_are_computed(block, ladder, skip):
 def test_it_refuses_what_it_cannot_read(tmp_path):
     with pytest.raises(SystemExit):
         main(["--encounters", str(tmp_path)])
+
+
+def test_the_section_of_the_error_map_is_the_one_that_is_computed(tmp_path):
+    section = error_map_section(tmp_path)
+    assert section in PAGE
+    assert (tmp_path / "error_map_angle.png").read_bytes().startswith(b"\x89PNG")
+    rows = {
+        tuple(cells[:2]): cells[2:]
+        for line in section.splitlines()
+        if len(cells := [cell.strip() for cell in line.strip("|").split("|")]) == 6
+    }
+    # Half the angle of the Earth at 6.6 km is 0.03 deg; flat Earth is off by more from the start.
+    assert float(rows["geodesic", "0.03°"][0]) == pytest.approx(
+        2 * math.radians(0.03) * 6371, rel=0.02
+    )
+    assert rows["flat_earth", "0.03°"][:3] == ["none"] * 3

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from components.geometry.ladder import EARTH
 from components.radar.ladder import DETECTION
 from dsa_des.cli import main
+from dsa_des.commands.cost import ladders_to_climb
 from dsa_des.costs.replay import run_rung
 from dsa_des.costs.study import climb
 from dsa_des.costs.variants import Choice, Variants
@@ -142,6 +143,19 @@ def test_what_a_scene_cannot_have_is_said(tmp_path):
         climb(boundary, "radar", DETECTION, repeats=1)
 
 
+@pytest.mark.parametrize(("band", "type_name"), [("eo", "optical.eo"), ("ir", "optical.ir")])
+def test_a_projection_stands_on_the_ladder_of_its_band(band, type_name):
+    variants = Variants(
+        str(SCENE), swaps=["ir=optical.projection"], sets=[f"blocks.ir.band={band}"]
+    )
+    ((_, ladder),) = ladders_to_climb(variants, "ir", None)[0]
+    assert ladder.rung(ladder.reference).type_name == type_name
+    best = variants.with_rungs([Choice("ir", ladder, ladder.rung(ladder.reference))])
+    assert best.blocks["ir"].type_name == type_name
+    same = variants.with_rungs([Choice("ir", ladder, ladder.rung("projection"))])
+    assert same.blocks["ir"].parameters == variants.scene.blocks["ir"].parameters
+
+
 def test_accuracy_of_the_scene_is_the_budget_and_chooses_no_rung():
     loose = Variants(
         str(SCENE), sets=["accuracy.angle_deg=0.1", "accuracy.range_m=100"], duration_s=20
@@ -162,6 +176,7 @@ def test_accuracy_of_the_scene_is_the_budget_and_chooses_no_rung():
         ((SCENE, "--block", "gate"), "declares no ladder"),
         ((), "SCENE is missing"),
         (("--map", "geometrie"), "did you mean 'geometry'"),
+        (("--map", "geometry", "--block", "eo"), "leave out --block"),
     ],
 )
 def test_wrong_calls_are_refused_and_leave_nothing(arguments, said, tmp_path, monkeypatch):

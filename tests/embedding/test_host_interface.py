@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from dsa_des.cli import main
 from dsa_des.embed import HostDriven, Simulator
 from dsa_des.errors import BlockFailure, SceneError, UsageError
 from dsa_des.scene import load_scene
@@ -280,8 +282,18 @@ def test_a_scene_without_fusion_is_refused(configs, tmp_path):
 
 def test_a_scene_for_a_host_does_not_run_by_itself(scene):
     loaded = load_scene(scene, swaps=["traffic=traffic.host"], duration_s=1)
-    with pytest.raises(BlockFailure, match=r"drive this scene with dsa_des\.embed\.Simulator"):
+    with pytest.raises(SceneError, match=r"drive this scene with dsa_des\.embed\.Simulator"):
         Simulation(loaded).run()
+
+
+def test_running_it_is_refused_on_the_command_line_and_leaves_nothing(scene, tmp_path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(
+        main, ["run", str(scene), "--swap", "traffic=traffic.host", "--out", str(out)]
+    )
+    assert done.exit_code == 2
+    assert "blocks.traffic.type: positions come from a host program" in done.stderr
+    assert not out.exists()
 
 
 def test_a_block_that_fails_is_named(scene, monkeypatch):

@@ -254,3 +254,26 @@ def test_a_silhouette_table_with_a_hole_is_a_problem_of_the_scene(scene, area_fi
     assert len(caught.value.problems) == 6
     for problem in caught.value.problems:
         assert problem.key.endswith("silhouette_table") and "hole" in str(problem)
+
+
+@pytest.mark.parametrize(
+    ("band", "silhouette", "said"),
+    [
+        ("eo", "aspect_table", "eo.silhouette_table of target 'bare' is None"),
+        ("ir", "aspect_table", "ir.silhouette_table of target 'bare' is None"),
+        ("ir", "mesh", "target 'propeller' has ir.back_m2 14 and ir.front_m2 12"),
+        ("eo", "mesh", "eo.side_m2 of target 'bare' is 0"),
+    ],
+)
+def test_targets_that_lack_a_silhouette_are_a_problem_before_the_run(scene, band, silhouette, said):
+    wish = f'silhouette = "{silhouette}"'
+    path = scene(wish, "") if band == "eo" else scene("", wish)
+    bare = (
+        '[[blocks.traffic.intruders]]\nname = "bare"\neast_m = 0\nnorth_m = 2000\n'
+        "eo = { front_m2 = 12, side_m2 = 0, horizontal_m2 = 90 }\n"
+    )
+    path.write_text(path.read_text(encoding="utf-8") + bare, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        Simulation(load_scene(path))
+    (problem,) = caught.value.problems
+    assert problem.key == f"blocks.{band}" and said in problem.message

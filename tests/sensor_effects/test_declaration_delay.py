@@ -67,7 +67,7 @@ def test_sentences(scene, runs):
     ("keys", "words"),
     [
         ("declare_m = 2", "declare_m and declare_n belong together"),
-        ("declare_m = 6\ndeclare_n = 5", "declare_m is 6: it must be at most declare_n, 5"),
+        ("declare_m = 6\ndeclare_n = 5", "declare_m = 6: it must be at most declare_n, 5"),
         ("declare_m = 0\ndeclare_n = 5", "declare_m"),
     ],
 )

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from components.display.fields_of_view import outline_of, reach_text
 from components.mounting import MountedAxes
+from components.reach import Reach
 from dsa_des.errors import SceneError
 from dsa_des.scene import load_scene
 
@@ -51,6 +53,22 @@ def test_a_mounting_in_azimuth_turns_the_field_of_view(scene, runs):
         half_pixel = math.radians(40 / 6144) / 2
         assert row["azimuth_rad"] == pytest.approx(row["true_azimuth_rad"], abs=1.01 * half_pixel)
         assert row["confidence"] == pytest.approx(wide[key]["confidence"], rel=1e-12)
+
+
+def test_fields_of_view_are_drawn_as_they_are_mounted():
+    reach = Reach((-math.radians(20), math.radians(20)), (-0.5, 0.5), 6000.0)
+    true, believed = (math.radians(90), 0.0, 0.0), (0.0, 0.0, 0.0)
+    beside = outline_of(math.radians(30), reach, MountedAxes(true, believed))
+    expected = 6 * np.array([[math.sin(b), math.cos(b)] for b in np.radians([100, 140])])
+    np.testing.assert_allclose(beside.corners_km[[0, 180]], expected, atol=1e-12)
+    np.testing.assert_array_equal(beside.corners_km[181], [0.0, 0.0])
+    assert reach_text(reach, MountedAxes(true, believed)).startswith(
+        "field of view ±20°\nround 90°,"
+    )
+    up = MountedAxes((0.0, math.radians(60), 0.0), believed)
+    middle = outline_of(0.0, reach, up).corners_km[90]
+    np.testing.assert_allclose(middle, [0.0, 3.0], atol=1e-12)
+    assert "60° up" in reach_text(reach, up)
 
 
 def test_looking_astern_sees_nobody_ahead(scene, runs):

@@ -38,5 +38,5 @@ def test_more_intruders_leave_the_first_ones_where_they_were():
 
 
 def test_speeds_in_the_wrong_order_are_refused():
-    with pytest.raises(SceneError, match="speed_max_mps is 10"):
+    with pytest.raises(SceneError, match="speed_max_mps = 10: it must be at least"):
         starts(5, speed_max_mps=10)

@@ -1,0 +1,30 @@
+"""The figure of `dsa-des cost`: every rung's name can be read."""
+
+from itertools import combinations
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from dsa_des.costs.output import _put_labels
+
+
+def test_labels_cover_neither_each_other_nor_a_point():
+    figure = Figure(figsize=(4.3, 3.5), dpi=110)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    axes = figure.add_axes((0.15, 0.15, 0.8, 0.8))
+    axes.set(xscale="log", yscale="log", xlim=(0.05, 1e4), ylim=(1e-2, 2e2))
+    points = {
+        "range_boundary": (0.15, 26.0), "projection": (0.19, 51.0), "thesis": (0.26, 33.0),
+        "exact (scene)": (0.36, 20.0), "sampled_table": (0.62, 0.36), "mesh": (700.0, 0.6),
+        "union: 5e-15 m²": (0.62, 0.03), "window": (0.62, 0.37), "far right of all": (8e3, 1.0),
+    }  # fmt: skip
+    _put_labels(axes, [(name, at, 0.1 * at[0], "black") for name, at in points.items()])
+    boxes = {text.get_text(): text.get_window_extent(renderer) for text in axes.texts}
+    assert boxes.keys() == points.keys()
+    for one, other in combinations(boxes, 2):
+        assert not boxes[one].overlaps(boxes[other]), (one, other)
+    for place in axes.transData.transform(np.array(list(points.values()))):
+        assert not [name for name, box in boxes.items() if box.contains(*place)]
+    for name, box in boxes.items():
+        assert axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1, name
