@@ -89,6 +89,16 @@ class Channel:
         self._waiting.append((arrivals, message))
         return arrivals
 
+    def forget(self, tick: int) -> None:
+        """Drop what a reader who only asks what is held, at `tick` or later, can never see.
+
+        A slow sensor behind a fast one would otherwise let a message wait for each window between
+        two of its scans.
+        """
+        if self._faults is None:
+            while len(self._waiting) > 1 and self._waiting[1][0][0] <= tick:
+                self._waiting.popleft()
+
     def next_arrivals(self, end: int) -> IntArray:
         """Return the ticks at which rows arrive before `end` that were not collected yet."""
         ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]

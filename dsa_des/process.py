@@ -319,6 +319,8 @@ class Node:
     def _deliver(self, port: str, message: Message, sent: int | None = None) -> None:
         for channel, node, target_port in self.subscribers.get(port, []):
             arrivals = channel.push(message, sent)
+            if node.component.inputs[target_port].mode == "sampled":
+                channel.forget(self.simulation.window[0])
             if not node.windowed and target_port in node._trigger_ports:
                 for arrival in arrivals.tolist():
                     node.wake_at(arrival)

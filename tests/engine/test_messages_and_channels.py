@@ -113,6 +113,19 @@ def test_a_channel_hands_each_row_over_once_and_not_before_it_arrives():
     assert channel.next_arrivals(10**6).tolist() == []
 
 
+def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
+    """Scenario: three messages wait, the next instant that may be sampled is 25."""
+    channel, whole = Channel("source"), Channel("source")
+    for part in (beats([0, 10]), beats([20, 21], start=2), beats([30, 40], start=4)):
+        channel.push(part)
+        whole.push(part)
+        channel.forget(25)
+    assert len(channel.state()[0]) == 2  # that of 0 and 10 is gone
+    asked = np.array([25, 35, 40])
+    (got, rows), (expected, places) = channel.sample(asked, 50), whole.sample(asked, 50)
+    assert got.tick[rows].tolist() == expected.tick[places].tolist() == [21, 30, 40]
+
+
 def test_a_delay_moves_the_arrival_and_not_what_the_row_speaks_of():
     channel = Channel("radar", delay_ticks=7)
     assert channel.push(beats([0, 10])).tolist() == [7, 17]
