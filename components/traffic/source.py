@@ -155,12 +155,13 @@ class TrafficSource(Component):
         for new in wake.arrivals("manoeuvres"):
             self._steer(new)
         time_s = wake.time_s
-        own = self.own.at(time_s)
         columns, fleet, near = self._everybody, self.fleet, None
-        if self._culling is not None:
-            columns, fleet, near = self._culling.cut(time_s)
-        elif self._steered_culling is not None:
-            columns, fleet, near = self._steered_culling.cut(self.own, time_s)
+        if self._steered_culling is not None:
+            own, columns, fleet, near = self._steered_culling.cut(self.own, time_s)
+        else:
+            own = self.own.at(time_s)
+            if self._culling is not None:
+                columns, fleet, near = self._culling.cut(time_s)
         states = fleet.at(time_s)
         present = states.present & own.present[:, np.newaxis]
         culled = None

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.state import TrajectoryState
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
@@ -19,6 +20,8 @@ SHORTEST_EPOCH_S = 1.0
 # Steering keeps the speed to 1e-4; what the ownship flies may be this much faster at most.
 _OWN_SPEED_MARGIN = 1.05
 _SPEED_MARGIN = 1.001
+# Targets are placed for so many epochs at once that it takes about this many cells.
+_CELLS_AT_ONCE = 8192
 _RANGE_MARGIN_M = 1.0
 
 
@@ -48,9 +51,12 @@ class SteeredCulling:
         #: By number of the epoch, for one path of the ownship.
         self._near: dict[int, BoolArray] = {}
         self._own: Any = None
+        #: Where all targets are at the starts of some epochs, from the first of them on.
+        self._placed: tuple[int, Any] | None = None
+        self._most_epochs = max(1, _CELLS_AT_ONCE // max(1, len(targets)))
         self._last: tuple[IntArray, Any] = np.arange(len(targets)), fleet
 
-    def cut(self, own: Any, time_s: FloatArray) -> tuple[IntArray, Any, BoolArray]:
+    def cut(self, own: Any, time_s: FloatArray) -> tuple[Any, IntArray, Any, BoolArray]:
         """Return the targets that may be in reach at some of the times.
 
         Parameters
@@ -61,6 +67,8 @@ class SteeredCulling:
 
         Returns
         -------
+        state : TrajectoryState
+            The ownship at the times.
         columns : (n,) of int
             Indices into the targets, ascending.
         fleet : object with `at(time_s)`
@@ -73,21 +81,33 @@ class SteeredCulling:
         epochs, of_row = np.unique(np.floor(time_s / self.epoch_s), return_inverse=True)
         numbers = epochs.astype(np.int64).tolist()
         new = [number for number in numbers if number not in self._near]
-        if new:
-            self._near.update(zip(new, self._near_at(np.array(new) * self.epoch_s), strict=True))
+        # One call for the rows and the epochs: a steered flight has many parts to go through.
+        both = own.at(np.concatenate([time_s, np.array(new) * self.epoch_s]))
+        rows = len(time_s)
+        state = TrajectoryState(*(values[:rows] for values in both.arrays()))
+        here = [both.lat_deg[rows:], both.lon_deg[rows:], both.alt_m[rows:]]
+        self._learn(np.array(new, dtype=np.int64), here)
         near = np.array([self._near[number] for number in numbers])
         columns = np.flatnonzero(near.any(axis=0))
         if not np.array_equal(columns, self._last[0]):
             self._last = columns, self._fleet.subset(columns)
-        return columns, self._last[1], near[:, columns][of_row]
+        return state, columns, self._last[1], near[:, columns][of_row]
 
-    def _near_at(self, start_s: FloatArray) -> BoolArray:
-        """Return which targets may come in reach in the epochs that start at some times."""
-        own, others = self._own.at(start_s), self._fleet.at(start_s)
-        _, _, range_m = line_of_sight(
-            own.lat_deg[:, np.newaxis], own.lon_deg[:, np.newaxis], own.alt_m[:, np.newaxis],
-            others.lat_deg, others.lon_deg, others.alt_m,
-            validate=False,
-        )  # fmt: skip
-        near: BoolArray = range_m <= self._within_m
-        return near
+    def _learn(self, epochs: IntArray, here: list[FloatArray]) -> None:
+        """Find who may come in reach in some epochs, given where the ownship starts each."""
+        while len(epochs):
+            first, others = self._placed or (0, None)
+            if others is None or not first <= epochs[0] < first + self._most_epochs:
+                first = int(epochs[0])
+                others = self._fleet.at((first + np.arange(self._most_epochs)) * self.epoch_s)
+                self._placed = first, others
+            known = int(np.searchsorted(epochs, first + self._most_epochs))
+            row = epochs[:known] - first
+            own_lat, own_lon, own_alt = (values[:known, np.newaxis] for values in here)
+            _, _, range_m = line_of_sight(
+                own_lat, own_lon, own_alt,
+                others.lat_deg[row], others.lon_deg[row], others.alt_m[row],
+                validate=False,
+            )  # fmt: skip
+            self._near.update(zip(epochs[:known].tolist(), range_m <= self._within_m, strict=True))
+            epochs, here = epochs[known:], [values[known:] for values in here]

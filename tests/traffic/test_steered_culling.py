@@ -42,7 +42,8 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
     for _ in range(12):
         later = now + draw.uniform(1.0, 60.0)
         times = np.sort(draw.uniform(now, later, 40))
-        columns, some, near = culling.cut(own, times)
+        state, columns, some, near = culling.cut(own, times)
+        assert state.lat_deg.tolist() == own.at(times).lat_deg.tolist()
         assert near.shape == (len(times), len(columns))
         assert len(some.at(times).lat_deg[0]) == len(columns)
         here, there = own.at(times), fleet.at(times)
@@ -56,7 +57,7 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
         in_reach += (range_m <= reach_m).sum()
         left_out += (~whole).sum()
         for row in (0, 17):  # an instant alone says the same
-            alone, _, at_once = culling.cut(own, times[row : row + 1])
+            _, alone, _, at_once = culling.cut(own, times[row : row + 1])
             assert alone[at_once[0]].tolist() == columns[near[row]].tolist()
         own = own.turned(later, math.radians(draw.uniform(-170, 170)), math.radians(3.0))
         assert own.max_speed_mps < 70.0 * 1.01
