@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dsa_des.recording import Recorder
     from dsa_des.simulation import Simulation
 
-# After something came back, a window starts at this part of its full length.
+# At the start, and after something came back, a window has this part of its full length.
 _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
@@ -81,7 +81,7 @@ def rewinding_windows(simulation: "Simulation", end: int) -> Iterator[tuple[int,
         for channel in wires
         if (channel.source, node.name) in simulation.cut_edges
     ]
-    start, length = 0, simulation.window_ticks
+    start, length = 0, max(1, simulation.window_ticks // _RESTART)
     came = 0  # when something came back last
     while start < end:
         stop = min(start + length, end, *(cut for cut in simulation.cuts if cut > start))
