@@ -8,6 +8,8 @@ import numpy.typing as npt
 from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 
 TWO_PI = 2.0 * np.pi
+# What the double nearest to 2 pi leaves out of it (6.28318530717958647692528676655900577).
+_TWO_PI_REST = 2.4492935982947064e-16
 RAD_PER_DEG = np.pi / 180.0
 
 # No offset in metres between two aircraft squares to less than this, unless it is 0.
@@ -47,13 +49,21 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
     """`wrap_pi` for a contiguous array that is known to be finite."""
     result = angle + 0.0
-    outside = (angle <= -np.pi) | (angle > np.pi)
-    if np.count_nonzero(outside):
+    size = np.abs(angle)
+    outside = (size > np.pi) | (angle == -np.pi)
+    if np.count_nonzero(outside) == 0:
+        return result
+    # Within three half turns the first difference is exact, and the second brings the true 2 pi.
+    once = angle - np.copysign(TWO_PI, angle)
+    once -= np.copysign(_TWO_PI_REST, angle)
+    far = size > 3.0 * np.pi
+    if np.count_nonzero(far):
         # The library's sin and cos reduce by the true pi, for any size of argument.
-        far = angle[outside]
-        wrapped = np.arctan2(np.sin(far), np.cos(far))
-        wrapped[wrapped <= -np.pi] = np.pi
-        result[outside] = wrapped + 0.0
+        once[far] = np.arctan2(np.sin(angle[far]), np.cos(angle[far]))
+    np.minimum(once, np.pi, out=once)
+    once[once <= -np.pi] = np.pi
+    once += 0.0
+    np.copyto(result, once, where=outside)
     return result
 
 
@@ -85,8 +95,8 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned = angle + 0.0
-    np.add(angle, TWO_PI, out=turned, where=angle < 0.0)
+    turned = (angle < 0.0) * TWO_PI
+    turned += angle
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
     turned[turned >= TWO_PI] = 0.0
     return turned

@@ -253,7 +253,12 @@ def sensor_angles_of_offsets(
         As from `sensor_angles`, to the last digit or two; at a third of its cost, because the
         direction need not be taken apart into angles first.
     """
-    x, y, z = _ned_to_body(north_m, east_m, 0.0 - up_m, yaw_rad, pitch_rad, roll_rad)
+    x, y = _turn(north_m, east_m, yaw_rad)
+    z = 0.0 - up_m
+    if pitch_rad.any():  # straight and level, as most fly most of the time, these change nothing
+        z, x = _turn(z, x, pitch_rad)
+    if roll_rad.any():
+        y, z = _turn(y, z, roll_rad)
     level = x * x
     level += y * y
     np.sqrt(level, out=level)
