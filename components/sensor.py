@@ -28,6 +28,9 @@ from dsa_des.ports import Input, Output
 from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.wake import Wake
 
+# Up to so many targets, counting row by row is mostly the overhead of rows.
+_FEW_COLUMNS = 8
+
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -79,6 +82,8 @@ class Cells:
         #: Index of each cell's scan within this look, and of its target in the roster.
         if len(rows) == 1:
             self.row, self.target = np.zeros(len(place), dtype=np.int64), place
+        elif width == 1:
+            self.row, self.target = place, np.zeros(len(place), dtype=np.int64)
         else:
             self.row, self.target = np.divmod(place, width)
         self.scan = scans[self.row]
@@ -343,6 +348,16 @@ class Sensor(Component):
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
+def _per_row(mask: BoolArray) -> IntArray:
+    """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
+    if mask.shape[1] > _FEW_COLUMNS:
+        return mask.sum(axis=1)
+    total = np.zeros(len(mask), dtype=np.int64)
+    for column in mask.T:
+        total += column
+    return total
+
+
 def _counted(
     reason: ReasonArray, everybody: int, culled: IntArray | None
 ) -> tuple[IntArray, dict[str, IntArray]]:
@@ -355,7 +370,7 @@ def _counted(
         count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
         of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
-        of = {code: (reason == code).sum(axis=1) for code in (EVALUATE, *SKIP_REASONS.values())}
+        of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = everybody - reason.shape[1]
     if culled is None:

@@ -95,7 +95,7 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned = (angle < 0.0) * TWO_PI
+    turned: FloatArray = (angle < 0.0) * TWO_PI
     turned += angle
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
     turned[turned >= TWO_PI] = 0.0

@@ -97,6 +97,9 @@ class Culling:
         -------
         (rows, targets) of bool
         """
+        last_s = float(time_s.max())
+        if self.intervals.throughout(float(time_s.min()) + self.lasts_s, last_s) == len(columns):
+            return np.ones((len(time_s), len(columns)), dtype=bool)
         if bool((time_s[1:] >= time_s[:-1]).all()):
             return self.intervals.at_each(columns, time_s, time_s + self.lasts_s)
         order = np.argsort(time_s, kind="stable")  # replicas, one after the other

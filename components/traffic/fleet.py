@@ -162,9 +162,10 @@ class _Group:
         for first in range(0, len(times), rows):
             block = slice(first, first + rows)
             t = times[block, np.newaxis]
-            inside = np.where(t > self._start, t, self._start)
-            inside = np.where(inside < self._until, inside, self._until)
-            lat, lon, alt, yaw = self._formula(self._table, inside - self._start)
+            inside = np.maximum(t, self._start)
+            np.minimum(inside, self._until, out=inside)
+            inside -= self._start
+            lat, lon, alt, yaw = self._formula(self._table, inside)
             if self._yaw_is_fixed.any():
                 yaw = np.where(self._yaw_is_fixed, fixed_yaw, yaw)
             present = (t >= self._start) & (t <= self._end)

@@ -201,8 +201,8 @@ class ScriptedTrajectory:
             whole = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
             return TrajectoryState(*whole).reshaped(times.shape)
         present = (flat >= self.start_time_s) & (flat <= self.end_time_s)
-        elapsed = np.where(flat > self.start_time_s, flat, self.start_time_s)
-        elapsed = np.where(elapsed < self.evaluated_until_s, elapsed, self.evaluated_until_s)
+        elapsed = np.maximum(flat, self.start_time_s)
+        np.minimum(elapsed, self.evaluated_until_s, out=elapsed)
         elapsed -= self.start_time_s
         if len(self.segments) == 1:
             columns = segment_state(self.segments[0], elapsed)

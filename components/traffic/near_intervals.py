@@ -46,6 +46,10 @@ class NearIntervals:
         met = (self.start_s <= last_s) & (self.end_s >= first_s)
         return np.unique(self.target[met])
 
+    def throughout(self, first_s: float, last_s: float) -> int:
+        """Return how many targets may be near at every time in [first_s, last_s]."""
+        return int(np.count_nonzero((self.start_s <= first_s) & (self.end_s >= last_s)))
+
     def at_each(self, columns: IntArray, first_s: FloatArray, last_s: FloatArray) -> BoolArray:
         """Return which targets may be near at some time of each of several looks.
 
@@ -61,10 +65,6 @@ class NearIntervals:
         (rows, targets) of bool
         """
         met = (self.start_s <= last_s[-1]) & (self.end_s >= first_s[0])
-        if len(columns) == np.count_nonzero(
-            met & (self.start_s <= last_s[0]) & (self.end_s >= first_s[-1])
-        ):
-            return np.ones((len(first_s), len(columns)), dtype=bool)  # all of them all the time
         column = np.searchsorted(columns, self.target[met])
         change = np.zeros((len(first_s) + 1, len(columns)), dtype=np.int8)
         np.add.at(change, (np.searchsorted(last_s, self.start_s[met]), column), 1)
