@@ -95,7 +95,7 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 def positive_turn(angle: FloatArray) -> FloatArray:
     """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned: FloatArray = (angle < 0.0) * TWO_PI
+    turned: FloatArray = np.multiply(angle < 0.0, TWO_PI, dtype=np.float64)
     turned += angle
     # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
     turned[turned >= TWO_PI] = 0.0
@@ -145,7 +145,8 @@ def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
     Parameters
     ----------
     across, along : ndarray
-        Contiguous, of one shape, any unit; `along` is 0 or at least 1e-200 in size, `across` below 1e100.
+        Contiguous, of one shape, any unit; `along` is 0 or at least 1e-200 in size, `across`
+        below 1e100.
 
     Returns
     -------
