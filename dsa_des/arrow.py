@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dsa_des.message import Columns, Schema, Text, rows_of
-from dsa_des.types import AnyArray
+from dsa_des.types import AnyArray, IntArray
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.
 ROW_GROUP = 65536
@@ -20,6 +20,9 @@ _ENCODINGS = {"tick": "DELTA_BINARY_PACKED", "time_s": "BYTE_STREAM_SPLIT"}
 
 #: Columns that every row has, whatever their kind.
 _LEADING = frozenset({"block", "time_s"})
+
+# Up to so many names it is faster to look for one after the other.
+_FEW_NAMES = 8
 
 _TYPES = {
     "int64": pa.int64(),
@@ -68,16 +71,27 @@ def _in_order_of_appearance(text: Text) -> pa.DictionaryArray:
 
     What the dictionary of a row group holds then follows from its rows alone.
     """
-    codes, count = text.codes, len(text.codes)
-    if count and codes[0] >= 0 and bool((codes == codes[0]).all()):  # as the block's name mostly is
-        return _dictionary(np.zeros(count, dtype=np.int32), (text.names[codes[0]],))
-    first = np.full(len(text.names) + 1, count)  # the last place is that of null
-    first[codes[::-1]] = np.arange(count - 1, -1, -1)
-    used = np.flatnonzero(first[:-1] < count)
+    first = _first_places(text.codes, len(text.names))
+    used = np.flatnonzero(first < len(text.codes))
     used = used[np.argsort(first[used])]
-    place = np.full(len(text.names) + 1, -1, dtype=np.int32)
+    names = tuple(text.names[i] for i in used.tolist())
+    if np.array_equal(used, np.arange(len(used))):
+        return _dictionary(text.codes, names)
+    place = np.full(len(text.names) + 1, -1, dtype=np.int32)  # the last place is that of null
     place[used] = np.arange(len(used))
-    return _dictionary(place[codes], tuple(text.names[i] for i in used.tolist()))
+    return _dictionary(place[text.codes], names)
+
+
+def _first_places(codes: AnyArray, names: int) -> IntArray:
+    """Return where each code stands first; the number of codes where it does not."""
+    count = len(codes)
+    if count and names <= _FEW_NAMES:
+        found = [codes == name for name in range(names)]
+        places = [int(hits.argmax()) if hits.any() else count for hits in found]
+        return np.array(places, dtype=np.int64)
+    first = np.full(names + 1, count)  # the last place is that of null
+    first[codes[::-1]] = np.arange(count - 1, -1, -1)
+    return first[:-1]
 
 
 class ParquetSink:
