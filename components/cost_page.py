@@ -19,7 +19,7 @@ _CONFIGS = Path(__file__).parents[1] / "configs"
 _PAGE = """# What accuracy costs
 
 For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their time; cruder ones save fractions of a microsecond, dearer ones bring nothing:
-1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle errs by up to {small_angle} mrad in the flown encounter.
+1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad in the flown encounter.
 2. **Radar**: take the exact Pd: for one pulse the table costs the same and Gram-Charlier {gram_times} times as much. A threshold or a range boundary saves up to {boundary_saves} µs and moves first detection by {threshold_km} to {boundary_km} km.
 3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) is nearly as good in level flight ({exact_gained} detections too many) but sees {flown_km} km too early in the flown encounter; boundary and line are {eo_boundary_km} and {eo_line_km} km off. A mesh costs {mesh_times} times the union and is no better.
 4. **Fusion**: a window of 0.1 s is worth its {window_extra} µs: it raises the fused share from {share} to {window_share} and adds {window_range} m to the range error (95th percentile).
@@ -144,6 +144,7 @@ def _numbers(costs: Sequence[Any], flown: Sequence[Any]) -> dict[str, str]:
     instant, window = of["fusion", "exact_instant"], of["fusion", "window"]
     return {
         "flat_saves": saved("transform", "flat_earth", "ellipsoid"),
+        "attitude_saves": saved("transform", "small_angle", "exact"),
         "flat_max": f"{flat:.1f}",
         "flat_pixels": f"{flat / math.radians(0.0358) / 1e3:.1f}",
         "gram_times": f"{us('radar', 'gram_charlier') / us('radar', 'exact'):.0f}",

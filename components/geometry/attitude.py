@@ -212,6 +212,9 @@ def sensor_angles(
     if model != "small_angle":
         allowed = " or ".join(repr(name) for name in MODELS)
         raise ValueError(f"model is {model!r}: it must be {allowed}")
+    if not validate:
+        given: tuple[Any, ...] = azimuth_rad, elevation_rad, yaw_rad, pitch_rad
+        return _angle_by_angle(*given)
     shape, (azimuth, elevation, yaw, pitch, _) = _checked(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
@@ -219,13 +222,21 @@ def sensor_angles(
         pitch_rad=pitch_rad,
         roll_rad=roll_rad,
     )
+    p, q = shaped(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
+    return p, q
+
+
+def _angle_by_angle(
+    azimuth: FloatArray, elevation: FloatArray, yaw: FloatArray, pitch: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     p = wrap_pi_unchecked(azimuth - yaw)
     q = wrap_pi_unchecked(elevation - pitch)
     over = np.abs(q) > 0.5 * np.pi
+    if np.count_nonzero(over) == 0:
+        return p, q
     q = np.where(over, np.copysign(np.pi, q) - q, q)
     p, over = np.broadcast_arrays(p, over)
     p = np.where(over, wrap_pi_unchecked(np.where(p > 0.0, p - np.pi, p + np.pi)), p)
-    p, q = shaped(shape, p, q)
     return p, q
 
 
