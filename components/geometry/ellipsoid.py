@@ -118,8 +118,8 @@ def line_of_sight_ned(
 
     Measured against 40-digit arithmetic over 15,000 hard pairs (poles, antimeridian, several
     turns of longitude, across the pole, antipodes; 1 mm to 13,000 km of slant range, -400 m to
-    40 km of altitude): vector error at most 1.1e-15 of the range through azimuth, elevation and
-    range, 8e-16 in NED. About 0.1 us per pair in blocks of 10,000; 50-60 us for a call with a
+    40 km of altitude): vector error at most 1.1e-15 of the range, through azimuth, elevation and
+    range as in NED. About 0.1 us per pair in blocks of 10,000; 50-60 us for a call with a
     few targets, which is why sensors evaluate windows of scans.
     """
     arrays, shape = positions(
