@@ -103,11 +103,12 @@ def _calls_table(row: dict[str, Any]) -> Any:
         "wall_us": "wall time",
         "cpu_us": "processor time",
         "undisturbed_us": "wall time, best of each call's repetitions",
+        "fixed_us": "fixed work: the machine's own spread",
     }
     for key, name in names.items():
         p50, p99, most = (f"{row[key][end]:.0f}" for end in ("p50", "p99", "max"))
         first = f"{row['first_us']:.0f}" if key == "wall_us" else ""
-        wanted = "" if key == "cpu_us" else f"{row['wanted_p99_us']:.0f}"
+        wanted = "" if key in ("cpu_us", "fixed_us") else f"{row['wanted_p99_us']:.0f}"
         table.add_row(name, p50, p99, wanted, most, first)
     return table
 
