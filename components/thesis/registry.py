@@ -65,6 +65,8 @@ ITEMS = (
     Item("table-2.4", "The systems of the literature", "systems:make"),
 )
 
+#: Numbers of the thesis that an item covers beside its own.
+_ALSO = {("eq", "33"): "eq-34", ("eq", "33.34"): "eq-34"}
 _KINDS = {"figure": "fig", "tab": "table", "section": "sec", "§": "sec", "equation": "eq"}
 
 
@@ -98,6 +100,8 @@ def chosen(names: Iterable[str]) -> list[Item]:
 def _find(name: str) -> list[str]:
     """Return the names of the items that a name may mean."""
     kind, number = _parts(name)
+    if (kind, number) in _ALSO:
+        return [_ALSO[kind, number]]
     parts = {item.name: _parts(item.name) for item in ITEMS}
     return [full for full, (k, n) in parts.items() if n == number and kind in ("", k)]
 

@@ -43,6 +43,8 @@ def cost_of_accuracy(
     if map_name is not None:
         if whole_chain or block is not None:
             raise UsageError("--map draws no scene's blocks: leave out --block and --all")
+        if scene is not None:
+            raise UsageError(f"--map draws no scene: leave out {scene}")
         _draw_maps(map_name, out)
         return
     if scene is None:

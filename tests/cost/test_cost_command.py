@@ -177,6 +177,7 @@ def test_accuracy_of_the_scene_is_the_budget_and_chooses_no_rung():
         ((), "SCENE is missing"),
         (("--map", "geometrie"), "did you mean 'geometry'"),
         (("--map", "geometry", "--block", "eo"), "leave out --block"),
+        ((SCENE, "--map", "geometry"), "--map draws no scene: leave out"),
     ],
 )
 def test_wrong_calls_are_refused_and_leave_nothing(arguments, said, tmp_path, monkeypatch):

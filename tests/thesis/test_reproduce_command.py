@@ -78,6 +78,10 @@ def test_spellings_of_one_item(spelling):
     assert [item.name for item in chosen([spelling])] == ["fig-4.14"]
 
 
+def test_an_item_may_cover_several_equations():
+    assert [item.name for item in chosen(["eq. 33", "eq-33-34"])] == ["eq-34"]
+
+
 def test_items_come_in_the_order_of_the_thesis_and_once():
     assert [item.name for item in chosen(["fig-4.5", "fig-4.3", "Fig. 4.5"])] == [
         "fig-4.3",
