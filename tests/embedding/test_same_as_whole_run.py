@@ -67,8 +67,8 @@ def test_detections_are_the_same_to_the_bit(configs, flying, sets):
     host = flying.Host(scene, sets=sets)
     simulator = flying.Simulator(scene, sets=sets, beyond_fusion=True)
     host.add_planes(simulator)
-    results = flying.fly(simulator, host, 60.0)
-    tables = flying.run_whole(scene, sets=(*sets, "duration_s=60"))
+    results = flying.fly(simulator, host, 40.0)
+    tables = flying.run_whole(scene, sets=(*sets, "duration_s=40"))
     for table in ("detections", "fused", "tracks", "scans"):
         _assert_same(results, tables, table)
 
@@ -101,11 +101,11 @@ def test_the_answer_is_that_of_the_fusion(configs, flying):
     host.add_planes(simulator)
     seen = [
         (result.time_s, sighting)
-        for result in flying.fly(simulator, host, 100.0)
+        for result in flying.fly(simulator, host, 70.0)
         for sighting in result
         if sighting.detected
     ]
-    fused = flying.run_whole(scene, sets=["duration_s=100"])["fused"].to_pylist()
+    fused = flying.run_whole(scene, sets=["duration_s=70"])["fused"].to_pylist()
     order = {name: place for place, name in enumerate(simulator.planes)}
     fused.sort(key=lambda row: (row["tick"], order[row["target"]]))
     assert len(seen) == len(fused) > 100
