@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from components.geometry.attitude import body_angles, body_to_ned, sensor_angles, unit_vector
+from components.geometry.attitude import body_angles, body_to_ned, unit_vector
+from components.geometry.sensor_angles import sensor_angles
 from components.reach import Reach, ReasonArray
 from dsa_des.effects import Effect, Verdict
 from dsa_des.types import BoolArray, FloatArray

@@ -13,11 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry.angles import (
-    direction_angle,
     sine_and_cosine,
-    slope_angle,
     wrap_pi,
-    wrap_pi_unchecked,
 )
 from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 
@@ -25,8 +22,6 @@ Triple = tuple[FloatArray, FloatArray, FloatArray]
 
 # Nearer to straight up or down than this, the azimuth is nothing but rounding.
 _ZENITH_RAD = 4.0 * float(np.finfo(np.float64).eps)
-
-MODELS = ("exact", "small_angle")
 
 
 @np.errstate(under="ignore")  # a product below 1e-308 is zero to every digit asked for
@@ -58,10 +53,10 @@ def ned_to_body(
     ValueError
         NaN, infinity, or shapes that do not fit.
     """
-    shape, arrays = _checked(
+    shape, arrays = checked(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    x, y, z = shaped(shape, *_ned_to_body(*arrays))
+    x, y, z = shaped(shape, *ned_to_body_unchecked(*arrays))
     return x, y, z
 
 
@@ -93,12 +88,12 @@ def body_to_ned(
     ValueError
         NaN, infinity, or shapes that do not fit.
     """
-    shape, (bx, by, bz, yaw, pitch, roll) = _checked(
+    shape, (bx, by, bz, yaw, pitch, roll) = checked(
         x=x, y=y, z=z, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    level_y, level_z = _turn(by, bz, -roll)
-    down, level_x = _turn(level_z, bx, -pitch)
-    north, east = _turn(level_x, level_y, -yaw)
+    level_y, level_z = turn_axes(by, bz, -roll)
+    down, level_x = turn_axes(level_z, bx, -pitch)
+    north, east = turn_axes(level_x, level_y, -yaw)
     north, east, down = shaped(shape, north, east, down)
     return north, east, down
 
@@ -122,8 +117,8 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Tri
     ValueError
         NaN, infinity, or shapes that do not fit.
     """
-    shape, arrays = _checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
-    north, east, down = shaped(shape, *_unit_vector(*arrays))
+    shape, arrays = checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
+    north, east, down = shaped(shape, *unit_vector_unchecked(*arrays))
     return north, east, down
 
 
@@ -156,124 +151,10 @@ def body_angles(
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
     degrees, where the asin of thesis eq. 5 loses half the digits.
     """
-    shape, arrays = _checked(x=x, y=y, z=z)
-    p, q = shaped(shape, *_body_angles(*(np.ascontiguousarray(np.broadcast_to(a, shape or (1,)))
-                                         for a in arrays)))  # fmt: skip
+    shape, arrays = checked(x=x, y=y, z=z)
+    wide = (np.ascontiguousarray(np.broadcast_to(a, shape or (1,))) for a in arrays)
+    p, q = shaped(shape, *body_angles_unchecked(*wide))
     return p, q
-
-
-def sensor_angles(
-    azimuth_rad: npt.ArrayLike,
-    elevation_rad: npt.ArrayLike,
-    yaw_rad: npt.ArrayLike,
-    pitch_rad: npt.ArrayLike,
-    roll_rad: npt.ArrayLike,
-    model: str = "exact",
-    *,
-    validate: bool = True,
-) -> tuple[FloatArray, FloatArray]:
-    """Find where in its own axes the ownship sees a target: the thesis's angles p and q.
-
-    Parameters
-    ----------
-    azimuth_rad, elevation_rad : array_like
-        Absolute bearing (from true north) and elevation of the line of sight.
-    yaw_rad, pitch_rad, roll_rad : array_like
-        The ownship's attitude, ZYX. All five broadcast.
-    model : {"exact", "small_angle"}
-        "exact" rotates the line of sight into the body axes. "small_angle" is thesis eq. 4-5,
-        corrected: p = wrap(azimuth - yaw), q = elevation - pitch, roll ignored. It is right dead
-        ahead with the wings level; abeam, pitch is wrongly subtracted, astern it has the wrong
-        sign.
-    validate : bool
-        False skips the checks, for a caller that has contiguous arrays of finite doubles with at
-        least one axis, the directions of the broadcast shape.
-
-    Returns
-    -------
-    p_rad : ndarray
-        Azimuth from the nose, clockwise seen from above, in (-pi, pi].
-    q_rad : ndarray
-        Elevation, in [-pi/2, pi/2]. Where elevation - pitch passes straight up or down, the
-        direction comes down on the other side: q becomes ±pi - q, and p turns by pi.
-
-    Raises
-    ------
-    ValueError
-        An unknown model, NaN, infinity, or shapes that do not fit.
-    """
-    if model == "exact":
-        if not validate:
-            with np.errstate(under="ignore"):
-                n, e, d = _unit_vector(azimuth_rad, elevation_rad)
-                return _body_angles(*_ned_to_body(n, e, d, yaw_rad, pitch_rad, roll_rad))
-        north, east, down = unit_vector(azimuth_rad, elevation_rad)
-        return body_angles(*ned_to_body(north, east, down, yaw_rad, pitch_rad, roll_rad))
-    if model != "small_angle":
-        allowed = " or ".join(repr(name) for name in MODELS)
-        raise ValueError(f"model is {model!r}: it must be {allowed}")
-    if not validate:
-        given: tuple[Any, ...] = azimuth_rad, elevation_rad, yaw_rad, pitch_rad
-        return _angle_by_angle(*given)
-    shape, (azimuth, elevation, yaw, pitch, _) = _checked(
-        azimuth_rad=azimuth_rad,
-        elevation_rad=elevation_rad,
-        yaw_rad=yaw_rad,
-        pitch_rad=pitch_rad,
-        roll_rad=roll_rad,
-    )
-    p, q = shaped(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
-    return p, q
-
-
-def _angle_by_angle(
-    azimuth: FloatArray, elevation: FloatArray, yaw: FloatArray, pitch: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    p = wrap_pi_unchecked(azimuth - yaw)
-    q = wrap_pi_unchecked(elevation - pitch)
-    over = np.abs(q) > 0.5 * np.pi
-    if np.count_nonzero(over) == 0:
-        return p, q
-    q = np.where(over, np.copysign(np.pi, q) - q, q)
-    p, over = np.broadcast_arrays(p, over)
-    p = np.where(over, wrap_pi_unchecked(np.where(p > 0.0, p - np.pi, p + np.pi)), p)
-    return p, q
-
-
-def sensor_angles_of_offsets(
-    north_m: FloatArray,
-    east_m: FloatArray,
-    up_m: FloatArray,
-    yaw_rad: FloatArray,
-    pitch_rad: FloatArray,
-    roll_rad: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Find where in its own axes the ownship sees what lies at some offsets, without checks.
-
-    Parameters
-    ----------
-    north_m, east_m, up_m : ndarray
-        Offsets in the ownship's local frame, of the broadcast shape.
-    yaw_rad, pitch_rad, roll_rad : ndarray
-        The ownship's attitude, ZYX. All six are contiguous arrays of finite doubles, at least one
-        axis.
-
-    Returns
-    -------
-    p_rad, q_rad : ndarray
-        As from `sensor_angles`, to the last digit or two; at a third of its cost, because the
-        direction need not be taken apart into angles first.
-    """
-    x, y = _turn(north_m, east_m, yaw_rad)
-    z = 0.0 - up_m
-    if pitch_rad.any():  # straight and level, as most fly most of the time, these change nothing
-        z, x = _turn(z, x, pitch_rad)
-    if roll_rad.any():
-        y, z = _turn(y, z, roll_rad)
-    level = x * x
-    level += y * y
-    np.sqrt(level, out=level)
-    return _azimuth(direction_angle(y, x), z, level), slope_angle(0.0 - z, level)
 
 
 def relative_attitude(
@@ -310,7 +191,7 @@ def relative_attitude(
     A small-angle form: the sign of the elevation is right only for a receding target, and roll
     shares its axis with elevation only abeam. `line_of_sight_in_target_axes` is exact.
     """
-    shape, (azimuth, elevation, yaw, pitch, roll) = _checked(
+    shape, (azimuth, elevation, yaw, pitch, roll) = checked(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
         target_yaw_rad=target_yaw_rad,
@@ -397,25 +278,29 @@ def aspect_angles(
     return body_angles(-x, -y, -z)
 
 
-def _unit_vector(azimuth: Any, elevation: Any) -> Triple:
+def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Triple:
+    """`unit_vector` for arrays of finite doubles."""
     level = np.cos(elevation)
     return level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
 
 
-def _ned_to_body(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Triple:
-    level_x, level_y = _turn(n, e, yaw)
-    z, x = _turn(d, level_x, pitch)
-    y, z = _turn(level_y, z, roll)
+def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Triple:
+    """`ned_to_body` for arrays of finite doubles."""
+    level_x, level_y = turn_axes(n, e, yaw)
+    z, x = turn_axes(d, level_x, pitch)
+    y, z = turn_axes(level_y, z, roll)
     return x, y, z
 
 
-def _body_angles(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+def body_angles_unchecked(
+    x: FloatArray, y: FloatArray, z: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """`body_angles` for contiguous arrays of one shape."""
     level = np.hypot(x, y)
-    return _azimuth(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
+    return azimuth_off_nose(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
 
 
-def _azimuth(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
+def azimuth_off_nose(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
     """Put an azimuth into (-pi, pi], and to 0 for what points along z; level is hypot(x, y)."""
     azimuth[azimuth <= -np.pi] = np.pi
     azimuth[level <= _ZENITH_RAD * np.abs(z)] = 0.0
@@ -423,13 +308,13 @@ def _azimuth(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArra
     return azimuth
 
 
-def _turn(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def turn_axes(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Components of a plane vector in axes turned by the angle from a towards b."""
     sine, cosine = sine_and_cosine(angle)
     return cosine * a + sine * b, cosine * b - sine * a
 
 
-def _checked(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
+def checked(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Check named arguments; returns the broadcast shape and arrays of at least one axis."""
     arrays = {name: finite(name, value) for name, value in values.items()}
     shape = common_shape(**arrays)

@@ -16,11 +16,11 @@ from pydantic import Field
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import wrap_pi_unchecked
-from components.geometry.attitude import sensor_angles, sensor_angles_of_offsets
 from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.ladder import ATTITUDE, EARTH
 from components.geometry.rung_choice import REFERENCE
 from components.geometry.rung_planning import Rung, pick_rung
+from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
 from components.geometry.true_reach import true_reach_m
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look

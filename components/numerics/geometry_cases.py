@@ -6,7 +6,8 @@ from typing import Any
 
 from components.geometry import ellipsoid, geodesic
 from components.geometry.angles import longitude_difference_deg
-from components.geometry.attitude import body_angles, sensor_angles
+from components.geometry.attitude import body_angles
+from components.geometry.sensor_angles import sensor_angles
 from components.numerics.case import Case, multiprecision
 
 DEG = math.pi / 180.0

@@ -6,8 +6,9 @@ from random import Random
 
 import numpy as np
 
-from components.geometry.attitude import sensor_angles, unit_vector
+from components.geometry.attitude import unit_vector
 from components.geometry.ellipsoid import line_of_sight
+from components.geometry.sensor_angles import sensor_angles
 from components.reach import EVALUATE
 from components.target_messages import GatedTargets, TrafficStates
 from dsa_des.recording import MemorySink, Recorder

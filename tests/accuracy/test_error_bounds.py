@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
-from components.geometry.attitude import sensor_angles, unit_vector
+from components.geometry.attitude import unit_vector
 from components.geometry.error_bounds import (
     Envelope,
     ErrorBound,
@@ -17,6 +17,7 @@ from components.geometry.error_bounds import (
     azimuth_error_rad,
     error_bound,
 )
+from components.geometry.sensor_angles import sensor_angles
 from components.traffic.enu import enu_to_geodetic
 
 MODELS = {

@@ -13,9 +13,9 @@ from components.geometry.attitude import (
     line_of_sight_in_target_axes,
     ned_to_body,
     relative_attitude,
-    sensor_angles,
     unit_vector,
 )
+from components.geometry.sensor_angles import sensor_angles
 
 fast = settings(derandomize=True, deadline=None, max_examples=100)
 angle = st.floats(-np.pi, np.pi)

@@ -8,8 +8,9 @@ import pytest
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.angles import longitude_difference_deg, sincosd
-from components.geometry.attitude import body_angles, relative_attitude, sensor_angles
+from components.geometry.attitude import body_angles, relative_attitude
 from components.geometry.field_of_view import inside
+from components.geometry.sensor_angles import sensor_angles
 
 DEG = math.pi / 180
 
