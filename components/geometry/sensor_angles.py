@@ -125,8 +125,8 @@ def sensor_angles_of_offsets(
     Returns
     -------
     p_rad, q_rad : ndarray
-        As from `sensor_angles`, to the last digit or two; at a third of its cost, because the
-        direction need not be taken apart into angles first.
+        As from `sensor_angles`, to the last digit or two; at a third to half of its cost, because
+        the direction need not be taken apart into angles first.
     """
     x, y = turn_axes(north_m, east_m, yaw_rad)
     z = 0.0 - up_m

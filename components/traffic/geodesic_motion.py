@@ -89,7 +89,7 @@ def geodesic_parameters(
     # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
     meridian, prime_vertical = (float(r) for r in radii_of_curvature(lat_deg))
     radius = 1.0 / (cos_az * cos_az / meridian + sin_az * sin_az / prime_vertical)
-    table = [0.0] * GEODESIC_ROWS  # filled in as a list: an array takes each number twice as long
+    table = np.zeros(GEODESIC_ROWS)
     table[_SPEED_RADIUS] = speed_mps * radius
     table[_CENTRE_DISTANCE] = radius + alt_m
     table[_CLIMB], table[_ALT] = climb_mps, alt_m
@@ -101,7 +101,7 @@ def geodesic_parameters(
     table[_RADIUS] = radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
-    return np.array(table)
+    return table
 
 
 def flight_time_s(

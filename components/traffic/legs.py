@@ -108,8 +108,8 @@ class ScriptedTrajectory:
             "start_time_s": start_time_s,
         }
         for key, value in given.items():
-            if value is not None and not math.isfinite(value):
-                require(False, f"{name}: {key}", value, "be finite")
+            if value is not None:
+                require(math.isfinite(value), f"{name}: {key}", value, "be finite")
         require(abs(lat_deg) <= 90.0, f"{name}: lat_deg", lat_deg, "lie in [-90, 90] degrees")
         require(abs(alt_m) <= 1e6, f"{name}: alt_m", alt_m, "lie within ±1e6 metres")
         require(speed_mps >= 0.0, f"{name}: speed_mps", speed_mps, "be 0 or more")
