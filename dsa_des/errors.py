@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
+from dsa_des.safe_text import MOST_OF_A_VALUE, printable, shortened
+
 
 def nearest(name: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed name closest to a misspelt one, or None when nothing is close."""
@@ -57,9 +59,9 @@ class Problem:
     def __str__(self) -> str:
         where = f"{self.source}: {self.key}" if self.key else self.source
         if self.value is not _UNSET:
-            shown = repr(self.value)
-            where += f" = {shown if len(shown) <= 80 else shown[:77] + '...'}"
-        return f"{where}: {self.message}"
+            where += f" = {shortened(repr(self.value), MOST_OF_A_VALUE)}"
+        # On one line whatever stands in a name: nobody can write a message of ours.
+        return printable(f"{where}: {self.message}")
 
 
 class SceneError(Exception):
@@ -78,7 +80,13 @@ class SceneError(Exception):
 
 
 class UsageError(Exception):
-    """A command was called with something it cannot use (exit code 2)."""
+    """A command was called with something it cannot use (exit code 2).
+
+    Each argument is one line of the message.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(printable(line) for line in self.args)
 
 
 class BlockFailure(Exception):
@@ -99,4 +107,6 @@ class BlockFailure(Exception):
 
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
-        return f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        return printable(
+            f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        )

@@ -5,9 +5,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-import click
-
 from dsa_des.errors import BlockFailure, SceneError, UsageError
+from dsa_des.terminal import say_lines
 
 
 def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
@@ -18,10 +17,10 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*args, **kwargs)
         except (SceneError, UsageError) as error:
-            click.echo(f"error: {error}", err=True)
+            say_lines(f"error: {error}", err=True)
             sys.exit(2)
         except BlockFailure as error:
-            click.echo(f"error: {error}", err=True)
+            say_lines(f"error: {error}", err=True)
             sys.exit(1)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.figures import DPI, drawing, mark_of, plain, style_of
+from components.display.figures import DPI, drawing, figure_text, mark_of, style_of
 from components.display.flights import Flights
 from components.display.marks import Detected, read_fused, read_scans
 from components.display.thinning import by_target, evenly, staggered
@@ -73,7 +73,8 @@ def draw_timeline(
     with drawing(*_SIZE_IN, path) as figure:
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
         _draw_scans(above, scans, detected.sensors, close_up)
-        above.set_title(plain(f"{simulation.scene.title}: {close_up.what}"), loc="left")
+        title = figure_text(simulation.scene.title, 60)
+        above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
@@ -150,7 +151,8 @@ def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) 
         style = style_of(sensors, name)
         hits[name] = time_s[count > 0]
         rate = (len(time_s) - 1) / (time_s[-1] - time_s[0]) if len(time_s) > 1 else 0.0
-        names.append(f"{name}\n{rate:.4g} Hz" if rate else name)
+        who = figure_text(name, 16)
+        names.append(f"{who}\n{rate:.4g} Hz" if rate else who)
         seen = (time_s >= close_up.start_s) & (time_s <= close_up.end_s)
         size = min(7.0, _mark_size(int(np.count_nonzero(seen))))
         shown = time_s[seen]
@@ -180,7 +182,7 @@ def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) 
             markeredgecolor="#000000", markerfacecolor="none", markeredgewidth=1.4, zorder=4.0,
             clip_on=False,
         )  # fmt: skip
-    axes.set_yticks([height[name] for name in sensors], [plain(name) for name in names])
+    axes.set_yticks([height[name] for name in sensors], names)
     axes.tick_params(axis="y", length=0, pad=9)
     axes.spines["left"].set_visible(False)
     axes.set_ylim(-0.6, max(1, len(sensors)) - 0.4)
@@ -228,7 +230,7 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     for name in detected.sensors:
         style = style_of(detected.sensors, name)
         _draw_detections(axes, style, detected, name, width_px / duration_s)
-        handles.append(Line2D([], [], **mark_of(style), label=plain(name)))
+        handles.append(Line2D([], [], **mark_of(style), label=figure_text(name, 16)))
     axes.set_ylim(0.0, top_km)
     axes.set_ylabel("true slant range [km]")
     axes.grid(color="#DDDDDD", linewidth=0.5)

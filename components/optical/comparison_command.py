@@ -21,6 +21,7 @@ from components.optical.comparison import (
     draw_comparison,
 )
 from components.optical.silhouette import visible_area
+from dsa_des.terminal import say, say_lines
 
 _AREAS = ("front_m2", "side_m2", "horizontal_m2")
 _MODELS = ("exact", "thesis", "convex_hull")
@@ -31,16 +32,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         comparisons = _compare(options)
-        print(comparison_table(comparisons))
+        say_lines(comparison_table(comparisons))
         out: Path = options.out
         out.mkdir(parents=True, exist_ok=True)
         _write_errors(comparisons, out / "errors.csv")
         _write_curves(comparisons, out / "curves.csv")
         draw_comparison(comparisons, out / "silhouettes.png", title=options.title or "")
     except (ImportError, OSError, ValueError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        say(f"error: {error}", err=True)
         return 2
-    print(f"\n{out}: errors.csv, curves.csv, silhouettes.png")
+    say()
+    say(f"{out}: errors.csv, curves.csv, silhouettes.png")
     return 0
 
 

@@ -1,6 +1,5 @@
 """``dsa-des reproduce``: make items, write figures and data, compare with the thesis."""
 
-import json
 import os
 import shutil
 import sys
@@ -8,14 +7,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-import click
-
 from components.thesis.document import markdown, short
 from components.thesis.files import write_csv, write_rows
 from components.thesis.made import Made
 from components.thesis.registry import ITEMS, Item, chosen
+from dsa_des import terminal
 from dsa_des.errors import BlockFailure, SceneError, UsageError
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.terminal import say, say_json
 
 Results = list[tuple[Item, Made]]
 
@@ -41,11 +40,11 @@ def reproduce_items(
         _write_page(Path(page), results, target)
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
     if as_json:
-        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        say_json(rows)
     else:
         _show(results, target)
     for failure in failures:
-        click.echo(f"error: {failure}", err=True)
+        say(f"error: {failure}", err=True)
     if failures:
         sys.exit(1)
 
@@ -109,10 +108,9 @@ def _replace(file: Path, folder: Path) -> None:
 
 
 def _show(results: Results, target: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if Console().is_terminal else 160)
+    console = terminal.console(160)
     shown = Table("item", "quantity", box=None, pad_edge=False)
     for name in ("printed", "ours", "difference"):
         shown.add_column(name, justify="right", no_wrap=True)
@@ -132,5 +130,6 @@ def _show(results: Results, target: Path) -> None:
     console.print(shown)
     statuses = [row.status.partition(",")[0] for _, made in results for row in made.rows]
     counts = ", ".join(f"{statuses.count(name)} {name}" for name in dict.fromkeys(statuses))
-    console.print(f"\n{len(statuses)} rows: {counts}", highlight=False)
+    console.print()
+    console.print(f"{len(statuses)} rows: {counts}", highlight=False)
     console.print(f"{target}: figures, data, rows.csv, thesis.md", highlight=False, soft_wrap=True)

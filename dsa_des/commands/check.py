@@ -1,9 +1,8 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
-import click
-
 from dsa_des.commands.loading import load
 from dsa_des.simulation import Simulation
+from dsa_des.terminal import say
 
 
 def check_scene_file(
@@ -17,14 +16,14 @@ def check_scene_file(
     loaded = load(scene, sets, swaps, seed, duration)
     simulation = Simulation(loaded)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
-    click.echo(
+    say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "
         f"{float(simulation.duration_s):g} s at {loaded.ticks_per_s:,} ticks per second."
     )
     for node in clocks:
         assert node.clock is not None
         spec = node.clock.spec
-        click.echo(
+        say(
             f"  {node.name}: {float(spec.rate_hz):g} Hz from {float(spec.offset_s):g} s, "
             f"a scan every {float(node.clock.period):,.10g} ticks"
         )

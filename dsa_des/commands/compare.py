@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
 from dsa_des.commands.study import finish, known_results, read_study_of, run_into, show_study
@@ -22,6 +21,7 @@ from dsa_des.studies.printing import short, times
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
+from dsa_des.terminal import console, say
 
 _MOST_SHOWN = 5
 
@@ -186,14 +186,15 @@ def _farthest_apart(
     both = [key for key in both if first[key] != second[key]][:_MOST_SHOWN]
     if not both:
         return
-    click.echo(f"\n{metric}: where {names[1]} differs most from {names[0]}")
+    say()
+    say(f"{metric}: where {names[1]} differs most from {names[0]}")
     runs = [dict(zip(side.keys, side.runs, strict=True)) for side in units]
     for key in both:
         where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
         change = f"{short(first[key])} -> {short(second[key])}"
-        click.echo(f"  {where}replica {key[-1]}: {change}")
+        say(f"  {where}replica {key[-1]}: {change}")
         for study, run in zip(studies, runs, strict=True):
-            click.echo(f"    {study.command(*run[key])}")
+            say(f"    {study.command(*run[key])}")
 
 
 def _compare(
@@ -210,7 +211,6 @@ def _compare(
             f"{names[0]} has the seed {one.study.seed} and {names[1]} {other.study.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    from rich.console import Console
     from rich.table import Table
 
     known = {result.name for result in other.results}
@@ -238,7 +238,7 @@ def _compare(
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
             _farthest_apart(metric, sides, names, (one.study, other.study))
-    Console(width=160).print(table)
+    console(160).print(table)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -247,4 +247,4 @@ def _compare(
         path = stem.with_name(f"{stem.name}-{metric}.png")
         x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
         draw_scatter(path, x, y, names, metric, "compared")
-        click.echo(f"wrote {path}")
+        say(f"wrote {path}")

@@ -1,13 +1,10 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
 import importlib
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import click
 
 from dsa_des.costs.front import parse_budgets
 from dsa_des.costs.output import draw_costs, print_costs, write_table
@@ -19,6 +16,7 @@ from dsa_des.ladder import Ladder, Unavailable
 from dsa_des.registry import UnknownType, find
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]
@@ -51,7 +49,7 @@ def cost_of_accuracy(
         raise UsageError("SCENE is missing: only --map needs none")
     variants = Variants(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in variants.dropped:
-        click.echo(f"note: the swap dropped {key}", err=True)
+        say(f"note: the swap dropped {key}", err=True)
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
     target = Path(out) if out else new_folder_name(Path("runs"), f"{variants.scene.path.stem}-cost")
@@ -84,15 +82,16 @@ def cost_of_accuracy(
             content["chain"] = chain
         write_json(folder / RUN_JSON, {"title": variants.scene.title, "cost": content})
     if as_json:
-        click.echo(json.dumps(rows + chain, indent=2, ensure_ascii=False))
+        say_json(rows + chain)
     else:
         print_costs(costs, chain, notes)
-        click.echo(f"\n{target}: {', '.join(sorted(path.name for path in target.iterdir()))}")
+        say()
+        say(f"{target}: {', '.join(sorted(path.name for path in target.iterdir()))}")
 
 
 def _say(text: str, silent: bool) -> None:
     if not silent and sys.stderr.isatty():
-        click.echo(text, err=True)
+        say(text, err=True)
 
 
 def ladders_to_climb(
@@ -161,7 +160,7 @@ def _draw_maps(name: str, out: str | None) -> None:
     with writing(target) as folder:
         paths = [Path(path).name for path in draw(folder)]
         write_json(folder / RUN_JSON, {"map": name, "files": paths})
-    click.echo(f"{target}: {', '.join(paths)}")
+    say(f"{target}: {', '.join(paths)}")
 
 
 def _map_functions() -> dict[str, str]:

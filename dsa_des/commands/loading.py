@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable
 
-import click
-
 from dsa_des.scene import Scene, load_scene
+from dsa_des.terminal import say
 
 
 def load(
@@ -17,5 +16,5 @@ def load(
     """Load and check a scene; parameters that a swap dropped are listed on standard error."""
     loaded = load_scene(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in loaded.dropped:
-        click.echo(f"note: the swap dropped {key}", err=True)
+        say(f"note: the swap dropped {key}", err=True)
     return loaded

@@ -1,7 +1,6 @@
 """``dsa-des run``: run a scene, record it, sum it up and draw it."""
 
 import hashlib
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -10,16 +9,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import click
-
-from dsa_des import __version__
+from dsa_des import __version__, terminal
 from dsa_des.commands.loading import load
 from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.recording import ObserverSink, Recorder
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.safe_text import shortened
 from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
+from dsa_des.terminal import say_json
 from dsa_des.toml_text import to_toml
 
 _VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
@@ -49,11 +48,9 @@ def run_scene(
         pacer=pacer,
     )
     if as_json:
-        click.echo(json.dumps(summary, indent=2))
+        say_json(summary)
     elif not quiet:
-        from rich.console import Console
-
-        console = Console()
+        console = terminal.console()
         for report in load_reports():
             report.show(console, summary)
         if pacer is not None:
@@ -169,15 +166,7 @@ def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[flo
     if silent or not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(simulation.scene.title, total=float(simulation.duration_s))
+    with terminal.progress("seconds") as bar:
+        title = shortened(simulation.scene.title)
+        task = bar.add_task(title, total=float(simulation.duration_s))
         yield lambda time_s: bar.update(task, completed=time_s)

@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import click
-
+from dsa_des import terminal
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.run_folder import new_folder_name
+from dsa_des.safe_text import shortened
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import StudyFolder, description
 from dsa_des.studies.output import Tables
@@ -17,6 +17,7 @@ from dsa_des.studies.printing import show
 from dsa_des.studies.runner import Clock, Stopped, results_of, run_study, why_one_by_one
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study, study_again
+from dsa_des.terminal import say
 
 _HOME = Path("studies")
 
@@ -75,7 +76,8 @@ def run_into(
             run_study(study, folder, executor, report)
     except Stopped as stop:
         again = f"dsa-des study {study.path} --resume --out {path}"
-        click.echo(f"stopped: {stop}; what is finished is kept, continue with\n  {again}", err=True)
+        say(f"stopped: {stop}; what is finished is kept, continue with", err=True)
+        say(f"  {again}", err=True)
         sys.exit(130 if str(stop) == "interrupted" else 1)
     finally:
         executor.close()
@@ -96,15 +98,13 @@ def finish(
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror}") from error
     if not quiet:
-        from rich.console import Console
-
-        console = Console() if sys.stdout.isatty() else Console(width=160)
-        show(console, tables, only)
+        show(terminal.console(160), tables, only)
         for path in figures:
-            click.echo(f"wrote {path}")
+            say(f"wrote {path}")
         if reason := why_one_by_one(study):
-            click.echo(f"replicas ran one by one where they cannot run in lock step: {reason}")
-        click.echo(f'\npandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
+            say(f"replicas ran one by one where they cannot run in lock step: {reason}")
+        say()
+        say(f'pandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
     return tables
 
 
@@ -157,12 +157,8 @@ def _progress(study: Study) -> Iterator[Any]:
     """Show a progress bar on a terminal, and a line now and then elsewhere."""
     clock = Clock()
     if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"))
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(study.title, total=None, text="")
+        with terminal.progress("text") as bar:
+            task = bar.add_task(shortened(study.title), total=None, text="")
 
             def update(progress: Any) -> None:
                 text = clock.text(progress)
@@ -179,20 +175,19 @@ def _progress(study: Study) -> Iterator[Any]:
         text = clock.text(progress)
         if time.monotonic() - last > 10:
             last = time.monotonic()
-            click.echo(text, err=True)
+            say(text, err=True)
 
     yield note
 
 
 def _list_metrics() -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from dsa_des.commands.components import parameter_rows
     from dsa_des.entry_points import registered
     from dsa_des.studies.metric import METRICS, find_metric
 
-    console = Console() if sys.stdout.isatty() else Console(width=120)
+    console = terminal.console(120)
     table = Table(box=None, pad_edge=False)
     for heading in ("metric", "reads", "keys", "what it is"):
         table.add_column(heading, no_wrap=heading == "metric")

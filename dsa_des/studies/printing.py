@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from dsa_des.safe_text import shortened
 from dsa_des.studies.output import Tables
 
 
@@ -22,7 +23,7 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     lines = tables.shown_lines(only)
     level = f"{100 * study.confidence:g} %"
     unit = "encounters" if study.over else "replicas"
-    table = Table(title=study.title, title_justify="left", box=None, pad_edge=False)
+    table = Table(title=shortened(study.title), title_justify="left", box=None, pad_edge=False)
     expected = any(line.expected is not None for line in lines)
     heads = [*tables.rows.axes, "result", "mean or share", f"{level} interval", unit, "without"]
     for heading in [*heads, *(["analytic"] if expected else [])]:
@@ -37,6 +38,7 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         table.add_row(*row)
     console.print(table)
     if tables.compared:
+        console.print()
         console.print(_difference_table(tables, {line.result.name for line in lines}))
     few = [line for line in lines if line.estimate.few and line.estimate.count]
     if few:
@@ -72,7 +74,7 @@ def _difference_table(tables: Tables, names: set[str]) -> Any:
 
     assert tables.study.baseline is not None
     axis, baseline = tables.study.baseline
-    title = f"\nless the same at {axis} = {short(baseline)}, pair by pair"
+    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     others = [name for name in tables.rows.axes if name != axis]
     for heading in (axis, *others, "result", "difference", "paired interval", "pairs",
@@ -105,4 +107,4 @@ def short(value: Any) -> str:
     """Return a value for a table: numbers to five digits."""
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
-    return str(value)
+    return shortened(value)
