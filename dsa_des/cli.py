@@ -81,6 +81,11 @@ def run(**options: Any) -> None:
 
 @main.command()
 @_scene_options
+@click.option(
+    "--no-import",
+    is_flag=True,
+    help="Import no module that SCENE names (module:Class, other packages' types); check the rest.",
+)
 @plain_errors
 def check(**options: Any) -> None:
     """Check SCENE without running it; report everything that is wrong at once."""

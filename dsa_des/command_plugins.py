@@ -25,7 +25,9 @@ class PluginGroup(click.Group):
         own = super().get_command(ctx, cmd_name)
         if own is not None or cmd_name not in registered(COMMANDS):
             return own
-        found: Any = registered(COMMANDS)[cmd_name].load()
+        from dsa_des.foreign import installed
+
+        found: Any = installed(registered(COMMANDS)[cmd_name])
         if not isinstance(found, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"

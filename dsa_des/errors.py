@@ -105,8 +105,17 @@ class BlockFailure(Exception):
         )
         super().__init__(block, path, time_s, scan, reason)
 
+    #: Exit code of a command that it ends.
+    exit_code = 1
+
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
         return printable(
             f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
         )
+
+
+class SetupFailure(BlockFailure):
+    """A block raised an exception before anything ran: the scene cannot be used."""
+
+    exit_code = 2

@@ -21,7 +21,7 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             sys.exit(2)
         except BlockFailure as error:
             say_lines(f"error: {error}", err=True)
-            sys.exit(1)
+            sys.exit(error.exit_code)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()
             sys.exit(1)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.entry_points import registered
+from dsa_des.foreign import installed
 from dsa_des.recording import Observer
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class Report(Protocol):
         """Return running summaries over the recorded rows of this run."""
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
-        """Print the summary on a ``rich.console.Console``."""
+        """Print the summary on a ``rich.console.Console`` that reads no markup."""
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
@@ -35,4 +36,4 @@ class Report(Protocol):
 
 def load_reports() -> list[Report]:
     """Return one instance of every registered report, in the order of their names."""
-    return [point.load()() for point in registered(REPORTS).values()]
+    return [installed(point)() for point in registered(REPORTS).values()]

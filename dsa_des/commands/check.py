@@ -1,6 +1,7 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
 from dsa_des.commands.loading import load
+from dsa_des.foreign import Foreign, Imports, imports
 from dsa_des.simulation import Simulation
 from dsa_des.terminal import say
 
@@ -11,10 +12,29 @@ def check_scene_file(
     swaps: tuple[str, ...],
     seed: int | None,
     duration: str | None,
+    no_import: bool,
 ) -> None:
-    """Load a scene, prepare its blocks (files are read), and say what was found."""
-    loaded = load(scene, sets, swaps, seed, duration)
-    simulation = Simulation(loaded)
+    """Load a scene, prepare its blocks (files are read), and say what was found.
+
+    Every foreign module is named, with its file, before it is imported: one that ends the process
+    (``os._exit``) has the last line. With `no_import` none is, and what depends on it stays
+    unchecked.
+    """
+
+    def announce(foreign: Foreign) -> None:
+        verb = "does not import" if no_import else "imports"
+        say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
+
+    with imports(Imports(allowed=not no_import, announce=announce)) as policy:
+        loaded = load(scene, sets, swaps, seed, duration)
+        if no_import and policy.seen:
+            say(
+                f"{scene}: nothing wrong as far as it was checked. {len(loaded.blocks)} blocks; "
+                "parameters, wires and clocks of the types above, and what needs the whole scene, "
+                "were not checked."
+            )
+            return
+        simulation = Simulation(loaded)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

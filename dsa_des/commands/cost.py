@@ -1,6 +1,5 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
-import importlib
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from dsa_des.costs.study import Compare, RungCost, applies, climb
 from dsa_des.costs.variants import Variants
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.foreign import NotImportable, load_named
 from dsa_des.ladder import Ladder, Unavailable
 from dsa_des.registry import UnknownType, find
 from dsa_des.reports import load_reports
@@ -151,10 +151,9 @@ def _draw_maps(name: str, out: str | None) -> None:
     functions = _map_functions()
     if name not in functions:
         raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")
-    module_name, _, function_name = functions[name].partition(":")
     try:
-        draw: Any = getattr(importlib.import_module(module_name), function_name)
-    except (ImportError, AttributeError) as error:
+        draw: Any = load_named(functions[name], "--map")
+    except NotImportable as error:
         raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
     target = Path(out) if out else new_folder_name(Path("runs"), f"map-{name}")
     with writing(target) as folder:

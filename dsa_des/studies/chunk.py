@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from dsa_des.errors import SceneError
 from dsa_des.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene import Scene
+from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, wanted_by
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.types import FloatArray
@@ -164,10 +165,11 @@ def _measured(
     for metric in metrics:
         try:
             found.update(metric.measure(group))
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             if len(runs) == 1:
-                what = f"metric {type(metric).__name__}: {type(error).__name__}: {error}"
-                return {}, {0: what}
+                return {}, {0: f"metric {type(metric).__name__}: {told(error)}"}
             return _one_by_one(scene, metrics, runs)
     return found, {}
 

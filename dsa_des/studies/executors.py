@@ -11,6 +11,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 from dsa_des.errors import UsageError
@@ -20,6 +21,7 @@ from dsa_des.studies.study import Chunk, Study
 #: How often a chunk may lose its worker before its runs are tried one by one.
 _PATIENCE = 2
 _CONNECT_TIMEOUT_S = 5
+_SAFE_PATH = "PYTHONSAFEPATH"
 
 
 class Executor(Protocol):
@@ -100,7 +102,8 @@ class Local:
     def _submit(self, study: Study, chunk: Chunk) -> "Future[Done]":
         if self._pool is None:
             self._pool = _new_pool(self.workers)
-        return self._pool.submit(run_chunk, study, chunk)
+        with not_from_here():
+            return self._pool.submit(run_chunk, study, chunk)
 
     def _renew(self) -> None:
         if self._pool is not None:
@@ -115,7 +118,9 @@ class Local:
             for number in range(start, end):
                 single = Chunk(chunk.name, ((cell, number, number + 1),))
                 try:
-                    parts.append(pool.submit(run_chunk, study, single).result())
+                    with not_from_here():
+                        future = pool.submit(run_chunk, study, single)
+                    parts.append(future.result())
                 except BrokenProcessPool:
                     pool.shutdown(wait=False)
                     pool = _new_pool(1)
@@ -145,6 +150,23 @@ def joined(name: str, parts: list[Done]) -> Done:
     pq.write_table(table.combine_chunks(), buffer, compression="zstd")
     failed = sum(part.failed for part in parts)
     return Done(name, buffer.getvalue(), table.num_rows, failed)
+
+
+@contextmanager
+def not_from_here() -> Iterator[None]:
+    """Let processes that are started meanwhile import nothing of the working directory.
+
+    Python puts it first on the module path of a process that it starts with ``-c``.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
 def _new_pool(workers: int) -> ProcessPoolExecutor:

@@ -19,6 +19,7 @@ from dsa_des.overrides import apply_swap, set_value
 from dsa_des.replicas import Replica
 from dsa_des.scene import Scene, check_scene
 from dsa_des.scene_file import SceneFile
+from dsa_des.strangers import Left, strangers_code
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -44,8 +45,12 @@ class MetricSpec:
         from dsa_des.studies.metric import check_tables
 
         cls = find_metric(self.name)
-        check_tables(cls, scene)
-        return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+        try:
+            with strangers_code(ValueError):
+                check_tables(cls, scene)
+                return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+        except Left as error:
+            raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
 
 
 @dataclass(frozen=True)
