@@ -10,9 +10,24 @@ from difflib import get_close_matches
 from typing import Any
 
 
+#: Problems that are listed in one error; the others are only counted.
+MOST_PROBLEMS = 20
+# What one problem shows of a value, a key and a message.
+_VALUE_LENGTH = 80
+_KEY_LENGTH = 200
+_LINE_LENGTH = 1000
+# Names longer or more than these are not compared: that takes longer than a user waits.
+_LONGEST_NAME = 100
+_MOST_NAMES = 2000
+
+
 def nearest(name: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed name closest to a misspelt one, or None when nothing is close."""
-    names = list(allowed)
+    if len(name) > _LONGEST_NAME:
+        return None
+    names = [candidate for candidate in allowed if len(candidate) <= _LONGEST_NAME]
+    if len(names) > _MOST_NAMES:
+        return None
     lower = {candidate.lower(): candidate for candidate in names}
     found = get_close_matches(name.lower(), list(lower), n=1, cutoff=0.6)
     return lower[found[0]] if found else None
@@ -26,8 +41,36 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
         return f"; did you mean {close!r}?"
     if not names:
         return ""
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    shown = ", ".join(shortened(name, _VALUE_LENGTH) for name in names[:12])
+    shown += ", ..." if len(names) > 12 else ""
     return f"; allowed: {shown}"
+
+
+def shortened(text: str, length: int = _LINE_LENGTH) -> str:
+    """Return a text of at most `length` characters; what is cut off is replaced by dots."""
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def shown_value(value: Any) -> str:
+    """Return how a value is shown in a message: as Python writes it, cut off where it is long."""
+    if isinstance(value, str):
+        # Cut before it is quoted: a long text is not copied.
+        return shortened(repr(str(value[: _VALUE_LENGTH + 1])), _VALUE_LENGTH)
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        left, right = "{}" if isinstance(value, dict) else "[]" if isinstance(value, list) else "()"
+        text = left
+        for item in value:
+            text += ", " if len(text) > 1 else ""
+            text += shown_value(item)
+            if isinstance(value, dict):
+                text += f": {shown_value(value[item])}"
+            if len(text) > _VALUE_LENGTH:
+                return shortened(text, _VALUE_LENGTH)
+        text += "," if isinstance(value, tuple) and len(value) == 1 else ""
+        return shortened(text + right, _VALUE_LENGTH)
+    return shortened(repr(value), _VALUE_LENGTH)
 
 
 _UNSET: Any = object()
@@ -55,15 +98,20 @@ class Problem:
     value: Any = _UNSET
 
     def __str__(self) -> str:
-        where = f"{self.source}: {self.key}" if self.key else self.source
+        where = shortened(self.source)
+        where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
-            shown = repr(self.value)
-            where += f" = {shown if len(shown) <= 80 else shown[:77] + '...'}"
-        return f"{where}: {self.message}"
+            where += f" = {shown_value(self.value)}"
+        # A file's own report has several lines.
+        lines = [shortened(line) for line in self.message.splitlines()[: 2 * MOST_PROBLEMS]]
+        return f"{where}: " + "\n".join(lines)
 
 
 class SceneError(Exception):
-    """A scene cannot be run; `problems` lists everything that is wrong with it."""
+    """A scene cannot be run; `problems` lists everything that is wrong with it.
+
+    As text, the first `MOST_PROBLEMS` of them and the number of all.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = list(problems)
@@ -73,7 +121,9 @@ class SceneError(Exception):
         if len(self.problems) == 1:
             return str(self.problems[0])
         lines = [f"{len(self.problems)} problems:"]
-        lines += [f"  {problem}" for problem in self.problems]
+        lines += [f"  {problem}" for problem in self.problems[:MOST_PROBLEMS]]
+        if len(self.problems) > MOST_PROBLEMS:
+            lines.append(f"  and {len(self.problems) - MOST_PROBLEMS} more")
         return "\n".join(lines)
 
 
