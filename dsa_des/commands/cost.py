@@ -84,7 +84,7 @@ def cost_of_accuracy(
             content["chain"] = chain
         write_json(folder / RUN_JSON, {"title": variants.scene.title, "cost": content})
     if as_json:
-        click.echo(json.dumps(rows + chain, indent=2, ensure_ascii=False))
+        click.echo(json_text(rows + chain, indent=2, ensure_ascii=False))
     else:
         print_costs(costs, chain, notes)
         click.echo(f"\n{target}: {', '.join(sorted(path.name for path in target.iterdir()))}")

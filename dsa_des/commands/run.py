@@ -1,7 +1,6 @@
 """``dsa-des run``: run a scene, record it, sum it up and draw it."""
 
 import hashlib
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ import click
 from dsa_des import __version__
 from dsa_des.commands.loading import load
 from dsa_des.pacing import Pacer, parse_factor
+from dsa_des.plain_json import json_text
 from dsa_des.recording import ObserverSink, Recorder
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
@@ -49,7 +49,7 @@ def run_scene(
         pacer=pacer,
     )
     if as_json:
-        click.echo(json.dumps(summary, indent=2))
+        click.echo(json_text(summary, indent=2))
     elif not quiet:
         from rich.console import Console
 

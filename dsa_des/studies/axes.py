@@ -10,7 +10,8 @@ from typing import Any
 
 from dsa_des.clock import parse_rational
 from dsa_des.component import as_written
-from dsa_des.errors import did_you_mean
+from dsa_des.errors import did_you_mean, shortened
+from dsa_des.input_files import is_folder, is_regular_file, resolve_home
 from dsa_des.scene import Scene
 
 SWAP = "swap."
@@ -109,7 +110,10 @@ def _label(value: Any) -> Any:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str) and _FRACTION.fullmatch(value):
-        return float(Fraction(value))
+        try:
+            return float(parse_rational(str(value)))
+        except ValueError:  # the scene says what is wrong with it
+            return str(value)
     return value if isinstance(value, int | float) else str(value)
 
 
@@ -137,18 +141,22 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
         raise ValueError('files must be a pattern such as "encounters/*.daa", or a list of names')
     found: list[Path] = []
     for item in patterns:
-        path = Path(item).expanduser()
+        path = resolve_home(item)
         folder = getattr(item, "folder", Path.cwd())
         base = path if path.is_absolute() else folder / path
         if any(sign in str(item) for sign in "*?["):
             start = Path(base.anchor) if base.is_absolute() else Path()
-            matches = sorted(start.glob(str(base.relative_to(base.anchor))))
+            try:
+                matches = sorted(start.glob(str(base.relative_to(base.anchor))))
+            except (OSError, NotImplementedError) as error:
+                raise ValueError(f"{shortened(str(base), 300)} cannot be searched for: "
+                                 f"{shortened(str(error), 100)}") from None  # fmt: skip
             if not matches:
                 raise ValueError(f"no file matches {base}")
             found += matches
-        elif base.is_dir():
+        elif is_folder(base):
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
-        elif base.is_file():
+        elif is_regular_file(base):
             found.append(base)
         else:
             raise ValueError(f"there is no file {base}")
