@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-
 #: Problems that are listed in one error; the others are only counted.
 MOST_PROBLEMS = 20
 # What one problem shows of a value, a key and a message.

@@ -30,6 +30,8 @@ _LONGEST_CHAIN = 32
 # Values taken from files, counted each time that a file is extended: files that extend the next
 # one twice would double them at every step.
 _MOST_VALUES = 2_000_000
+# What a file counts for, however short it is.
+_VALUES_PER_FILE = 20
 
 
 def dotted(key: Key) -> str:
@@ -95,7 +97,7 @@ class _Reader:
         self._taken = 0
 
     def file(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
-        self._count(path)
+        self._count(path, _VALUES_PER_FILE)
         if path not in self._read:
             self._read[path] = _tables_of(path)
         real, tables = self._read[path]
@@ -125,8 +127,8 @@ class _Reader:
             self.problems.append(Problem(str(path), "", message))
         return {}
 
-    def _count(self, path: Path) -> None:
-        self._taken += 1
+    def _count(self, path: Path, values: int = 1) -> None:
+        self._taken += values
         if self._taken > _MOST_VALUES:
             message = f"with all that it extends, has more than {_MOST_VALUES:,} values"
             raise SceneError([Problem(str(path), "", message)])

@@ -236,7 +236,9 @@ def _find_columns(
     area_name = next((name for name in AREA_COLUMNS if name in header), None)
     for name in ("az_deg", "el_deg"):
         if name not in header:
-            raise ValueError(f"{path} has the columns {shortened(', '.join(header), 200)}: {name} is missing")
+            raise ValueError(
+                f"{path} has the columns {shortened(', '.join(header), 200)}: {name} is missing"
+            )
     if area_name is None:
         raise ValueError(
             f"{path} has the columns {shortened(', '.join(header), 200)}: an area is missing "

@@ -1,7 +1,6 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
 import importlib
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from dsa_des.costs.variants import Variants
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.ladder import Ladder, Unavailable
+from dsa_des.plain_json import json_text
 from dsa_des.registry import UnknownType, find
 from dsa_des.reports import load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing

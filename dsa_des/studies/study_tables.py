@@ -8,15 +8,14 @@ from dsa_des.component import SourcedText
 from dsa_des.input_files import InputFileError, is_regular_file, resolve_home
 from dsa_des.studies.draws import KINDS
 
-#: What holds no paths: texts for people, and tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
+#: What holds no paths: texts for people, and tables that name axes and results;
+#: ``wires[4].drop_probability`` is no pattern of files there.
 _NO_PATHS = ("title", "description", "figures", "compare", "over", "stop_when")
 
 
 def resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) -> dict[str, Any]:
     """Return a study's tables with absolute paths, and further swap axes."""
-    tables = {
-        key: value if key in _NO_PATHS else _absolute(value) for key, value in data.items()
-    }
+    tables = {key: value if key in _NO_PATHS else _absolute(value) for key, value in data.items()}
     for block, types in swaps:
         tables.setdefault("axes", {})[f"swap.{block}"] = types
     return tables
