@@ -10,8 +10,7 @@ from typing import Any
 
 from dsa_des.clock import parse_rational
 from dsa_des.component import as_written
-from dsa_des.errors import did_you_mean, shortened
-from dsa_des.input_files import is_folder, is_regular_file, resolve_home
+from dsa_des.errors import did_you_mean
 from dsa_des.scene import Scene
 
 SWAP = "swap."
@@ -110,10 +109,7 @@ def _label(value: Any) -> Any:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str) and _FRACTION.fullmatch(value):
-        try:
-            return float(parse_rational(str(value)))
-        except ValueError:  # the scene says what is wrong with it
-            return str(value)
+        return float(Fraction(value))
     return value if isinstance(value, int | float) else str(value)
 
 
@@ -141,22 +137,18 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
         raise ValueError('files must be a pattern such as "encounters/*.daa", or a list of names')
     found: list[Path] = []
     for item in patterns:
-        path = resolve_home(item)
+        path = Path(item).expanduser()
         folder = getattr(item, "folder", Path.cwd())
         base = path if path.is_absolute() else folder / path
         if any(sign in str(item) for sign in "*?["):
             start = Path(base.anchor) if base.is_absolute() else Path()
-            try:
-                matches = sorted(start.glob(str(base.relative_to(base.anchor))))
-            except (OSError, NotImplementedError) as error:
-                raise ValueError(f"{shortened(str(base), 300)} cannot be searched for: "
-                                 f"{shortened(str(error), 100)}") from None  # fmt: skip
+            matches = sorted(start.glob(str(base.relative_to(base.anchor))))
             if not matches:
                 raise ValueError(f"no file matches {base}")
             found += matches
-        elif is_folder(base):
+        elif base.is_dir():
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
-        elif is_regular_file(base):
+        elif base.is_file():
             found.append(base)
         else:
             raise ValueError(f"there is no file {base}")

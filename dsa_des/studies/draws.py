@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.limits import refuse_extremes
 from dsa_des.randomness import key_of
 from dsa_des.types import IntArray
 
@@ -119,7 +118,7 @@ def parse_draw(key: str, table: Any) -> Draw:
         if not values:
             raise ValueError("choice is empty: give at least one value")
         return Draw(key, kind, tuple(values))
-    low, high = _two_numbers(key, kind, values)
+    low, high = _two_numbers(kind, values)
     if kind == "normal":
         if high < 0:
             raise ValueError(f"normal: the standard deviation is {high}: it must be 0 or more")
@@ -129,12 +128,11 @@ def parse_draw(key: str, table: Any) -> Draw:
     return Draw(key, "uniform", (low, high), stratified=kind == "latin_hypercube")
 
 
-def _two_numbers(key: str, kind: str, values: Any) -> tuple[float, float]:
+def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
     if len(values) != 2 or any(
         isinstance(value, bool) or not isinstance(value, int | float) for value in values
     ):
         raise ValueError(f"{kind} takes two numbers")
     if not all(map(math.isfinite, values)):
         raise ValueError(f"{kind} = {values}: must be finite")
-    refuse_extremes(key, values)
     return float(values[0]), float(values[1])

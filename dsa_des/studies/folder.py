@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from dsa_des import __version__
 from dsa_des.errors import UsageError
-from dsa_des.input_files import InputFileError, NoSuchFile, read_input_text
 from dsa_des.studies.draws import as_text
 from dsa_des.studies.study import Study
 
@@ -76,16 +75,14 @@ class StudyFolder:
             If the folder is not a study.
         """
         try:
-            text = read_input_text(self.path / STUDY_JSON)
-        except NoSuchFile:
+            text = (self.path / STUDY_JSON).read_text(encoding="utf-8")
+        except OSError:
             raise UsageError(
                 f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}"
             ) from None
-        except InputFileError as error:
-            raise UsageError(f"{self.path / STUDY_JSON}: {error}") from None
         try:
             content: Any = json.loads(text)
-        except (ValueError, RecursionError):
+        except ValueError:
             content = None
         needed = {"study", "scene", "study_sha256", "tables"}
         if not isinstance(content, dict) or not needed <= set(content):

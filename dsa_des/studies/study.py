@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.errors import Problem
-from dsa_des.input_files import is_regular_file
 from dsa_des.overrides import apply_swap, set_value
 from dsa_des.replicas import Replica
 from dsa_des.scene import Scene, check_scene
@@ -194,7 +193,7 @@ class Study:
 def set_text(value: Any) -> str:
     """Return a value the way ``--set`` takes it; a path of the study's own as it was found."""
     folder = getattr(value, "folder", None)
-    if folder is not None and is_regular_file(folder / value):
+    if folder is not None and (folder / value).is_file():
         return str(folder / value)
     if isinstance(value, list | dict):
         from dsa_des.toml_text import inline

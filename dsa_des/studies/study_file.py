@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from dsa_des.component import SourcedText
 from dsa_des.entry_points import registered
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.input_files import InputFileError, resolve_home
 from dsa_des.overrides import apply_set
 from dsa_des.parameter_errors import explain
 from dsa_des.scene import Scene
@@ -179,11 +178,7 @@ class _Reader:
         if not isinstance(name, str):
             self.add(("scene",), "is required: the TOML file of the scene that is studied")
             return None, None
-        try:
-            path = resolve_home(str(name))
-        except InputFileError as error:
-            self.add(("scene",), str(error), str(name))
-            return None, None
+        path = Path(str(name)).expanduser()
         if not path.is_absolute():
             path = getattr(name, "folder", Path()) / path
         try:
