@@ -132,7 +132,10 @@ def file_case(rng: random.Random, case: Case) -> Case:
                 "front_m2": 1, "side_m2": 2, "horizontal_m2": 3, "silhouette_table": "area.csv"
             }  # fmt: skip
             blocks["eo"]["silhouette"] = "aspect_table"
-        traffic = {"type": "traffic.scripted", "ownship": {"lat_deg": 5, "lon_deg": 4, "alt_m": 900}}
+        traffic = {
+            "type": "traffic.scripted",
+            "ownship": {"lat_deg": 5, "lon_deg": 4, "alt_m": 900},
+        }
         blocks["traffic"] = {**traffic, "intruders": [craft]}
     else:
         return _comparison(rng, case)

@@ -26,8 +26,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 _LONGEST_MESSAGE = 30_000
 
 
-def judge(case: Case, limit_s: float = LIMIT_S) -> list[str]:
-    """Run a case and return what is wrong with how it ended; an empty list if nothing is."""
+def judge(case: Case, limit_s: float = LIMIT_S) -> tuple[int | None, list[str]]:
+    """Run a case; return its exit code, and what is wrong with how it ended: nothing, mostly."""
     home = Path(tempfile.mkdtemp(prefix="fuzz-"))
     try:
         work = home / "work"
@@ -38,7 +38,7 @@ def judge(case: Case, limit_s: float = LIMIT_S) -> list[str]:
         out = (home / "out").read_text(errors="surrogateescape")
         error = (home / "err").read_text(errors="surrogateescape")
         left = {path.name for path in work.iterdir()} - before - {"__pycache__", "runs", "studies"}
-        return _faults(case, code, out, error, left)
+        return code, _faults(case, code, out, error, left)
     finally:
         shutil.rmtree(home, ignore_errors=True)
 
@@ -166,7 +166,9 @@ def _simulate(argv: list[str]) -> None:
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
         recorder = Recorder([MemorySink()])
         simulation = Simulation(loaded, recorder=recorder)
-        observers = ObserverSink(o for report in load_reports() for o in report.observers(simulation))
+        observers = ObserverSink(
+            o for report in load_reports() for o in report.observers(simulation)
+        )
         recorder.sinks.append(observers)
         outcome = simulation.run()
         click.echo(len(json_text({**observers.result(), **outcome.report})))

@@ -5,6 +5,7 @@ import random
 import tomllib
 import typing
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import fuzz_values
@@ -12,6 +13,9 @@ from fuzz_cases import Case
 
 from dsa_des.component import Parameters
 from dsa_des.entry_points import registered
+from dsa_des.errors import SceneError
+from dsa_des.scene import check_scene
+from dsa_des.scene_file import SceneFile
 from dsa_des.sections import section_models
 from dsa_des.toml_text import to_toml
 
@@ -74,21 +78,22 @@ alt_m = 1100
 heading_deg = 270
 speed_mps = 110
 legs = [{ kind = "straight", duration_s = 1 }, { kind = "turn", rate_deg_s = -2, angle_deg = 40 },
-  { kind = "climb", climb_mps = 3 }, { kind = "waypoints", points = [{ east_m = 0, north_m = 9 }]}]
+  { kind = "climb", climb_mps = 3, duration_s = 1 }, { kind = "waypoints", points = [{ east_m = 0, north_m = 9 }]}]
 """
 
 ADDITIONS = (
     '[weather]\ngas = true\nrain_rate_mm_h = 5\nfog_water_g_m3 = 0.05',
     '[navigation]\nposition_noise_m = [5, 5, 9]\nattitude_noise_deg = [0.5, 0.2, 0.2]',
-    '[terrain]\nheight_m = 20',
+    '[terrain]\nheight_m = 20\n[blocks.radar]\nazimuth_resolution_deg = 2\nelevation_resolution_deg = 2\nrange_resolution_m = 100',
     '[accuracy]\ndetection_probability = 0.05\nangle_deg = 0.5',
-    '[blocks.radar]\nclutter = true\nbeam_sweep = true\nfalse_alarms = true\nrange_resolution_m = 150',
+    '[blocks.radar]\nbeam_sweep = true\nfalse_alarms = true\nrange_resolution_m = 150\n'
+    'azimuth_resolution_deg = 3\nelevation_resolution_deg = 3\nfluctuation = "sampled"',
     '[blocks.eo]\nfalse_alarms_per_frame = 0.1\nbackground = "sky"',
     '[processors.cpu]\nservice_s = 0.01\nservice_spread_s = 0.01\n[blocks.eo]\nprocessor = "cpu"',
     '[blocks.radar]\nlatency_s = 0.05',
     '[blocks.radar]\ndeclare_m = 2\ndeclare_n = 3\njitter_s = 0.01',
     '[blocks.radar]\ntype = "radar.threshold"\nthreshold_db = 12',
-    '[blocks.radar]\ncalibrate = { rcs_dbsm = 3, range_km = 10, pd = 0.9, swerling = 1 }\npower_w = 1',
+    '[blocks.radar]\npulses = 4\ncalibrate = { rcs_dbsm = 3, range_km = 10, pd = 0.9, swerling = 1 }',
     '[blocks.transform]\ntype = "geometry.flat_earth"',
     '[blocks.transform]\ntype = "geometry.geodesic"',
     '[blocks.fusion]\ntype = "fusion.gated"\ntime_gate_s = 0.1\nangle_gate_deg = 2',
@@ -108,6 +113,8 @@ def base_scene(rng: random.Random) -> dict[str, Any]:
     scene = tomllib.loads(BASE)
     for addition in rng.sample(ADDITIONS, rng.choice((0, 0, 1, 2, 4))):
         _merge(scene, tomllib.loads(addition))
+    if "calibrate" in scene["blocks"]["radar"]:
+        del scene["blocks"]["radar"]["bandwidth_hz"]
     if rng.random() < 0.15:
         scene["blocks"]["traffic"] = copy.deepcopy(RANDOM_TRAFFIC)
     if rng.random() < 0.15:
@@ -215,6 +222,21 @@ def mutate(rng: random.Random, scene: dict[str, Any]) -> None:
             scene["wires"].append(wire)
 
 
+def allowed_extremes(rng: random.Random, scene: dict[str, Any]) -> dict[str, Any]:
+    """Return a scene with one to three odd values that its models allow: it has to run."""
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        for _ in range(12):
+            changed = copy.deepcopy(scene)
+            set_parameter(rng, changed, fuzz_values.number(rng))
+            try:
+                check_scene(SceneFile(Path("scene.toml"), changed))
+            except SceneError:
+                continue
+            scene = changed
+            break
+    return scene
+
+
 def scene_text(rng: random.Random, scene: dict[str, Any]) -> bytes:
     """Return a scene as the bytes of a file; sometimes they are damaged."""
     data = to_toml(scene).encode("utf-8", "surrogatepass")
@@ -294,6 +316,10 @@ def extending(rng: random.Random, case: Case) -> None:
 def scene_case(rng: random.Random, case: Case) -> Case:
     """Return a scene that is checked, simulated, or run with everything that belongs to it."""
     scene = base_scene(rng)
+    if rng.random() < 0.5:
+        case.files["scene.toml"] = to_toml(allowed_extremes(rng, scene)).encode()
+        case.argv = command(rng, "scene.toml")
+        return case
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         if isinstance(scene.get("blocks"), dict) and scene["blocks"]:
             try:

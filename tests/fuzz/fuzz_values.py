@@ -38,10 +38,14 @@ RAW = (
 def number(rng: random.Random) -> Any:
     """Return a number: one of the list, a small change of it, or one of any size."""
     kind = rng.random()
-    if kind < 0.6:
+    if kind < 0.3:
         return rng.choice(NUMBERS)
-    if kind < 0.8:
-        return rng.choice((-1, 1)) * 10 ** rng.uniform(-12, 12)
+    if kind < 0.5:
+        return rng.choice((1, 1, -1)) * 10.0 ** rng.randint(-30, 30)
+    if kind < 0.7:
+        return rng.choice((1, 1, 1, -1)) * 10 ** rng.uniform(-6, 6)
+    if kind < 0.9:
+        return plausible(rng)
     return rng.choice((-1, 1)) * 10 ** rng.uniform(-310, 308)
 
 

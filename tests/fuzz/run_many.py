@@ -19,12 +19,19 @@ sys.path.insert(0, str(Path(__file__).parent))
 from fuzz_cases import KINDS, make_case
 from fuzz_judge import LIMIT_S, import_everything, judge
 
+Result = tuple[str, int | None, list[str], float]
 
-def one(kind: str, seed: int, number: int, limit_s: float) -> tuple[str, list[str], float]:
-    """Return a case's name, what is wrong with it, and how long it took, s."""
+
+def one(kind: str, seed: int, number: int, limit_s: float) -> Result:
+    """Return a case's name, its exit code, what is wrong with it, and how long it took, s."""
     started = time.monotonic()
     case = make_case(kind, seed, number)
-    return case.name, judge(case, limit_s), time.monotonic() - started
+    return case.name, *judge(case, limit_s), time.monotonic() - started
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of a case from its name."""
+    return name.split("-", 1)[0]
 
 
 def keep(name: str, faults: list[str], folder: Path) -> None:
@@ -63,8 +70,9 @@ def main() -> int:
     slowest = (0.0, "")
     with ProcessPoolExecutor(options.workers, mp_context=context) as pool:
         jobs = ((kinds[n % len(kinds)], options.seed, n, options.limit) for n in numbers)
-        for name, faults, took_s in pool.map(one, *zip(*jobs, strict=True), chunksize=4):
+        for name, code, faults, took_s in pool.map(one, *zip(*jobs, strict=True), chunksize=4):
             totals["cases"] += 1
+            totals[f"{kind_of(name)} exit {code}"] += 1
             slowest = max(slowest, (took_s, name))
             if faults:
                 totals["faults"] += 1
@@ -72,7 +80,7 @@ def main() -> int:
                 for fault in faults:
                     totals[fault.split(":")[0]] += 1
                     print(f"{name}: {fault}", flush=True)
-    print(", ".join(f"{what}: {count}" for what, count in totals.items()))
+    print(", ".join(f"{what}: {count}" for what, count in sorted(totals.items())))
     print(f"slowest: {slowest[1]}, {slowest[0]:.1f} s")
     return 1 if totals["faults"] else 0
 
