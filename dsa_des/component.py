@@ -11,11 +11,21 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
 
 from dsa_des.clock import ClockSpec, parse_rational
 from dsa_des.effects import Effect
+from dsa_des.input_files import resolve_home
 from dsa_des.ladder import Ladder
+from dsa_des.limits import refuse_extremes
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.randomness import Stream, Streams
@@ -54,7 +64,7 @@ class SourcedText(str):
 def _resolve_path(value: object) -> Path:
     if not isinstance(value, str | Path) or not str(value):
         raise ValueError("must be a path, as text")
-    path = Path(str(value)).expanduser()
+    path = resolve_home(str(value))
     if isinstance(value, SourcedText) and not path.is_absolute():
         path = value.folder / path
     return path
@@ -68,6 +78,13 @@ class Parameters(BaseModel):
     """Parameters of a block: every field has its unit in its name, bounds and a description."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _computable(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse numbers that no physics can compute with (`dsa_des.limits`)."""
+        refuse_extremes(info.field_name or "", value)
+        return value
 
 
 class ClockedParameters(Parameters):

@@ -238,7 +238,7 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     )
     graph = build_graph(list(classes), wires)
     check_graph(scene_file, graph, classes, problems, unsure)
-    ticks_per_s = check_times(scene_file, blocks, wires, duration, problems)
+    ticks_per_s = check_times(scene_file, blocks, wires, duration, problems, processors)
     if not unsure:
         check_activity(scene_file, blocks, wires, problems)
     if problems:

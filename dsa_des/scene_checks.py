@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 from dsa_des.clock import MAX_TICK, ClockSpec, resolution
 from dsa_des.errors import Problem
+from dsa_des.safe_text import shortened
 from dsa_des.scene_file import Key, SceneFile
 from dsa_des.strangers import Left, strangers_code
 from dsa_des.wiring import Wire
 
 if TYPE_CHECKING:
+    from dsa_des.processors import ProcessorParameters
     from dsa_des.scene import Block
 
 # Assumed where a scene leaves its length to its sources.
@@ -49,6 +51,7 @@ def check_times(
     wires: Sequence[Wire],
     duration_s: Fraction | None,
     problems: list[Problem],
+    processors: "Mapping[str, ProcessorParameters] | None" = None,
 ) -> int:
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
     clocks = _clocks(scene, blocks, problems)
@@ -59,7 +62,10 @@ def check_times(
     ticks_per_s = resolution(times)
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
-        shown = (f"{name} {spec.rate_hz} Hz + {spec.offset_s} s" for name, spec in clocks.items())
+        shown = (
+            shortened(f"{name} {spec.rate_hz} Hz + {spec.offset_s} s", 100)
+            for name, spec in clocks.items()
+        )
         message = (
             "these clocks have no common tick that fits 64 bits for the whole run: "
             f"{', '.join(shown)}; give offsets to fewer digits or rates as simpler fractions"
@@ -73,6 +79,11 @@ def check_times(
     for wire in late:
         if wire.total_delay_s + wire.jitter_s >= longest_s:
             problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
+    for name, processor in (processors or {}).items():
+        for what in ("service_s", "service_spread_s"):
+            if (time_s := getattr(processor, what)) >= longest_s:
+                key: Key = ("processors", name, what)
+                problems.append(scene.problem(key, limit, str(time_s)))
     for name, spec in clocks.items():
         _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)
     return ticks_per_s

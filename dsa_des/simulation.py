@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dsa_des.clock import ScanClock
+from dsa_des.clock import MAX_TICK, ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
-from dsa_des.connections import connect
+from dsa_des.connections import check_reach, connect
 from dsa_des.effects import Planned, plan, unspent
 from dsa_des.errors import BlockFailure, Problem, SceneError, SetupFailure
 from dsa_des.graph import depths, window_order
@@ -38,6 +38,9 @@ from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
+# What a block raises, before anything runs, because of what its table says: nothing it can be
+# made of, or nothing that can be computed or held in memory.
+_REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 
 
 @dataclass
@@ -141,6 +144,7 @@ class Simulation:
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
         connect(scene, self.nodes, self.replicas)
+        check_reach(scene, self.nodes, self.end_tick)
         self.window_ticks = self._window_length(window)
 
     #: Whether a failure inside a window is traced to its instant by running the scene again.
@@ -181,8 +185,8 @@ class Simulation:
             yield
         except (SceneError, BlockFailure):
             raise
-        except (ValueError, OSError) as error:
-            problems.append(self._problem(f"blocks.{name}", error))
+        except _REFUSALS as error:
+            problems.append(self._problem(f"blocks.{name}", reason_of(error)))
         except BaseException as error:
             if is_ours_to_obey(error):
                 raise
@@ -210,7 +214,11 @@ class Simulation:
         if not known:
             message = "is required: no block of this scene has a length of its own"
             raise SceneError([self._problem("duration_s", message)])
-        return max(known)
+        longest = max(known)
+        if longest * self.ticks_per_s >= MAX_TICK:
+            message = f"is {float(longest):.4g} s by the data of its blocks: give a shorter one"
+            raise SceneError([self._problem("duration_s", message)])
+        return longest
 
     def _offer_down_the_chain(self) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
@@ -425,6 +433,15 @@ class Simulation:
         self.failure = (failure, error)
         if not self._rewinds:
             raise Abort
+
+
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, with its kind where its text alone says little."""
+    if isinstance(error, ArithmeticError):
+        return f"its numbers are too large or too small to be computed with ({error})"
+    if isinstance(error, MemoryError):
+        return f"needs more memory than there is ({error})" if str(error) else "needs more memory"
+    return str(error)
 
 
 def _failure(

@@ -4,12 +4,12 @@ No other file prints, echoes, makes a console or writes to the standard streams;
 that. Rich is imported only when it is asked for.
 """
 
-import json
 import sys
 from typing import Any
 
 import click
 
+from dsa_des.plain_json import json_text
 from dsa_des.safe_text import printable
 
 
@@ -31,8 +31,8 @@ def say_lines(text: str, *, err: bool = False) -> None:
 
 
 def say_json(value: Any) -> None:
-    """Print a value as JSON; all that is not ASCII is an escape."""
-    _put(json.dumps(value, indent=2, ensure_ascii=True), False)
+    """Print a value as JSON; all that is not ASCII is an escape, numbers that are none are null."""
+    _put(json_text(value, indent=2, ensure_ascii=True), False)
 
 
 def _put(text: str, err: bool) -> None:

@@ -7,7 +7,6 @@ maximum error of each half turn as in Table 4.3, and a figure of three panels as
 import argparse
 import csv
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,9 @@ from components.optical.comparison import (
     draw_comparison,
 )
 from components.optical.silhouette import visible_area
+from dsa_des.input_files import LARGEST_TOML_BYTES, read_input_text
 from dsa_des.terminal import say, say_lines
+from dsa_des.toml_input import parse_toml
 
 _AREAS = ("front_m2", "side_m2", "horizontal_m2")
 _MODELS = ("exact", "thesis", "convex_hull")
@@ -119,11 +120,15 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
                 f"--areas is {options.areas!r}: it must be three numbers, FRONT,SIDE,HORIZONTAL"
             )
         return dict(zip(_AREAS, values, strict=True))
-    with open(options.aircraft, "rb") as file:
-        table = tomllib.load(file).get("eo", {})
+    try:
+        table = parse_toml(read_input_text(options.aircraft, LARGEST_TOML_BYTES)).get("eo")
+    except ValueError as error:
+        raise ValueError(f"--aircraft {options.aircraft}: {error}") from None
     for name in _AREAS:
-        if name not in table:
-            raise ValueError(f"{options.aircraft} has no eo.{name}: --aircraft needs it")
+        value = table.get(name) if isinstance(table, dict) else None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"{options.aircraft} has no number eo.{name}: --aircraft needs it")
+    assert isinstance(table, dict)
     return {name: float(table[name]) for name in _AREAS}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from components.checks import FloatArray, finite
 from components.optical.aspect_table import AspectTable
+from dsa_des.input_files import InputFileError, status_of
+from dsa_des.safe_text import shortened
 
 DEFAULT_ROWS = 1024
 
@@ -189,8 +192,18 @@ def load_mesh(
         raise ImportError(
             "reading a mesh needs the library trimesh: pip install 'dsa-des[mesh]'"
         ) from error
-    loaded: Any = trimesh.load(str(path), force="mesh")
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)
+    try:
+        status_of(Path(path))
+        loaded: Any = trimesh.load(str(path), force="mesh")
+        loaded.merge_vertices(merge_tex=True, merge_norm=True)
+        if len(loaded.faces) == 0:
+            raise ValueError("it holds no triangles")
+    except InputFileError as error:
+        raise ValueError(f"{path} {error}") from None
+    # A reader of a dozen formats says "this is no mesh" with a dozen kinds of exceptions.
+    except Exception as error:
+        reason = shortened(" ".join(str(error).split()), 200) or type(error).__name__
+        raise ValueError(f"{path} is not a mesh that can be read: {reason}") from None
     vertices = np.empty((len(loaded.vertices), 3))
     for column, letter in enumerate(axes):
         axis, sign = _AXES[letter]

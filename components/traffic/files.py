@@ -102,7 +102,7 @@ class DaaFile(RecordedTraffic):
         reference = (self.p.reference_lat_deg, self.p.reference_lon_deg, self.p.reference_alt_m)
         try:
             state = self.p.file.stat()
-        except OSError:  # the reader says what is wrong with it
+        except (OSError, ValueError):  # the reader says what is wrong with it
             return _read_daa(self.p.file, None, reference)
         return _read_daa(self.p.file, (state.st_mtime_ns, state.st_size), reference)
 

@@ -35,7 +35,10 @@ class RandomTrafficParameters(SourceParameters):
     speed_max_mps: float = Field(default=120.0, ge=0, description="Fastest ground speed, m/s.")
     aircraft: Aircraft = Field(default=Aircraft(), description="What all of them are.")
     sample_interval_s: float = Field(
-        default=1.0, gt=0, description="Spacing of the samples at which closest approach is sought."
+        default=1.0,
+        ge=0.001,
+        le=86400,
+        description="Spacing of the samples at which closest approach is sought, s.",
     )
 
     @model_validator(mode="after")

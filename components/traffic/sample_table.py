@@ -46,6 +46,10 @@ _LIMITS = {
     "sy": (-4e6, 4e6, "lie within ±4,000 km"),
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
+# A file in which nobody is seen for longer than this has a wrong time in it: a run over it would
+# simulate the years in between.
+_LONGEST_SILENCE_S = 86400.0
+
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
 
@@ -163,6 +167,7 @@ class SampleTable:
                 f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
         samples = {name: self._sorted(name, rows) for name, rows in self._aircraft.items()}
+        self._refuse_long_silence()
         self._problems.raise_if_any()
         start = min(float(columns["time"][0]) for columns in samples.values())
         made = {}
@@ -228,6 +233,27 @@ class SampleTable:
                 column=header,
             )
         return {key: values[order] for key, values in columns.items()}
+
+    def _refuse_long_silence(self) -> None:
+        """Note times after which the whole file falls silent for more than a day."""
+        seen = [
+            (time_s, line)
+            for rows in self._aircraft.values()
+            for time_s, line in zip(rows.values.get("time", ()), rows.lines, strict=True)
+        ]
+        if not seen:
+            return
+        seen.sort()
+        times = np.array([time_s for time_s, _ in seen])
+        for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):
+            (before_s, line_before), (after_s, line) = seen[i], seen[i + 1]
+            self._problems.add(
+                f"the time is {after_s:.15g} s, and the one before it, in line {line_before}, is "
+                f"{before_s:.15g} s: the file may not be without a sample for more than "
+                f"{_LONGEST_SILENCE_S:g} s",
+                line=line,
+                column=self._columns["time"].header,
+            )
 
     def _trajectory(self, name: str, columns: dict[str, FloatArray]) -> SampledTrajectory:
         velocity = None

@@ -125,7 +125,10 @@ class ScriptedParameters(SourceParameters):
     ownship: Ownship = Field(description="The ownship.")
     intruders: list[Intruder] = Field(default=[], description="Any number of intruders.")
     sample_interval_s: float = Field(
-        default=0.1, gt=0, description="Spacing of the samples at which closest approach is sought."
+        default=0.1,
+        ge=0.001,
+        le=86400,
+        description="Spacing of the samples at which closest approach is sought, s.",
     )
 
 
