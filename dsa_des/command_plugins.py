@@ -9,12 +9,34 @@ from typing import Any
 import click
 
 from dsa_des.entry_points import registered
+from dsa_des.interruption import plain_ending
+from dsa_des.plain_errors import plain_output
 
 COMMANDS = "dsa_des.commands"
 
 
 class PluginGroup(click.Group):
-    """A command group whose registered commands are loaded when they are named or listed."""
+    """A command group whose registered commands are loaded when they are named or listed.
+
+    Whatever it runs ends in one line: also when a signal interrupts it (exit code 130 for ctrl-C,
+    143 for SIGTERM) and when its output cannot be written (1).
+    """
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a command and end the program."""
+        with plain_ending(), plain_output():
+            return super().main(*args, **kwargs)
+
+    # click turns KeyboardInterrupt into exit code 1 outside of these two.
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Read the command line."""
+        with plain_ending():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that the command line names."""
+        with plain_ending():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return our own commands and the registered ones, sorted."""

@@ -1,10 +1,13 @@
 """Figures without a window system, the same bytes on every drawing."""
 
+import io
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from dsa_des.output_file import write_file
 
 DPI = 110
 
@@ -13,7 +16,8 @@ DPI = 110
 def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
     """Give an empty figure and write it as PNG when the block is done.
 
-    Neither the user's matplotlibrc nor the date goes into it.
+    The file is there as a whole or not at all. Neither the user's matplotlibrc nor the date goes
+    into it.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -38,6 +42,6 @@ def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
         with warnings.catch_warnings():
             # Names may hold letters that the font lacks; they are drawn as boxes.
             warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            canvas.print_png(
-                str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
-            )
+            content = io.BytesIO()
+            canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
+        write_file(path, content.getvalue())

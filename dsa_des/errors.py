@@ -100,3 +100,7 @@ class BlockFailure(Exception):
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
         return f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+
+
+class OutputError(Exception):
+    """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

@@ -1,5 +1,6 @@
 """``dsa-des graph``: the blocks and wires of a scene as text, DOT or a picture."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,8 +9,10 @@ import click
 import networkx as nx
 
 from dsa_des.commands.loading import load
-from dsa_des.errors import UsageError
+from dsa_des.errors import OutputError, UsageError
 from dsa_des.graph import depths
+from dsa_des.output_file import check_file, write_file
+from dsa_des.output_names import named
 from dsa_des.scene import Scene
 from dsa_des.wiring import Wire
 
@@ -31,7 +34,8 @@ def show_graph(
     if dot:
         click.echo(to_dot(loaded))
     elif png:
-        path = Path(out) if out else Path(f"{loaded.path.stem}-graph.png")
+        path = Path(f"{loaded.path.stem}-graph.png") if out is None else named(out)
+        check_file(path)
         draw_graph(loaded, path)
         click.echo(f"wrote {path}")
     else:
@@ -114,10 +118,12 @@ def draw_graph(scene: Scene, path: Path) -> None:
         )  # fmt: skip
     for wire in _wires(scene):
         _draw_wire(axes, wire, place, boxes)
+    content = io.BytesIO()
+    figure.savefig(content, metadata={"Software": None})
     try:
-        figure.savefig(path, metadata={"Software": None})
+        write_file(path, content.getvalue())
     except OSError as error:
-        raise UsageError(f"--out {path}: cannot be written: {error.strerror}") from error
+        raise OutputError(f"--out {path}: cannot be written: {error.strerror}") from error
 
 
 def _layout(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:

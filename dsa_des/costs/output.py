@@ -1,5 +1,6 @@
 """The results of a cost study as a table on the terminal, a Parquet file and a figure."""
 
+import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.costs.study import RungCost
+from dsa_des.output_file import write_file
 
 _EFFECT_COLUMNS = (
     ("first seen, m", "first_detection_range_change_m", "+,.0f"),
@@ -26,7 +28,10 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
     flat = [_flattened(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), path)
+    # To memory first: a Parquet writer on a full disk fails a second time when it is collected.
+    content = io.BytesIO()
+    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), content)
+    write_file(path, content.getvalue())
 
 
 def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
