@@ -9,6 +9,11 @@ from dsa_des.errors import UsageError
 from dsa_des.output_names import reason_of, why_no_name
 from dsa_des.unfinished import remove_left_over, temporary_beside
 
+#: Folders of the system, in which names stand for something else: ``/dev/stdout`` is a link that
+#: may well lead to an ordinary file, and must not be replaced all the same.
+_SYSTEM = ("/dev", "/proc", "/sys")
+_ORDINARY = ("/dev/shm",)
+
 
 def write_file(path: Path, content: bytes) -> None:
     """Write a file under a temporary name and rename it.
@@ -56,6 +61,10 @@ def check_file(path: Path, option: str = "--out") -> None:
 
 def _why_no_file(path: Path) -> str | None:
     """Return why a file must not take this place, if so; devices would be replaced by it."""
+    folder = Path(os.path.realpath(path.parent))
+    above = {str(one) for one in (folder, *folder.parents)}
+    if above.intersection(_SYSTEM) and not above.intersection(_ORDINARY):
+        return f"is in a folder of the system, {folder}"
     try:
         kind = path.stat().st_mode
     except FileNotFoundError:  # nothing there, or a link to nothing

@@ -8,7 +8,14 @@ from pathlib import Path
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.interruption import deferred
 from dsa_des.manifest import foreign_in
-from dsa_des.output_names import check_place, location_of, named, new_folder_name, reason_of
+from dsa_des.output_names import (
+    check_place,
+    claim_folder,
+    location_of,
+    named,
+    new_folder_name,
+    reason_of,
+)
 from dsa_des.unfinished import EARLIER, unfinished
 
 _MOST_SHOWN = 3
@@ -123,6 +130,46 @@ class OutputFolder:
         results.rename(saved)
         wanted, self.path = self.path, self.path.with_name(saved.name)
         raise OutputError(f"--out {wanted}: {reason}; the results are in {self.path}")
+
+
+@contextmanager
+def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
+    """Make a folder for results that come one by one; it is removed again if none came.
+
+    It is what ``--out`` names, which must be new or empty, or the next free ``parent/stem-NNN``.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be made.
+    """
+    folder = parent / stem if out is None else named(out)
+    made = [above for above in folder.parents if not os.path.lexists(above)]
+    if out is None:
+        folder = claim_folder(parent, stem)
+        made.insert(0, folder)
+    elif _make(folder):
+        made.insert(0, folder)
+    try:
+        yield folder
+    finally:
+        with deferred():
+            for one in made:
+                with suppress(OSError):
+                    one.rmdir()
+
+
+def _make(folder: Path) -> bool:
+    """Make a folder unless an empty one is there; return whether it was made."""
+    try:
+        if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
+            raise UsageError(f"--out {folder}: is there already; a new folder is needed")
+        check_place(folder)
+        new = not folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written: {reason_of(error)}") from error
+    return new
 
 
 def _move_aside(place: Path, earlier: Path) -> str | None:

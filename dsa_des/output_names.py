@@ -110,6 +110,8 @@ def check_place(folder: Path, option: str = "--out") -> None:
     if reason := why_no_name(folder):
         raise UsageError(f"{option} {folder}: {reason}")
     try:
+        if ".." in folder.parts:
+            folder.parent.lstat()  # it must be there: .. leads out of nothing that is not
         reason = _why_no_place(location_of(folder))
     except OSError as error:
         reason = f"cannot be written: {reason_of(error)}"
@@ -132,7 +134,8 @@ def _why_no_place(place: Path) -> str | None:
             return f"{'is' if place == kept else 'holds'} {what}; name a folder inside it"
     if os.path.ismount(place) or str(place) in _mount_points():
         return "is a mount point; name a folder inside it"
-    if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
+    effective = os.access in os.supports_effective_ids
+    if not os.access(place, os.R_OK | os.W_OK | os.X_OK, effective_ids=effective):
         return "cannot be written: Permission denied"
     _raise_if_too_long(place)
     return None

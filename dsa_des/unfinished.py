@@ -43,7 +43,7 @@ def unfinished(target: Path) -> Iterator[Path]:
     OSError
         If there is no place for it.
     """
-    made = [parent for parent in target.parents if not parent.exists()]
+    made = [parent for parent in target.parents if not os.path.lexists(parent)]
     folder: Path | None = None
     lock: int | None = None
     try:
