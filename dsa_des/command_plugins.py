@@ -11,6 +11,8 @@ from typing import Any
 import click
 
 from dsa_des.entry_points import registered
+from dsa_des.interruption import plain_ending
+from dsa_des.plain_errors import plain_output
 from dsa_des.safe_text import printable
 
 COMMANDS = "dsa_des.commands"
@@ -30,16 +32,26 @@ def _printable_errors() -> Iterator[None]:
 
 
 class PluginGroup(click.Group):
-    """A command group whose registered commands are loaded when they are named or listed."""
+    """A command group whose registered commands are loaded when they are named or listed.
 
+    Whatever it runs ends in one line: also when a signal interrupts it (exit code 130 for ctrl-C,
+    143 for SIGTERM) and when its output cannot be written (1).
+    """
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a command and end the program."""
+        with plain_ending(), plain_output():
+            return super().main(*args, **kwargs)
+
+    # click turns KeyboardInterrupt into exit code 1 outside of these two.
     def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
-        """Read the arguments as click does."""
-        with _printable_errors():
+        """Read the command line."""
+        with plain_ending(), _printable_errors():
             return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the command that is named, as click does."""
-        with _printable_errors():
+        """Run the command that the command line names."""
+        with plain_ending(), _printable_errors():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:

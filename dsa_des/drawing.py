@@ -4,6 +4,7 @@ Text in them is text: nothing is read as mathematics, control characters are esc
 would push the figure aside are cut, and letters that the font lacks are boxes without a warning.
 """
 
+import io
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ from dsa_des.safe_text import printable, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+from dsa_des.output_file import write_file
 
 DPI = 110
 #: Longest name and longest line in a figure.
@@ -26,7 +29,8 @@ _MOST_LINES = 60
 def drawing(width_in: float, height_in: float, path: Path, dpi: int = DPI) -> Iterator[Any]:
     """Give an empty figure and write it as PNG when the block is done.
 
-    Neither the user's matplotlibrc nor the date goes into it.
+    The file is there as a whole or not at all. Neither the user's matplotlibrc nor the date goes
+    into it.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -52,7 +56,9 @@ def drawing(width_in: float, height_in: float, path: Path, dpi: int = DPI) -> It
         canvas = FigureCanvasAgg(figure)
         yield figure
         _make_plain(figure)
-        canvas.print_png(str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4})
+        content = io.BytesIO()
+        canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
+        write_file(path, content.getvalue())
 
 
 def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:

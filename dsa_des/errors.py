@@ -176,3 +176,7 @@ class SetupFailure(BlockFailure):
     """A block raised an exception before anything ran: the scene cannot be used."""
 
     exit_code = 2
+
+
+class OutputError(Exception):
+    """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

@@ -8,7 +8,9 @@ from typing import Any
 
 from components.benchmark.cases import Case, chosen
 from dsa_des import terminal
-from dsa_des.errors import UsageError
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.output_file import check_file
+from dsa_des.output_names import named
 from dsa_des.run_folder import write_json
 
 # The thesis's run time for its scene, 3 s for 21,600 target-scans (errata 24).
@@ -28,9 +30,9 @@ def run_benchmark(
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
     cases = [] if embed else chosen(scenes)
     before = {} if compare is None else _read(Path(compare))
-    target = None if json_file is None else Path(json_file)
-    if target is not None and not target.parent.is_dir():
-        raise UsageError(f"--json {target}: the folder {target.parent} does not exist")
+    target = None if json_file is None else named(json_file, "--json")
+    if target is not None:
+        check_file(target, "--json")
     console = terminal.console()
     rows: list[dict[str, Any]] = []
     if embed:
@@ -44,7 +46,10 @@ def run_benchmark(
     else:
         rows += _measured_cases(console, cases, quick, repeats, before)
     if target is not None:
-        write_json(target, rows)
+        try:
+            write_json(target, rows)
+        except OSError as error:
+            raise OutputError(f"--json {target}: cannot be written: {error.strerror}") from error
         console.print(f"rows written to {target}")
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from components.benchmark.cases import CASES, replicas_of, scene_of
 from components.benchmark.measure import engine_run, peak_mb, pin
+from dsa_des.interruption import plain_ending
 from dsa_des.recording import MemorySink
 from dsa_des.scene import Scene
 from dsa_des.terminal import say, say_json
@@ -126,4 +127,5 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from components.numerics.document import PAGE, differences, markdown
+from dsa_des.interruption import plain_ending
 from dsa_des.terminal import say, say_lines
 
 
@@ -35,4 +36,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

@@ -236,7 +236,8 @@ def _find_columns(
     for name in ("az_deg", "el_deg"):
         if name not in header:
             raise ValueError(
-                f"{path}: none of its {len(header)} columns is {name}: it must have az_deg and el_deg"
+                f"{path}: none of its {len(header)} columns is {name}; it must have az_deg, el_deg "
+                "and an area"
             )
     if area_name is None:
         raise ValueError(

@@ -1,7 +1,5 @@
 """``dsa-des reproduce``: make items, write figures and data, compare with the thesis."""
 
-import os
-import shutil
 import sys
 import time
 from pathlib import Path
@@ -12,8 +10,11 @@ from components.thesis.files import write_csv, write_rows
 from components.thesis.made import Made
 from components.thesis.registry import ITEMS, Item, chosen
 from dsa_des import terminal
-from dsa_des.errors import BlockFailure, SceneError, UsageError
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
+from dsa_des.output_file import check_file, write_file
+from dsa_des.output_folder import OutputFolder
+from dsa_des.output_names import named
+from dsa_des.run_folder import write_run_json
 from dsa_des.terminal import say, say_json
 
 Results = list[tuple[Item, Made]]
@@ -28,21 +29,24 @@ def reproduce_items(
     wanted = chosen(items)
     if page is not None and len(wanted) < len(ITEMS):
         raise UsageError("--page shows all items: leave the ITEMs out")
-    if page is not None and not Path(page).parent.is_dir():
-        raise UsageError(f"--page {page}: there is no folder {Path(page).parent}")
-    target = Path(out) if out else new_folder_name(Path("runs"), "thesis")
-    check_target(target)
+    shown_on = None if page is None else named(page, "--page")
+    if shown_on is not None:
+        check_file(shown_on, "--page")
+    target = OutputFolder.chosen(out, Path("runs"), "thesis")
     started = time.perf_counter()
-    results, failures = make(wanted)
-    with writing(target) as folder:
+    with target.writing() as folder:
+        results, failures = make(wanted)
         write(folder, results, failures, time.perf_counter() - started)
-    if page is not None and not failures:
-        _write_page(Path(page), results, target)
+    if shown_on is not None and not failures:
+        try:
+            _write_page(shown_on, results, target.path)
+        except OSError as error:
+            raise OutputError(f"--page {page}: cannot be written: {error.strerror}") from error
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
     if as_json:
         say_json(rows)
     else:
-        _show(results, target)
+        _show(results, target.path)
     for failure in failures:
         say(f"error: {failure}", err=True)
     if failures:
@@ -86,7 +90,7 @@ def write(folder: Path, results: Results, failures: list[str], wall_s: float) ->
         "failures": failures,
         "timings": {"wall_s": wall_s},
     }
-    write_json(folder / RUN_JSON, content)
+    write_run_json(folder, content)
 
 
 def _write_page(page: Path, results: Results, source: Path) -> None:
@@ -95,16 +99,9 @@ def _write_page(page: Path, results: Results, source: Path) -> None:
     images.mkdir(parents=True, exist_ok=True)
     for _, made in results:
         for picture in made.pictures:
-            _replace(source / "figures" / f"{picture.name}.png", images)
-    temporary = page.with_name(f".{page.name}.new")
-    temporary.write_text(markdown(results, f"images/{page.stem}"), encoding="utf-8")
-    os.replace(temporary, page)
-
-
-def _replace(file: Path, folder: Path) -> None:
-    temporary = folder / f".{file.name}.new"
-    shutil.copyfile(file, temporary)
-    os.replace(temporary, folder / file.name)
+            figure = source / "figures" / f"{picture.name}.png"
+            write_file(images / figure.name, figure.read_bytes())
+    write_file(page, markdown(results, f"images/{page.stem}").encode())
 
 
 def _show(results: Results, target: Path) -> None:

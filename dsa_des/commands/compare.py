@@ -9,8 +9,8 @@ import numpy as np
 
 from dsa_des.commands.study import finish, known_results, read_study_of, run_into, show_study
 from dsa_des.entry_points import registered
-from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.run_folder import new_folder_name
+from dsa_des.errors import OutputError, UsageError, did_you_mean
+from dsa_des.output_folder import new_folder
 from dsa_des.scene import load_scene
 from dsa_des.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
@@ -37,29 +37,27 @@ def compare_command(
     """Compare what the command line names."""
     if replicas < 1:
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
-    home = Path(out) if out else new_folder_name(Path("studies"), "compare")
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        _compare_swap(Path(paths[0]), swaps, replicas, results, workers, home)
+        _compare_swap(Path(paths[0]), swaps, replicas, results, workers, out)
         return
     if len(paths) == 1 and (Path(paths[0]) / STUDY_JSON).is_file():
         show_study(Path(paths[0]), results)
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    if home.exists() and (not home.is_dir() or any(home.iterdir())):
-        raise UsageError(f"--out {home}: is there already; a new folder is needed")
     studies = [_study_at(Path(path), replicas) for path in paths]
     for study in studies:
         known_results(study, results)
-    found = [
-        _tables(Path(path), study, workers, home)
-        for path, study in zip(paths, studies, strict=True)
-    ]
-    for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
-        stem = "scatter" if len(found) == 2 else f"scatter-{number}"
-        _compare(found[0], other, (paths[0], path), results, home / stem)
+    with new_folder(out, Path("studies"), "compare") as home:
+        found = [
+            _tables(Path(path), study, workers, home)
+            for path, study in zip(paths, studies, strict=True)
+        ]
+        for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
+            stem = "scatter" if len(found) == 2 else f"scatter-{number}"
+            _compare(found[0], other, (paths[0], path), results, home / stem)
 
 
 def _compare_swap(
@@ -68,7 +66,7 @@ def _compare_swap(
     replicas: int,
     results: Sequence[str],
     workers: int | None,
-    home: Path,
+    out: str | None,
 ) -> None:
     """Run a scene or study with and without swaps, and compare the two."""
     chosen: list[tuple[str, list[str]]] = []
@@ -86,7 +84,8 @@ def _compare_swap(
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
     known_results(study, results)
-    folder = run_into(study, home, workers, resume=False)
+    with new_folder(out, Path("studies"), "compare") as home:
+        folder = run_into(study, home, workers, resume=False)
     tables = finish(study, folder, only=results)
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
@@ -239,12 +238,11 @@ def _compare(
             together.setdefault(metric, []).append(pair)
             _farthest_apart(metric, sides, names, (one.study, other.study))
     console(160).print(table)
-    try:
-        stem.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"--out {stem.parent}: cannot be written: {error.strerror}") from error
     for metric, pairs in together.items():
         path = stem.with_name(f"{stem.name}-{metric}.png")
         x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
-        draw_scatter(path, x, y, names, metric, "compared")
+        try:
+            draw_scatter(path, x, y, names, metric, "compared")
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
         say(f"wrote {path}")

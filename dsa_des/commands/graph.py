@@ -10,6 +10,8 @@ from dsa_des.commands.loading import load
 from dsa_des.drawing import drawing, figure_text
 from dsa_des.errors import UsageError
 from dsa_des.graph import depths
+from dsa_des.output_file import check_file
+from dsa_des.output_names import named
 from dsa_des.safe_text import printable, shortened
 from dsa_des.scene import Scene
 from dsa_des.terminal import console, say, say_lines
@@ -33,7 +35,8 @@ def show_graph(
     if dot:
         say_lines(to_dot(loaded))
     elif png:
-        path = Path(out) if out else Path(f"{loaded.path.stem}-graph.png")
+        path = Path(f"{loaded.path.stem}-graph.png") if out is None else named(out)
+        check_file(path)
         draw_graph(loaded, path)
         say(f"wrote {path}")
     else:
@@ -109,7 +112,7 @@ def draw_graph(scene: Scene, path: Path) -> None:
             figure.suptitle(figure_text(scene.title, 80), fontsize=12)
             _draw_blocks(axes, scene, place)
     except OSError as error:
-        raise UsageError(f"--out {path}: cannot be written: {error.strerror}") from error
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _draw_blocks(axes: Any, scene: Scene, place: Mapping[str, tuple[float, float]]) -> None:

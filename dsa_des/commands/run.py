@@ -11,10 +11,12 @@ from typing import Any
 
 from dsa_des import __version__, terminal
 from dsa_des.commands.loading import load
+from dsa_des.output_file import write_file
+from dsa_des.output_folder import OutputFolder
 from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.recording import ObserverSink, Recorder
 from dsa_des.reports import load_reports
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.run_folder import write_run_json
 from dsa_des.safe_text import shortened
 from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
@@ -39,7 +41,7 @@ def run_scene(
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
     loaded = load(scene, sets, swaps, seed, duration)
-    target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
+    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
@@ -59,7 +61,7 @@ def run_scene(
 
 def record_run(
     loaded: Scene,
-    target: Path,
+    target: Path | OutputFolder,
     *,
     simulate_everything: bool = False,
     silent: bool = True,
@@ -70,9 +72,13 @@ def record_run(
     Raises
     ------
     UsageError
-        If the folder holds something other than a run.
+        If the folder holds something other than a run, or there is no place for it.
+    OutputError
+        If the results cannot be written.
     """
-    check_target(target)
+    if isinstance(target, Path):
+        target = OutputFolder(target)
+    target.check()
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     if pacer is not None:
@@ -81,24 +87,29 @@ def record_run(
     observers = ObserverSink(
         observer for report in reports for observer in report.observers(simulation)
     )
-    with writing(target) as folder:
+    with target.writing() as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
         from dsa_des.arrow import ParquetSink
 
-        recorder.sinks += [ParquetSink(folder), observers]
+        tables = ParquetSink(folder)
+        recorder.sinks += [tables, observers]
         started = time.perf_counter()
-        with _progress(simulation, silent=silent) as progress:
-            outcome = simulation.run(_paced(progress, pacer))
-        summary = _summary(observers, outcome, target)
+        try:
+            with _progress(simulation, silent=silent) as progress:
+                outcome = simulation.run(_paced(progress, pacer))
+        finally:
+            tables.release()
+        summary = _summary(observers, outcome, target.path)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
-        (folder / "scene.toml").write_text(scene_text, encoding="utf-8")
+        write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
-        write_json(folder / RUN_JSON, info)
         for report in reports:
             report.draw(simulation, folder, summary)
+        write_run_json(folder, info)
+    summary["out"] = str(target.path)
     return summary
 
 

@@ -1,5 +1,6 @@
 """The results of a cost study as a table on the terminal, a Parquet file and a figure."""
 
+import io
 import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -9,6 +10,7 @@ from typing import Any
 from dsa_des import terminal
 from dsa_des.costs.study import RungCost
 from dsa_des.drawing import drawing, figure_text, tight
+from dsa_des.output_file import write_file
 from dsa_des.safe_text import printable, shortened
 
 _EFFECT_COLUMNS = (
@@ -28,7 +30,10 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
     flat = [_flattened(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), path)
+    # To memory first: a Parquet writer on a full disk fails a second time when it is collected.
+    content = io.BytesIO()
+    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), content)
+    write_file(path, content.getvalue())
 
 
 def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
