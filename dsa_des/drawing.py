@@ -4,14 +4,14 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 DPI = 110
 
 
 @contextmanager
-def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG when the block is done.
+def drawing(width_in: float, height_in: float, path: Path | BinaryIO) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG, to a file or a stream, when the block is done.
 
     Neither the user's matplotlibrc nor the date goes into it.
     """
@@ -39,5 +39,7 @@ def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
             # Names may hold letters that the font lacks; they are drawn as boxes.
             warnings.filterwarnings("ignore", message="Glyph .* missing from")
             canvas.print_png(
-                str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
+                str(path) if isinstance(path, Path) else path,
+                metadata={"Software": None},
+                pil_kwargs={"compress_level": 4},
             )
