@@ -99,7 +99,11 @@ class StudyFolder:
             import fcntl
         except ImportError:  # no such locks on this system
             return
-        self._lock = open_lock(self.path / LOCK)
+        try:
+            self._lock = open_lock(self.path / LOCK)
+        except OSError as error:
+            reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
+            raise UsageError(reason) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
