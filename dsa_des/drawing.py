@@ -34,12 +34,11 @@ def drawing(width_in: float, height_in: float, path: Path | BinaryIO) -> Iterato
         )
         figure = Figure(figsize=(width_in, height_in), dpi=DPI)
         canvas = FigureCanvasAgg(figure)
-        yield figure
+        target = str(path) if isinstance(path, Path) else path
         with warnings.catch_warnings():
-            # Names may hold letters that the font lacks; they are drawn as boxes.
+            # Names may hold letters that the font lacks; they are drawn as boxes. Names may be
+            # longer than their place; they are cut off.
             warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            canvas.print_png(
-                str(path) if isinstance(path, Path) else path,
-                metadata={"Software": None},
-                pil_kwargs={"compress_level": 4},
-            )
+            warnings.filterwarnings("ignore", message="Tight layout not applied")
+            yield figure
+            canvas.print_png(target, metadata={"Software": None}, pil_kwargs={"compress_level": 4})

@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from dsa_des.commands.study import (
+    check_workers,
     console_of_study,
     finish,
     known_results,
@@ -52,6 +53,7 @@ def compare_command(
     """Compare what the command line names."""
     if replicas < 1:
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
+    check_workers(workers)
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")

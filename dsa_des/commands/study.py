@@ -122,6 +122,14 @@ def tell_crashed(found: Sequence[Tables], again: str) -> None:
         sys.exit(1)
 
 
+def check_workers(workers: int | None) -> None:
+    """Raise UsageError unless so many processes can be had."""
+    if workers is not None and workers < 1:
+        raise UsageError(f"--workers is {workers}: it must be 1 or more")
+    if workers is not None and workers > _MOST_WORKERS:
+        raise UsageError(f"--workers is {workers}: at most {_MOST_WORKERS} are allowed")
+
+
 def run_into(
     study: Study,
     path: "Path | Callable[[], Path]",
@@ -141,10 +149,7 @@ def run_into(
     again : callable
         Takes the folder and returns the command that continues the study.
     """
-    if workers is not None and workers < 1:
-        raise UsageError(f"--workers is {workers}: it must be 1 or more")
-    if workers is not None and workers > _MOST_WORKERS:
-        raise UsageError(f"--workers is {workers}: at most {_MOST_WORKERS} are allowed")
+    check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)
     folder: StudyFolder | None = None
     try:

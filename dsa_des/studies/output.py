@@ -21,6 +21,8 @@ _EXPECTED_OVER = 64
 _MOST_SCATTERS = 6
 #: Bytes of a file's name, with room for what is put around it while it is written.
 _LONGEST_NAME = 200
+#: Letters of a figure's title.
+_LONGEST_TITLE = 200
 SUMMARY, DIFFERENCES = "summary.parquet", "differences.parquet"
 
 
@@ -174,7 +176,7 @@ class Tables:
         if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False
         metric = str(figure.metric)
-        title = self.record.title if figure.title is None else figure.title
+        title = _shortened(self.record.title if figure.title is None else figure.title)
         axis = figure.axis or places.axes[0]
         if figure.kind == "heat":
             x = figure.x or places.axes[0]
@@ -214,7 +216,7 @@ class Tables:
                 _, first, second = paired(self.rows, metric, by_place[base], chosen)
                 name = "-".join(["scatter", metric, *map(str, at)])
                 names, drawn = (str(baseline), str(at[place])), io.BytesIO()
-                draw_scatter(drawn, first, second, names, metric, self.record.title)
+                draw_scatter(drawn, first, second, names, metric, _shortened(self.record.title))
                 paths.append(self._write(f"{safe_name(name)}.png", drawn))
         return paths
 
@@ -232,6 +234,10 @@ class Tables:
             raise UsageError(f"{target}: is a link; the figures of a run are in a folder")
         record_run(scene, target)
         return sorted(target.glob("*.png"))
+
+
+def _shortened(title: str) -> str:
+    return title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
 
 
 def safe_name(name: str) -> str:
