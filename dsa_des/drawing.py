@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from dsa_des.safe_text import printable, shortened
 
@@ -26,8 +26,10 @@ _MOST_LINES = 60
 
 
 @contextmanager
-def drawing(width_in: float, height_in: float, path: Path, dpi: int = DPI) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG when the block is done.
+def drawing(
+    width_in: float, height_in: float, path: Path | BinaryIO, dpi: int = DPI
+) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG, to a file or a stream, when the block is done.
 
     The file is there as a whole or not at all. Neither the user's matplotlibrc nor the date goes
     into it.
@@ -58,7 +60,10 @@ def drawing(width_in: float, height_in: float, path: Path, dpi: int = DPI) -> It
         _make_plain(figure)
         content = io.BytesIO()
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
-        write_file(path, content.getvalue())
+        if isinstance(path, Path):
+            write_file(path, content.getvalue())
+        else:
+            path.write(content.getvalue())
 
 
 def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:

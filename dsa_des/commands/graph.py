@@ -8,7 +8,7 @@ import networkx as nx
 
 from dsa_des.commands.loading import load
 from dsa_des.drawing import drawing, figure_text
-from dsa_des.errors import UsageError
+from dsa_des.errors import OutputError, UsageError
 from dsa_des.graph import depths
 from dsa_des.output_file import check_file
 from dsa_des.output_names import named

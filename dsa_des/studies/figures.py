@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,6 +17,10 @@ _STYLES = (
 _MOST_LINES = 12
 #: Letters in a title.
 _TITLE = 80
+#: More texts than this below an axis cannot be told apart.
+_MOST_NAMES = 60
+#: Where a figure is drawn to.
+Target = Path | BinaryIO
 
 
 def readable(name: str) -> str:
@@ -73,7 +77,7 @@ def _label(axis: str, value: Any, many: int) -> str:
 
 
 def draw_axis(
-    path: Path,
+    path: Target,
     places: Places,
     metric: str,
     axis: str,
@@ -132,7 +136,8 @@ def _positions(values: list[Any]) -> tuple[dict[Any, float], bool]:
 
 def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
     if not numeric:
-        axes.set_xticks(list(where.values()), [figure_text(v) for v in values])
+        shown = values[:: -(-len(values) // _MOST_NAMES)]
+        axes.set_xticks([where[v] for v in shown], [str(v) for v in shown])
         axes.set_xlim(-0.5, len(values) - 0.5)
         return
     positive = [v for v in values if v > 0]
@@ -201,7 +206,7 @@ def _signed(value: float) -> str:
     return ("+" if value > 0 else "") + _digits(value)
 
 
-def draw_heat(path: Path, places: Places, metric: str, x: str, y: str, title: str) -> None:
+def draw_heat(path: Target, places: Places, metric: str, x: str, y: str, title: str) -> None:
     """Draw a result over two axes; values of further axes are averaged."""
     across, up = places.axes.index(x), places.axes.index(y)
     lines = places.of(metric)
@@ -241,7 +246,7 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
-def draw_polar(path: Path, places: Places, metric: str, axis: str, title: str) -> None:
+def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str) -> None:
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     place = places.axes.index(axis)
     with drawing(6.2, 6.0, path) as figure:
@@ -271,7 +276,7 @@ def draw_polar(path: Path, places: Places, metric: str, axis: str, title: str) -
 
 
 def draw_scatter(
-    path: Path, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
+    path: Target, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
 ) -> None:
     """Draw a result of two conditions against each other, one point per encounter or replica."""
     both = ~np.isnan(first) & ~np.isnan(second)
