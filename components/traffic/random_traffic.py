@@ -14,6 +14,12 @@ from components.aircraft import Aircraft, Roster
 from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
+from components.traffic.sample_times import (
+    RegularTimes,
+    SampleTimes,
+    regular_count,
+    regular_times_s,
+)
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from dsa_des.randomness import target_keys
@@ -94,5 +100,9 @@ class RandomTraffic(TrafficSource):
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""
-        step = self.p.sample_interval_s
-        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
+        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
+        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+
+    def sample_times(self) -> list[SampleTimes]:
+        """Return a regular grid over the run."""
+        return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]

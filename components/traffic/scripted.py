@@ -12,6 +12,12 @@ from components.traffic import leg_types
 from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
+from components.traffic.sample_times import (
+    RegularTimes,
+    SampleTimes,
+    regular_count,
+    regular_times_s,
+)
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from dsa_des.component import Parameters
 from dsa_des.types import FloatArray
@@ -152,9 +158,12 @@ class ScriptedTraffic(TrafficSource):
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""
-        step = self.p.sample_interval_s
-        # Rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
-        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
+        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
+        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+
+    def sample_times(self) -> list[SampleTimes]:
+        """Return a regular grid over the run."""
+        return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]
 
 
 def flight_arguments(flight: Flight) -> dict[str, Any]:
