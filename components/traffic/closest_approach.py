@@ -99,11 +99,12 @@ def closest_approaches(
             np.concatenate((first[before], middle[after] + 1)),
             np.concatenate((middle[before] - 1, last[after])),
         )
-        if len(halves[0]):
+        if len(halves[0]) > MOST_AT_ONCE:
             # Those that may come nearest first: what they find spares the others.
             order = np.argsort(np.concatenate((nearest_m[before], nearest_m[after])), kind="stable")
-            target, first, last = (a[order] for a in halves)
-            waiting.append((target, first, last))
+            halves = halves[0][order], halves[1][order], halves[2][order]
+        if len(halves[0]):
+            waiting.append(halves)
     return best
 
 
@@ -114,18 +115,18 @@ def _range_at(
     time_s: FloatArray,
 ) -> tuple[FloatArray, Any]:
     """Return slant ranges, and whether both are there, of targets at times of their own."""
-    times, which = np.unique(time_s, return_inverse=True)
-    own, other = own_at(times), targets_at(target, time_s)
+    own, other = own_at(time_s), targets_at(target, time_s)
     _, _, range_m = line_of_sight(
-        own.lat_deg[which], own.lon_deg[which], own.alt_m[which],
-        other.lat_deg, other.lon_deg, other.alt_m,
+        own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
         validate=False,
     )  # fmt: skip
-    return range_m, own.present[which] & other.present
+    return range_m, own.present & other.present
 
 
 def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray) -> None:
     """Note what is nearer than all that was known, or as near and earlier."""
+    maybe = range_m <= best.range_m[target]
+    target, time_s, range_m = target[maybe], time_s[maybe], range_m[maybe]
     order = np.lexsort((time_s, range_m, target))
     one = order[np.flatnonzero(np.diff(target[order], prepend=-1))]
     known_m, known_s = best.range_m[target[one]], best.time_s[target[one]]
