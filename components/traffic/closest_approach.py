@@ -88,7 +88,7 @@ def closest_approaches(
             target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
         middle = (first + last) // 2
         time_s = times.at(target, middle)
-        range_m, there = _range_at(own_at, targets_at, target, time_s)
+        range_m, there = _apart(own_at(time_s), targets_at(target, time_s))
         _improve(best, target[there], time_s[there], range_m[there])
         away_s = np.maximum(time_s - times.at(target, first), times.at(target, last) - time_s)
         nearest_m = range_m - closing[target] * away_s - _RANGE_MARGIN_M
@@ -108,14 +108,8 @@ def closest_approaches(
     return best
 
 
-def _range_at(
-    own_at: Callable[[FloatArray], Any],
-    targets_at: Callable[[IntArray, FloatArray], Any],
-    target: IntArray,
-    time_s: FloatArray,
-) -> tuple[FloatArray, Any]:
-    """Return slant ranges, and whether both are there, of targets at times of their own."""
-    own, other = own_at(time_s), targets_at(target, time_s)
+def _apart(own: Any, other: Any) -> tuple[FloatArray, Any]:
+    """Return slant ranges between two states, and whether both are there."""
     _, _, range_m = line_of_sight(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
         validate=False,
@@ -158,6 +152,6 @@ def looked_at_one_by_one(
         for start in range(0, len(times), MOST_AT_ONCE):
             some = times[start : start + MOST_AT_ONCE]
             which = np.full(len(some), number)
-            range_m, there = _range_at(own.at, lambda _, t, at=target.at: at(t), which, some)
+            range_m, there = _apart(own.at(some), target.at(some))
             _improve(best, which[there], some[there], range_m[there])
     return best
