@@ -13,10 +13,11 @@ from typing import Any
 import click
 
 from dsa_des import __version__
+from dsa_des.attempts import attempt
 from dsa_des.commands.loading import load
 from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.recording import ObserverSink, Recorder
-from dsa_des.reports import load_reports
+from dsa_des.reports import draw_all, load_reports
 from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
 from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
@@ -81,8 +82,9 @@ def record_run(
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
+    notes: list[str] = []
     observers = ObserverSink(
-        observer for report in reports for observer in report.observers(simulation)
+        (observer for report in reports for observer in report.observers(simulation)), notes
     )
     with writing(target) as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
@@ -92,23 +94,29 @@ def record_run(
         started = time.perf_counter()
         with _progress(simulation, silent=silent) as progress:
             outcome = simulation.run(_paced(progress, pacer))
-        summary = _summary(observers, outcome, target)
+        summary = _summary(observers, outcome, target, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
         (folder / "scene.toml").write_text(scene_text, encoding="utf-8")
         wall_s = time.perf_counter() - started
         info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        if notes:
+            info["notes"] = list(notes)
         write_json(folder / RUN_JSON, info)
-        for report in reports:
-            report.draw(simulation, folder, summary)
+    # The run has its name: whatever happens while figures are drawn, it is not lost.
+    notes += draw_all(reports, simulation, target, summary)
+    for note in notes:
+        click.echo(f"note: {note}; the run itself is complete in {target}", err=True)
     return summary
 
 
-def _summary(observers: ObserverSink, outcome: Outcome, target: Path) -> dict[str, Any]:
+def _summary(
+    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+) -> dict[str, Any]:
     return {
         **observers.result(),
-        **outcome.report,
+        **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
         "out": str(target),
