@@ -19,6 +19,7 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from components.traffic.straight_flights import Start, flights_of
 from dsa_des.component import Parameters
 from dsa_des.types import FloatArray
 
@@ -190,7 +191,7 @@ def _leg(leg: Any) -> Any:
 
 def _intruders(
     crafts: Sequence[Intruder], reference: tuple[float, float, float]
-) -> list[ScriptedTrajectory]:
+) -> Sequence[ScriptedTrajectory]:
     """Return the flights of all intruders; starts given as offsets are converted together."""
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []
@@ -208,10 +209,17 @@ def _intruders(
                 "or as east_m, north_m and up_m from the ownship's start"
             )
     converted = iter(_geodetic(offsets, reference))
-    return [
-        _intruder(craft, next(converted) if start is None else start, reference)
-        for craft, start in zip(crafts, starts, strict=True)
-    ]
+    known = [next(converted) if start is None else start for start in starts]
+    if not any(craft.legs for craft in crafts):
+        return flights_of([_straight(craft, *at) for craft, at in zip(crafts, known, strict=True)])
+    return [_intruder(craft, at, reference) for craft, at in zip(crafts, known, strict=True)]
+
+
+def _straight(craft: Intruder, lat_deg: float, lon_deg: float, alt_m: float) -> Start:
+    return Start(
+        craft.name, lat_deg, lon_deg, alt_m, craft.heading_deg, craft.speed_mps, craft.climb_mps,
+        craft.yaw_deg, craft.pitch_deg, craft.roll_deg, craft.start_time_s, craft.end_time_s,
+    )  # fmt: skip
 
 
 def _geodetic(

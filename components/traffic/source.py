@@ -21,6 +21,7 @@ from components.traffic.closest_approach import (
 )
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
+from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
 from components.traffic.sample_times import SampleTimes
 from components.traffic.state import TrajectoryState
 from components.traffic.steered_culling import SteeredCulling
@@ -244,7 +245,7 @@ class TrafficSource(Component):
     def report(self) -> dict[str, Any]:
         """Return the closest approach of every target over the run."""
         end_s = float(self.context.duration_s)
-        names = [target.name for target in self.targets]
+        names = self.roster.names
         best = self._closest_approaches(end_s)
         found = zip(names, best.time_s.tolist(), best.range_m.tolist(), strict=True)
         return {
@@ -263,7 +264,7 @@ class TrafficSource(Component):
         if not samples:
             return looked_at_one_by_one(self.own, self.targets, self.sample_times_s, end_s)
         best = Approaches.none(len(self.targets))
-        speeds = np.array([target.max_speed_mps for target in self.targets])
+        speeds = max_speeds_mps(self.targets)
         present_s = _present_together_s(self.own, self.targets, end_s)
         for times in samples:
             closest_approaches(
@@ -277,10 +278,8 @@ def _present_together_s(
     own: Any, targets: Sequence[Any], end_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last time (targets,) of a run at which both may be there, s."""
-    always = (0.0, math.inf)
-    first, last = own.interval_present() if hasattr(own, "interval_present") else always
-    there = [t.interval_present() if hasattr(t, "interval_present") else always for t in targets]
-    intervals = np.array(there, dtype=np.float64).reshape(-1, 2)
+    first, last = intervals_present_s([own])[0].tolist()
+    intervals = intervals_present_s(targets)
     return (
         np.maximum(intervals[:, 0], max(first, 0.0)),
         np.minimum(intervals[:, 1], min(last, end_s)),

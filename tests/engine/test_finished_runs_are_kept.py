@@ -1,5 +1,6 @@
 """A run that is finished is not lost because a figure or a summary of it fails."""
 
+import contextlib
 import json
 
 import pytest
@@ -54,10 +55,8 @@ def test_the_run_is_complete_before_a_figure_is_begun(configs, tmp_path, monkeyp
         raise KeyboardInterrupt
 
     monkeypatch.setattr(DetectAndSenseReport, "draw", draw)
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         run(configs, tmp_path / "kept", "--quiet")
-    except KeyboardInterrupt:
-        pass
     assert seen == {"tables": TABLES, "folder": tmp_path / "kept"}
     assert set(dsa_des.read_run(tmp_path / "kept").tables) == TABLES
 
