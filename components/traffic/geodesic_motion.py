@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
@@ -107,12 +108,12 @@ def geodesic_parameters(
 
 
 def geodesic_parameter_table(
-    lat_deg: Sequence[float],
-    lon_deg: Sequence[float],
-    alt_m: Sequence[float],
-    azimuth_rad: Sequence[float],
-    speed_mps: Sequence[float],
-    climb_mps: Sequence[float],
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    azimuth_rad: npt.ArrayLike,
+    speed_mps: npt.ArrayLike,
+    climb_mps: npt.ArrayLike,
 ) -> FloatArray:
     """Prepare many straight legs, bit for bit as `geodesic_parameters` prepares each.
 
@@ -121,8 +122,8 @@ def geodesic_parameter_table(
 
     Parameters
     ----------
-    lat_deg, lon_deg, alt_m, azimuth_rad, speed_mps, climb_mps : sequence of float
-        As for `geodesic_parameters`, of one length n.
+    lat_deg, lon_deg, alt_m, azimuth_rad, speed_mps, climb_mps : (n,)
+        As for `geodesic_parameters`.
 
     Returns
     -------
@@ -159,7 +160,9 @@ def geodesic_parameter_table(
     table[_TAU], table[_PER_METRE] = sigma1 + _added(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
     i3 = sigma1 + _added(c3, sines)
-    table[_LON_RAD] = _each(math.radians, np.array(lon_deg)) - omega1 + lon_slope * i3
+    table[_LON_RAD] = (
+        _each(math.radians, np.array(lon_deg, dtype=np.float64)) - omega1 + lon_slope * i3
+    )
     table[_LON_SLOPE] = lon_slope
     table[_SIGMA] = sigma1
     table[_RADIUS] = radius

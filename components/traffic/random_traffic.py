@@ -22,7 +22,7 @@ from components.traffic.sample_times import (
 )
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
-from components.traffic.straight_flights import Start, flights_of
+from components.traffic.straight_flights import Starts, flights_of
 from dsa_des.randomness import target_keys
 from dsa_des.types import FloatArray
 
@@ -84,12 +84,7 @@ class RandomTraffic(TrafficSource):
         )
         altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
         speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
-        columns = (lat, lon, altitude, 360.0 * heading, speed)
-        starts = [
-            Start(*start)
-            for start in zip(names, *(column.tolist() for column in columns), strict=True)
-        ]
-        flights = flights_of(starts)
+        flights = flights_of(Starts(names, lat, lon, altitude, 360.0 * heading, speed))
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(name, p.aircraft) for name in names])

@@ -19,7 +19,7 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
-from components.traffic.straight_flights import Start, flights_of
+from components.traffic.straight_flights import Starts, flights_of
 from dsa_des.component import Parameters
 from dsa_des.types import FloatArray
 
@@ -210,15 +210,24 @@ def _intruders(
             )
     converted = iter(_geodetic(offsets, reference))
     known = [next(converted) if start is None else start for start in starts]
-    if not any(craft.legs for craft in crafts):
-        return flights_of([_straight(craft, *at) for craft, at in zip(crafts, known, strict=True)])
+    if crafts and not any(craft.legs for craft in crafts):
+        return flights_of(_starts(crafts, known))
     return [_intruder(craft, at, reference) for craft, at in zip(crafts, known, strict=True)]
 
 
-def _straight(craft: Intruder, lat_deg: float, lon_deg: float, alt_m: float) -> Start:
-    return Start(
-        craft.name, lat_deg, lon_deg, alt_m, craft.heading_deg, craft.speed_mps, craft.climb_mps,
-        craft.yaw_deg, craft.pitch_deg, craft.roll_deg, craft.start_time_s, craft.end_time_s,
+def _starts(crafts: Sequence[Intruder], known: list[tuple[float, float, float]]) -> Starts:
+    """Return flights without legs as columns."""
+    lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).T.copy()
+
+    def column(name: str, default: float = 0.0) -> FloatArray:
+        values = [getattr(craft, name) for craft in crafts]
+        return np.array([default if v is None else v for v in values], dtype=np.float64)
+
+    return Starts(
+        [craft.name for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
+        column("speed_mps"), column("climb_mps"), column("start_time_s"),
+        column("end_time_s", np.inf),
+        np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
     )  # fmt: skip
 
 

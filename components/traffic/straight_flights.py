@@ -6,9 +6,9 @@ minute. Each flight has the bits it would have alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from math import atan2, cos, inf, isfinite, nan, radians
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import atan2, cos, inf, isnan, radians
 from typing import overload
 
 import numpy as np
@@ -19,22 +19,66 @@ from components.traffic.legs import LONGEST_FLIGHT_S, MOST_ALT_M, ScriptedTrajec
 from components.traffic.normals import FloatArray, wrap_longitude_deg
 
 
-@dataclass(slots=True)
-class Start:
-    """Where and how a straight flight starts; units and defaults of `ScriptedTrajectory`."""
+@dataclass(eq=False)
+class Starts:
+    """Where and how straight flights start, as columns; units of `ScriptedTrajectory`.
 
-    name: str
-    lat_deg: float
-    lon_deg: float
-    alt_m: float
-    heading_deg: float
-    speed_mps: float
-    climb_mps: float = 0.0
-    yaw_deg: float | None = None
-    pitch_deg: float | None = None
-    roll_deg: float | None = None
-    start_time_s: float = 0.0
-    end_time_s: float | None = None
+    Parameters
+    ----------
+    names : sequence of str
+    lat_deg, lon_deg, alt_m, heading_deg, speed_mps : (flights,)
+    climb_mps, start_time_s : (flights,), optional
+        0 by default.
+    end_time_s : (flights,), optional
+        Infinite by default.
+    fixed_deg : (3, flights), optional
+        Fixed yaw, pitch and roll; NaN, the default, where they follow from the motion.
+    """
+
+    names: Sequence[str]
+    lat_deg: FloatArray
+    lon_deg: FloatArray
+    alt_m: FloatArray
+    heading_deg: FloatArray
+    speed_mps: FloatArray
+    climb_mps: FloatArray | None = None
+    start_time_s: FloatArray | None = None
+    end_time_s: FloatArray | None = None
+    fixed_deg: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def column(self, name: str, default: float) -> FloatArray:
+        """Return a column, of the default where it is left out."""
+        given = getattr(self, name)
+        return np.full(len(self), default) if given is None else given
+
+    def flight(self, number: int) -> ScriptedTrajectory:
+        """Return one of the flights, made by itself.
+
+        Raises
+        ------
+        ValueError
+            A value that is not allowed.
+        """
+        fixed = (np.nan,) * 3 if self.fixed_deg is None else self.fixed_deg[:, number].tolist()
+        yaw, pitch, roll = (None if isnan(angle) else angle for angle in fixed)
+        end_s = float(self.column("end_time_s", inf)[number])
+        return ScriptedTrajectory(
+            self.names[number],
+            lat_deg=float(self.lat_deg[number]),
+            lon_deg=float(self.lon_deg[number]),
+            alt_m=float(self.alt_m[number]),
+            heading_deg=float(self.heading_deg[number]),
+            speed_mps=float(self.speed_mps[number]),
+            climb_mps=float(self.column("climb_mps", 0.0)[number]),
+            yaw_deg=yaw,
+            pitch_deg=pitch,
+            roll_deg=roll,
+            start_time_s=float(self.column("start_time_s", 0.0)[number]),
+            end_time_s=None if end_s == inf else end_s,
+        )
 
 
 class StraightFlights(Sequence[ScriptedTrajectory]):
@@ -42,38 +86,39 @@ class StraightFlights(Sequence[ScriptedTrajectory]):
 
     Parameters
     ----------
-    starts : iterable of Start
+    starts : Starts
         As `are_plain` says they may be.
     """
 
-    def __init__(self, starts: Iterable[Start]) -> None:
-        of = list(starts)
-        self.names = [start.name for start in of]
+    def __init__(self, starts: Starts) -> None:
+        self.names = starts.names
         #: First and last time at which each is there, shape (flights,).
-        self.start_s = np.array([start.start_time_s for start in of], dtype=np.float64)
-        ends = [inf if start.end_time_s is None else start.end_time_s for start in of]
-        self.end_s = np.array(ends, dtype=np.float64)
+        self.start_s = starts.column("start_time_s", 0.0)
+        self.end_s = starts.column("end_time_s", inf)
         self.until_s = np.minimum(self.end_s, self.start_s + LONGEST_FLIGHT_S)
-        lon = np.array([start.lon_deg for start in of], dtype=np.float64)
-        wrapped = (lon >= -180.0) & (lon < 180.0)
-        lon = np.where(wrapped, lon, wrap_longitude_deg(lon))
-        headings = [radians(start.heading_deg % 360.0) for start in of]
-        pitches = [atan2(start.climb_mps, start.speed_mps) for start in of]
-        speeds = [start.speed_mps / cos(p) for start, p in zip(of, pitches, strict=True)]
+        lon = starts.lon_deg
+        lon = np.where((lon >= -180.0) & (lon < 180.0), lon, wrap_longitude_deg(lon))
+        speeds, climbs = starts.speed_mps.tolist(), starts.column("climb_mps", 0.0).tolist()
+        pitches = list(map(atan2, climbs, speeds))
         #: The table of `geodesic_state`, shape (rows, flights).
         self.table: FloatArray = geodesic_parameter_table(
-            [start.lat_deg for start in of],
-            lon.tolist(),
-            [start.alt_m for start in of],
-            headings,
-            [start.speed_mps for start in of],
-            [start.climb_mps for start in of],
+            starts.lat_deg,
+            lon,
+            starts.alt_m,
+            [radians(heading % 360.0) for heading in starts.heading_deg.tolist()],
+            speeds,
+            climbs,
         )
         #: The attitude that follows from the motion, shape (flights,).
         self.pitch_rad = np.array(pitches, dtype=np.float64)
         #: Fixed yaw, pitch and roll, NaN where the motion gives them, shape (3, flights).
-        self.fixed_rad = np.array([_fixed(start) for start in of]).reshape(-1, 3).T.copy()
-        self.max_speeds_mps = np.array(speeds, dtype=np.float64)
+        self.fixed_rad = np.full((3, len(starts)), np.nan)
+        if starts.fixed_deg is not None:
+            yaw, pitch, roll = starts.fixed_deg.tolist()
+            self.fixed_rad[0] = [radians(angle % 360.0) for angle in yaw]
+            self.fixed_rad[1:] = [list(map(radians, pitch)), list(map(radians, roll))]
+        #: Largest speed of each along its path, shape (flights,).
+        self.max_speeds_mps = starts.speed_mps / np.array(list(map(cos, pitches)))
 
     @property
     def intervals_present_s(self) -> FloatArray:
@@ -109,7 +154,7 @@ class StraightFlights(Sequence[ScriptedTrajectory]):
         return (self[number] for number in range(len(self)))
 
 
-def flights_of(starts: Sequence[Start]) -> Sequence[ScriptedTrajectory]:
+def flights_of(starts: Starts) -> Sequence[ScriptedTrajectory]:
     """Return flights without legs, together where that can be, else each by itself.
 
     Raises
@@ -119,30 +164,19 @@ def flights_of(starts: Sequence[Start]) -> Sequence[ScriptedTrajectory]:
     """
     if are_plain(starts):
         return StraightFlights(starts)
-    return [ScriptedTrajectory(**asdict(start)) for start in starts]
+    return [starts.flight(number) for number in range(len(starts))]
 
 
-def are_plain(starts: Iterable[Start]) -> bool:
+def are_plain(starts: Starts) -> bool:
     """Return whether all flights move, and have no value that `ScriptedTrajectory` refuses."""
-    return all(
-        start.speed_mps > 0.0
-        and abs(start.lat_deg) <= 90.0
-        and abs(start.alt_m) <= MOST_ALT_M
-        and (start.end_time_s is None or start.end_time_s >= start.start_time_s)
-        and isfinite(start.lon_deg)
-        and all(
-            value is None or isfinite(value)
-            for value in (start.heading_deg, start.speed_mps, start.climb_mps, start.start_time_s,
-                          start.yaw_deg, start.pitch_deg, start.roll_deg)
-        )
-        for start in starts
-    )  # fmt: skip
-
-
-def _fixed(start: Start) -> tuple[float, float, float]:
-    yaw, pitch, roll = start.yaw_deg, start.pitch_deg, start.roll_deg
-    return (
-        nan if yaw is None else radians(yaw % 360.0),
-        nan if pitch is None else radians(pitch),
-        nan if roll is None else radians(roll),
+    start_s = starts.column("start_time_s", 0.0)
+    others = (starts.lon_deg, starts.heading_deg, starts.column("climb_mps", 0.0), start_s)
+    fixed = starts.fixed_deg
+    return bool(
+        np.all(np.isfinite(starts.speed_mps) & (starts.speed_mps > 0.0))
+        and np.all(np.abs(starts.lat_deg) <= 90.0)
+        and np.all(np.abs(starts.alt_m) <= MOST_ALT_M)
+        and np.all(starts.column("end_time_s", inf) >= start_s)
+        and all(np.isfinite(column).all() for column in others)
+        and (fixed is None or not np.isinf(fixed).any())
     )
