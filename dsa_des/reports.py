@@ -4,10 +4,11 @@ They are found by the entry-point group ``dsa_des.reports``; each is a class wit
 `Report`, called without arguments.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dsa_des.attempts import attempt
 from dsa_des.entry_points import registered
 from dsa_des.foreign import installed
 from dsa_des.recording import Observer
@@ -31,9 +32,25 @@ class Report(Protocol):
         """Return what changed from one run's recorded tables to another's."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
-        """Draw figures from the Parquet tables in `folder` into it and return their paths."""
+        """Draw figures from the Parquet tables in `folder` into it and return their paths.
+
+        The run is complete when this is called, and may be large: tables are read in pieces.
+        """
 
 
 def load_reports() -> list[Report]:
     """Return one instance of every registered report, in the order of their names."""
     return [installed(point)() for point in registered(REPORTS).values()]
+
+
+def draw_all(
+    reports: Iterable[Report], simulation: "Simulation", folder: Path, summary: dict[str, Any]
+) -> list[str]:
+    """Let every report draw its figures of a finished run, and return what went wrong.
+
+    A figure that fails takes nothing with it: the run is complete without.
+    """
+    notes: list[str] = []
+    for report in reports:
+        attempt("drawing", notes, report.draw, simulation, folder, summary)
+    return notes

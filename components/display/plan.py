@@ -84,8 +84,10 @@ def draw_plan(
         }
         named = _draw_closest(axes, view, flights)
         title = f"{figure_text(simulation.scene.title, 60)}: plan view"
-        if named < len(flights.targets):
-            title += f" ({named} nearest of {len(flights.targets):,} targets named)"
+        if named < flights.all_targets:
+            title += f" ({named} nearest of {flights.all_targets:,} targets named"
+            drawn_tracks = len(flights.targets)
+            title += f", {drawn_tracks:,} drawn)" if drawn_tracks < flights.all_targets else ")"
         if view.cropped:
             title += "; flights go on outside"
         axes.set_title(title, loc="left")

@@ -10,17 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des import __version__, terminal
+from dsa_des.attempts import attempt
 from dsa_des.commands.loading import load
 from dsa_des.output_file import write_file
 from dsa_des.output_folder import OutputFolder
 from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.recording import ObserverSink, Recorder
-from dsa_des.reports import load_reports
+from dsa_des.reports import draw_all, load_reports
 from dsa_des.run_folder import write_run_json
 from dsa_des.safe_text import shortened
 from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
-from dsa_des.terminal import say_json
+from dsa_des.terminal import say, say_json
 from dsa_des.toml_text import to_toml
 
 _VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
@@ -84,8 +85,9 @@ def record_run(
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
+    notes: list[str] = []
     observers = ObserverSink(
-        observer for report in reports for observer in report.observers(simulation)
+        (observer for report in reports for observer in report.observers(simulation)), notes
     )
     with target.writing() as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
@@ -99,24 +101,31 @@ def record_run(
                 outcome = simulation.run(_paced(progress, pacer))
         finally:
             tables.release()
-        summary = _summary(observers, outcome, target.path)
+        summary = _summary(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
-        for report in reports:
-            report.draw(simulation, folder, summary)
+        if notes:
+            info["notes"] = list(notes)
         write_run_json(folder, info)
     summary["out"] = str(target.path)
+    # The run has its name: whatever happens while figures are drawn, it is not lost.
+    notes += draw_all(reports, simulation, target.path, summary)
+    write_run_json(target.path, info)  # with the figures among its files
+    for note in notes:
+        say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary
 
 
-def _summary(observers: ObserverSink, outcome: Outcome, target: Path) -> dict[str, Any]:
+def _summary(
+    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+) -> dict[str, Any]:
     return {
         **observers.result(),
-        **outcome.report,
+        **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
         "out": str(target),
