@@ -68,4 +68,5 @@ class Gate(Component):
                 place[rows] = np.arange(len(rows))
                 seen = [values[rows] for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
-        return GatedTargets(**vars(targets), decisions=decisions)
+        # Behind another gate, that one's decisions were for the sensors there.
+        return GatedTargets(**{**vars(targets), "decisions": decisions})

@@ -72,14 +72,15 @@ class Sweep:
         ValueError
             If the targets can be known only at the instants of the rows.
         """
-        revisit = targets.revisit
-        if revisit is None:
+        if targets.revisit is None:
             raise ValueError(
                 "beam_sweep needs to know the targets at instants of its own; the traffic, or a "
                 "block on the way, passes no flights on: set beam_sweep to false"
             )
         block, columns = self._block, targets.columns
         at_start = targets.take(rows)
+        revisit = at_start.revisit
+        assert revisit is not None
         start_s = (at_start.tick / self._ticks_per_s)[:, np.newaxis]
         found: dict[str, Any] = {}
 

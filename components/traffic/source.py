@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
+from components.known_flights import Flights, KnownFlights
 from components.known_targets import KnownTraffic
 from components.reach import FarthestLook, farthest_look
 from components.steering import Manoeuvres
@@ -27,7 +29,7 @@ from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Arrivals, Wake
+from dsa_des.wake import Wake
 
 
 class SourceParameters(Parameters):
@@ -119,6 +121,7 @@ class TrafficSource(Component):
             self._cull(look)
         if self.context.producers:
             self.own = SteeredFlight(self.own)
+        self._flights_now: Flights = partial(self.flights, self.own)
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where somebody knows how far anybody looks."""
@@ -152,8 +155,7 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        for new in wake.arrivals("manoeuvres"):
-            self._steer(new)
+        flights = self._steer(wake)
         time_s = wake.time_s
         columns, fleet, near = self._everybody, self.fleet, None
         if self._steered_culling is not None:
@@ -186,16 +188,18 @@ class TrafficSource(Component):
             roster=self.roster,
             columns=columns,
             culled=culled,
-            flights=self.flights if self._flights_asked_for else None,
+            flights=flights,
         )
 
     def flights(
-        self, columns: IntArray, time_s: FloatArray
+        self, own: Trajectory, columns: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
         Parameters
         ----------
+        own : Trajectory
+            The ownship's flight, as far as it is known.
         columns : (targets,) of int
         time_s : (rows, targets)
             With an ``update_rate_hz``, the last publication up to then counts.
@@ -213,16 +217,31 @@ class TrafficSource(Component):
         if self._culling is not None:
             near = self._culling.intervals.holds(everyone, times)
             others = replace(others, present=others.present & near)
-        return self.own.at(time_s), others.reshaped(time_s.shape)
+        return own.at(time_s), others.reshaped(time_s.shape)
 
-    def _steer(self, new: Arrivals) -> None:
-        """Turn the ownship at the times at which manoeuvres have come."""
-        told = zip(new.tick.tolist(), new.message.turn_rad, new.message.rate_rad_s, strict=True)
-        for tick, turn_rad, rate_rad_s in told:
-            assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.turned(
-                tick / self.context.ticks_per_s, float(turn_rad), float(rate_rad_s)
-            )
+    def _steer(self, wake: Wake) -> KnownFlights | None:
+        """Turn the ownship at the times at which manoeuvres have come.
+
+        Returns
+        -------
+        KnownFlights or None
+            The flights as they are known at each row, where somebody asks for them: a row knows
+            the manoeuvres that have come by its own instant, whatever came later in this wake.
+        """
+        known, came = [self._flights_now], [np.empty(0, dtype=np.int64)]
+        for new in wake.arrivals("manoeuvres"):
+            came.append(new.tick)
+            turns = new.message.turn_rad.tolist(), new.message.rate_rad_s.tolist()
+            for tick, turn_rad, rate_rad_s in zip(new.tick.tolist(), *turns, strict=True):
+                assert isinstance(self.own, SteeredFlight)
+                self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
+                known.append(partial(self.flights, self.own))
+        self._flights_now = known[-1]
+        if not self._flights_asked_for:
+            return None
+        # A manoeuvre has come before anything runs at its instant.
+        of_row = np.searchsorted(np.concatenate(came), wake.ticks, side="right")
+        return KnownFlights(known, of_row)
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""
