@@ -123,6 +123,7 @@ class Simulation:
         self._window = window
         self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
+        self._along = self._order_along_wires()
         queued = any(block.options.processor for block in scene.blocks.values())
         self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
         self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
@@ -147,6 +148,13 @@ class Simulation:
         return 0 if self.replicas is None else self.replicas.span_ticks
 
     # -- building ------------------------------------------------------------------------------
+
+    def _order_along_wires(self) -> dict[str, int]:
+        """Return each block's place in the chain: what it is told comes over slow wires as well."""
+        graph = self.scene.graph
+        if not any(delayed for _, _, delayed in graph.edges(data="delayed")):
+            return self._depth
+        return window_order(graph, set(graph), cut_loops(graph, self.scene.classes))
 
     def _make_streams(self) -> Streams:
         return Streams(self.scene.seed)
@@ -189,7 +197,7 @@ class Simulation:
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
-        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (self._along[name], name)):
             self.components[name].context.producers = [
                 Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
                 for wire in self.scene.wires
@@ -223,7 +231,7 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
-        for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (-self._along[name], name)):
             component = self.components[name]
             component.context.consumers = [
                 Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
