@@ -68,4 +68,5 @@ class Gate(Component):
                 place[rows] = np.arange(len(rows))
                 seen = [values[rows] for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
-        return GatedTargets(**vars(targets), decisions=decisions)
+        fields = {**vars(targets), "tick": wake.ticks}
+        return GatedTargets(**fields, decisions=decisions)

@@ -80,7 +80,9 @@ class Sweep:
             )
         block, columns = self._block, targets.columns
         at_start = targets.take(rows)
-        start_s = (at_start.tick / self._ticks_per_s)[:, np.newaxis]
+        # A picture that came late goes on from the instant it is of.
+        start = at_start.tick if at_start.state_tick is None else at_start.state_tick
+        start_s = (start / self._ticks_per_s)[:, np.newaxis]
         found: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
