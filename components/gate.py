@@ -69,4 +69,5 @@ class Gate(Component):
                 seen = [values[rows] for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
         # Behind another gate, that one's decisions were for the sensors there.
-        return GatedTargets(**{**vars(targets), "decisions": decisions})
+        fields = {**vars(targets), "tick": wake.ticks, "decisions": decisions}
+        return GatedTargets(**fields)

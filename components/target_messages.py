@@ -14,7 +14,7 @@ import numpy as np
 from components.aircraft import Roster
 from components.known_flights import KnownFlights, Revisit
 from components.reach import Decision
-from dsa_des.message import Message, per_row, static
+from dsa_des.message import Message, per_row, per_row_tick, static
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
@@ -94,6 +94,9 @@ class RelativeTargets(Message):
         ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
     revisit : Revisit or None
         The targets at other instants than those of the rows, as each row knows their flights.
+    state_tick : (rows,) of int, or None
+        The instant at which the aircraft were there: earlier than `tick` where the traffic's
+        message took its time. None where it is `tick`.
     """
 
     azimuth_rad: FloatArray
@@ -112,6 +115,7 @@ class RelativeTargets(Message):
     culled: IntArray | None = per_row(default=None, kw_only=True)
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: Revisit | None = per_row(default=None, kw_only=True)
+    state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
 

@@ -30,7 +30,7 @@ from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows
+from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
 from dsa_des.scene import Scene
 from dsa_des.types import IntArray
 
@@ -123,10 +123,10 @@ class Simulation:
         self._window = window
         self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
-        self._along = self._order_along_wires()
         queued = any(block.options.processor for block in scene.blocks.values())
         self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
         self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
+        self._place = telling_order(scene.graph, scene.classes)
         self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
@@ -149,13 +149,6 @@ class Simulation:
 
     # -- building ------------------------------------------------------------------------------
 
-    def _order_along_wires(self) -> dict[str, int]:
-        """Return each block's place in the chain: what it is told comes over slow wires as well."""
-        graph = self.scene.graph
-        if not any(delayed for _, _, delayed in graph.edges(data="delayed")):
-            return self._depth
-        return window_order(graph, set(graph), cut_loops(graph, self.scene.classes))
-
     def _make_streams(self) -> Streams:
         return Streams(self.scene.seed)
 
@@ -170,7 +163,7 @@ class Simulation:
                 simulate_everything=simulate_everything,
             )
             try:
-                components[name] = block.cls(name, block.parameters, context)
+                components[name] = block.cls(name, self._parameters(name), context)
             except (ValueError, OSError) as error:
                 problems.append(self._problem(f"blocks.{name}", error))
             except Exception as error:
@@ -178,6 +171,9 @@ class Simulation:
         if problems:
             raise SceneError(problems)
         return components
+
+    def _parameters(self, name: str) -> Any:
+        return self.scene.blocks[name].parameters
 
     def _problem(self, key: str, what: object) -> Problem:
         return Problem(str(self.scene.path), key, str(what))
@@ -197,7 +193,7 @@ class Simulation:
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
-        for name in sorted(self.components, key=lambda name: (self._along[name], name)):
+        for name in sorted(self.components, key=lambda name: (self._place[name], name)):
             self.components[name].context.producers = [
                 Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
                 for wire in self.scene.wires
@@ -231,7 +227,7 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
-        for name in sorted(self.components, key=lambda name: (-self._along[name], name)):
+        for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             component = self.components[name]
             component.context.consumers = [
                 Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))

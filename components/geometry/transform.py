@@ -127,7 +127,8 @@ class Transform(Component):
             return None
         own = _beside_targets(states)
         return RelativeTargets(
-            tick=states.tick,
+            tick=wake.ticks,
+            state_tick=states.tick,
             own_alt_m=states.own_alt_m,
             roster=states.roster,
             columns=states.columns,

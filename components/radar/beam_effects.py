@@ -81,7 +81,9 @@ class Sweep:
         at_start = targets.take(rows)
         revisit = at_start.revisit
         assert revisit is not None
-        start_s = (at_start.tick / self._ticks_per_s)[:, np.newaxis]
+        # A picture that came late goes on from the instant it is of.
+        start = at_start.tick if at_start.state_tick is None else at_start.state_tick
+        start_s = (start / self._ticks_per_s)[:, np.newaxis]
         found: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
