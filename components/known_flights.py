@@ -7,7 +7,8 @@ keeps them whatever the other rows of its message know.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ from components.traffic.state import TrajectoryState
 from dsa_des.types import AnyArray, FloatArray, IntArray
 
 #: Gives the states of the ownship and of some targets (columns of the roster) at times
-#: (rows, columns), as arrays of that shape.
-Flights = Callable[[IntArray, FloatArray], tuple[TrajectoryState, TrajectoryState]]
+#: (rows, columns), as two `TrajectoryState` with arrays of that shape; or what was made of them
+#: (`KnownFlights.seen_by`), as arrays of that shape by name.
+Flights = Callable[[IntArray, FloatArray], Any]
 
 
 class KnownFlights:
@@ -37,10 +39,8 @@ class KnownFlights:
     def __len__(self) -> int:
         return len(self.of_row)
 
-    def __call__(
-        self, columns: IntArray, time_s: FloatArray
-    ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return the ownship and some targets at times (rows, columns), as each row knows them."""
+    def __call__(self, columns: IntArray, time_s: FloatArray) -> Any:
+        """Return what the flights give at times (rows, columns), as each row knows them."""
         if len(self.flights) == 1:
             return self.flights[0](columns, time_s)
         known = np.flatnonzero(np.bincount(self.of_row)).tolist()
@@ -49,9 +49,11 @@ class KnownFlights:
             self.flights[number](columns, time_s[here])
             for number, here in zip(known, rows, strict=True)
         ]
-        order = np.argsort(np.concatenate(rows), kind="stable")
-        own, others = (_joined(states, order) for states in zip(*parts, strict=True))
-        return own, others
+        return _joined(parts, np.argsort(np.concatenate(rows), kind="stable"))
+
+    def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
+        """Return the same for who looks at the states through `seen`, which takes both."""
+        return KnownFlights([_Seen(flight, seen) for flight in self.flights], self.of_row)
 
     def take_rows(self, rows: slice | IntArray) -> KnownFlights:
         """Return the flights of some rows."""
@@ -65,45 +67,33 @@ class KnownFlights:
     @classmethod
     def join_rows(cls, parts: Sequence[KnownFlights]) -> KnownFlights:
         """Return the flights of the rows of all parts, in the order given."""
-        flights: list[Flights] = []
+        places: dict[Flights, int] = {}
         of_row = []
         for part in parts:
-            for flight in part.flights:
-                if flight not in flights:
-                    flights.append(flight)
-            place = np.array([flights.index(flight) for flight in part.flights], dtype=np.int64)
-            of_row.append(place[part.of_row])
-        return cls(flights, np.concatenate(of_row))
+            place = [places.setdefault(flight, len(places)) for flight in part.flights]
+            of_row.append(np.array(place, dtype=np.int64)[part.of_row])
+        return cls(list(places), np.concatenate(of_row))
 
 
-class Revisit:
-    """The targets as seen from the ownship at other instants than those of the rows.
+@dataclass(frozen=True)
+class _Seen:
+    """Flights as somebody sees them; equal where the flights and the onlooker are."""
 
-    Parameters
-    ----------
-    flights : KnownFlights
-    seen : callable
-        Gives, for states of the ownship and of targets (rows, columns), the fields
-        (rows, columns) of `components.target_messages.RelativeTargets`.
-    """
+    flight: Flights
+    seen: Callable[..., Mapping[str, AnyArray]]
 
-    def __init__(self, flights: KnownFlights, seen: Callable[..., dict[str, AnyArray]]) -> None:
-        self.flights, self._seen = flights, seen
-
-    def __call__(self, columns: IntArray, time_s: FloatArray) -> dict[str, AnyArray]:
-        """Return the fields of some targets at times (rows, columns), one row per row here."""
-        return self._seen(*self.flights(columns, time_s))
-
-    def take_rows(self, rows: slice | IntArray) -> Revisit:
-        """Return the same of some rows."""
-        return Revisit(self.flights.take_rows(rows), self._seen)
-
-    @classmethod
-    def join_rows(cls, parts: Sequence[Revisit]) -> Revisit:
-        """Return the same of the rows of all parts, in the order given."""
-        return cls(KnownFlights.join_rows([part.flights for part in parts]), parts[-1]._seen)
+    def __call__(self, columns: IntArray, time_s: FloatArray) -> Mapping[str, AnyArray]:
+        return self.seen(*self.flight(columns, time_s))
 
 
-def _joined(states: Sequence[Any], order: IntArray) -> TrajectoryState:
-    columns = zip(*(state.arrays() for state in states), strict=True)
-    return TrajectoryState(*(np.concatenate(arrays)[order] for arrays in columns))
+def _joined(parts: Sequence[Any], order: IntArray) -> Any:
+    """Join what several flights gave for rows of their own, and put the rows in order."""
+    first = parts[0]
+    if isinstance(first, Mapping):
+        return {name: _joined([part[name] for part in parts], order) for name in first}
+    if isinstance(first, TrajectoryState):
+        columns = zip(*(state.arrays() for state in parts), strict=True)
+        return TrajectoryState(*(_joined(arrays, order) for arrays in columns))
+    if isinstance(first, tuple):
+        return tuple(_joined(states, order) for states in zip(*parts, strict=True))
+    return np.concatenate(parts)[order]

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft import Roster
-from components.known_flights import KnownFlights, Revisit
+from components.known_flights import KnownFlights
 from components.reach import Decision
 from dsa_des.message import Message, per_row, per_row_tick, static
 from dsa_des.types import BoolArray, FloatArray, IntArray
@@ -92,7 +92,7 @@ class RelativeTargets(Message):
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
         ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
-    revisit : Revisit or None
+    revisit : KnownFlights or None
         The targets at other instants than those of the rows, as each row knows their flights.
     state_tick : (rows,) of int, or None
         The instant at which the aircraft were there: earlier than `tick` where the traffic's
@@ -114,7 +114,7 @@ class RelativeTargets(Message):
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
-    revisit: Revisit | None = per_row(default=None, kw_only=True)
+    revisit: KnownFlights | None = per_row(default=None, kw_only=True)
     state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})

@@ -22,7 +22,6 @@ from components.geometry.rung_choice import REFERENCE
 from components.geometry.rung_planning import Rung, pick_rung
 from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
 from components.geometry.true_reach import true_reach_m
-from components.known_flights import Revisit
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
 from components.target_messages import RelativeTargets, TrafficStates
@@ -134,7 +133,7 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed=self._believed(states),
-            revisit=None if states.flights is None else Revisit(states.flights, self._revisited),
+            revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
         )
 

@@ -107,6 +107,10 @@ class TrafficSource(Component):
         duration_s = float(self.context.duration_s) + lasts_s
         return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
 
+    def serves_replicas(self) -> bool:
+        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        return super().serves_replicas() and not self.context.producers
+
     def setup(self) -> None:
         """Learn how far anybody looks; what stays beyond it is not moved."""
         terrain = self.context.sections.get("terrain")
@@ -122,6 +126,8 @@ class TrafficSource(Component):
         if self.context.producers:
             self.own = SteeredFlight(self.own)
         self._flights_now: Flights = partial(self.flights, self.own)
+        #: Manoeuvres (tick, turn and rate) that have come, and are not flown by any row yet.
+        self._told: list[tuple[int, float, float]] = []
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where somebody knows how far anybody looks."""
@@ -228,20 +234,25 @@ class TrafficSource(Component):
             The flights as they are known at each row, where somebody asks for them: a row knows
             the manoeuvres that have come by its own instant, whatever came later in this wake.
         """
-        known, came = [self._flights_now], [np.empty(0, dtype=np.int64)]
         for new in wake.arrivals("manoeuvres"):
-            came.append(new.tick)
             turns = new.message.turn_rad.tolist(), new.message.rate_rad_s.tolist()
-            for tick, turn_rad, rate_rad_s in zip(new.tick.tolist(), *turns, strict=True):
-                assert isinstance(self.own, SteeredFlight)
-                self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
-                known.append(partial(self.flights, self.own))
+            self._told = [*self._told, *zip(new.tick.tolist(), *turns, strict=True)]
+        last = int(wake.ticks[-1])
+        # What comes after the last row is for the next wake: what is flown at the end of a run
+        # must not depend on how far a window reached beyond it.
+        told = [turn for turn in self._told if turn[0] <= last]
+        self._told = self._told[len(told) :]
+        known = [self._flights_now]
+        for tick, turn_rad, rate_rad_s in told:
+            assert isinstance(self.own, SteeredFlight)
+            self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
+            known.append(partial(self.flights, self.own))
         self._flights_now = known[-1]
         if not self._flights_asked_for:
             return None
         # A manoeuvre has come before anything runs at its instant.
-        of_row = np.searchsorted(np.concatenate(came), wake.ticks, side="right")
-        return KnownFlights(known, of_row)
+        came = np.array([tick for tick, _, _ in told], dtype=np.int64)
+        return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""

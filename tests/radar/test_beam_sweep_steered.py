@@ -166,3 +166,16 @@ def test_rows_keep_the_flights_they_know() -> None:
         assert (other.lat_deg == time_s[which]).all()
         assert (other.lon_deg == columns).all()
     assert len(joined.take_rows(slice(1, 5)).flights) == 1
+
+    def northward(own: Any, other: Any) -> Any:
+        return {"north_deg": other.lat_deg - own.lat_deg}
+
+    def southward(own: Any, other: Any) -> Any:
+        return {"north_deg": own.lat_deg - other.lat_deg}
+
+    halves = [joined.take_rows(slice(0, 4)).seen_by(northward),
+              joined.take_rows(slice(4, 7)).seen_by(southward)]  # fmt: skip
+    found = KnownFlights.join_rows(halves)(columns, time_s)["north_deg"]
+    expected = time_s - knows[:, np.newaxis]
+    expected[4:] *= -1.0
+    assert (found == expected).all()

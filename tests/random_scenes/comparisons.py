@@ -1,6 +1,5 @@
 """Ways to run one scene that must give the same bytes, and what differs where they do not."""
 
-import json
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -78,8 +77,17 @@ def recorded(scene: Scene, **options: Any) -> dict[str, dict[str, Any]]:
     """Run a scene and return everything it records, and what its blocks report."""
     sink = ColumnSink()
     outcome = Simulation(scene, recorder=Recorder([sink]), **options).run()
-    report = json.dumps(outcome.report, sort_keys=True, default=str)
-    return {**plain(sink.tables()), "(report)": {"text": np.array([report], dtype=object)}}
+    return {**plain(sink.tables()), "(report)": flat(outcome.report)}
+
+
+def flat(report: Any, path: str = "") -> dict[str, Any]:
+    """Return the sections that blocks report as columns of one value each, by dotted name."""
+    if not isinstance(report, Mapping):
+        return {path: np.array([repr(report)], dtype=object)}
+    found: dict[str, Any] = {}
+    for key, value in report.items():
+        found |= flat(value, f"{path}.{key}" if path else str(key))
+    return found
 
 
 def difference(one: Tables, other: Tables) -> str:
@@ -215,8 +223,7 @@ def _outcomes_differ(one: Recorded | Failed, other: Recorded | Failed) -> str:
         return "" if one == other else f"{_error_of(one)}, together {_error_of(other)}"
     if found := difference(plain(one.tables), plain(other.tables)):
         return found
-    alone, together = (json.dumps(r.report(), sort_keys=True, default=str) for r in (one, other))
-    return "" if alone == together else f"reports: {alone[:200]}, together {together[:200]}"
+    return difference({"(report)": flat(one.report())}, {"(report)": flat(other.report())})
 
 
 def _error_of(outcome: Recorded | Failed) -> str:

@@ -105,9 +105,10 @@ class _Maker:
         dice = self.dice
         duration = dice.pick(2, 3, 5, 8, 12, 20, 40)
         loop = dice.chance(0.45, "loop")
-        chains = 2 if dice.chance(0.06, "two sources") else 1
+        chains = 2 if dice.chance(0.1, "two sources") else 1
         for _ in range(chains):
             self._chain(duration, loop)
+        self._steer_the_other()
         # In a scene with many wires some would be slow or lossy all but surely, and scenes whose
         # wires are good are run in other ways: in windows, in lock step.
         self.trouble = dice.pick("none", "none", "late", "lossy", "lossy")
@@ -212,6 +213,17 @@ class _Maker:
                 if number:
                     dice.features.add(f"several {kind}s behind one block")
         return found
+
+    def _steer_the_other(self) -> None:
+        """Let what one ownship senses steer the other, where that is free: no loop at all."""
+        steered = {wire["to"] for wire in self.wires if _kind(wire["to"]) == "traffic"}
+        free = [name for name in self.blocks if _kind(name) == "traffic" and name not in steered]
+        avoidances = [name for name in self.blocks if _kind(name) == "avoidance"]
+        for traffic in free[1:]:
+            before = list(self.blocks).index(traffic)
+            others = [name for name in avoidances if list(self.blocks).index(name) < before]
+            if others and self.dice.chance(0.7, "steered by another ownship"):
+                self._wire(self.dice.choice(others), traffic)
 
     def _back(self, avoidance: str, traffic: str) -> dict[str, Any]:
         """Return the wire that closes a loop."""

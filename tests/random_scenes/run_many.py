@@ -142,9 +142,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=3000, help="how many scenes [3000]")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first [1]")
     parser.add_argument("--workers", type=int, default=2, help="processes [2]")
-    parser.add_argument(
-        "--limit", type=float, default=20.0, help="longest single run, processor s [20]"
-    )
+    parser.add_argument("--limit", type=float, default=20.0, help="longest run, processor s [20]")
     parser.add_argument("--every", type=int, default=100, help="scenes from one study to the next")
     parser.add_argument("--out", type=Path, default=Path("random-scenes"), help="for faulty scenes")
     options = parser.parse_args()
