@@ -7,6 +7,7 @@ when they run in a look-ahead window. Physics written over rows serves both.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -25,6 +26,11 @@ _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 def per_row(**kwargs: Any) -> Any:
     """Declare a field whose first axis is the rows (also the default for plain fields)."""
     return field(metadata={"per": PER_ROW}, **kwargs)
+
+
+def per_row_tick(**kwargs: Any) -> Any:
+    """Declare a field with an instant per row, in ticks, beside `Message.tick`."""
+    return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
 
 
 def per_entry(**kwargs: Any) -> Any:
@@ -51,6 +57,11 @@ def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
             entries.append(item.name)
     _LAYOUTS[message_type] = tuple(rows), tuple(entries)
     return _LAYOUTS[message_type]
+
+
+@cache
+def _tick_fields(message_type: type) -> tuple[str, ...]:
+    return tuple(item.name for item in fields(message_type) if item.metadata.get("is_tick"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +102,8 @@ class Message:
     Parameters
     ----------
     tick : ndarray of int64, shape (rows,)
-        The instant each row speaks of, in order.
+        The instant at which its block made each row, in order: one of those at which the block
+        ran. It may arrive later, and speak of what was there earlier.
     """
 
     tick: IntArray
@@ -129,6 +141,9 @@ class Message:
         """Return the message with its ticks, and its scan numbers if it has any, moved."""
         result = copy(self)
         result.tick = self.tick + ticks
+        for name in _tick_fields(type(self)):
+            if (values := getattr(self, name)) is not None:
+                setattr(result, name, values + ticks)
         if hasattr(self, "scan"):
             result.scan = self.scan + scans  # type: ignore[attr-defined]
         return result
@@ -175,6 +190,26 @@ class Message:
             If this message type cannot be written in a scene (the default).
         """
         raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
+
+
+def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
+    """Return what a block returned as messages by output name; a lone one goes to the only output.
+
+    Raises
+    ------
+    TypeError
+        If a lone message could go to several outputs.
+    """
+    if result is None:
+        return {}
+    if not isinstance(result, Message):
+        return result  # type: ignore[no-any-return]
+    if len(outputs) != 1:
+        raise TypeError(
+            f"returned one message but has {len(outputs)} outputs; return a dict of "
+            f"{', '.join(sorted(outputs)) or 'nothing'}"
+        )
+    return {outputs[0]: result}
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:

@@ -31,7 +31,7 @@ from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows
+from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
 from dsa_des.scene import Scene
 from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.types import IntArray
@@ -136,6 +136,7 @@ class Simulation:
         queued = any(block.options.processor for block in scene.blocks.values())
         self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
         self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
+        self._place = telling_order(scene.graph, scene.classes)
         self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
@@ -173,7 +174,7 @@ class Simulation:
                 simulate_everything=simulate_everything,
             )
             with self._preparing(name, problems):
-                components[name] = block.cls(name, block.parameters, context)
+                components[name] = block.cls(name, self._parameters(name), context)
         if problems:
             raise SceneError(problems)
         return components
@@ -203,6 +204,9 @@ class Simulation:
             raise SceneError(problems)
         return answer
 
+    def _parameters(self, name: str) -> Any:
+        return self.scene.blocks[name].parameters
+
     def _problem(self, key: str, what: object) -> Problem:
         return Problem(str(self.scene.path), key, str(what))
 
@@ -225,7 +229,7 @@ class Simulation:
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
-        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (self._place[name], name)):
             self.components[name].context.producers = [
                 Producer(wire.source, wire.input, self._asked(wire.source, "offer", wire.output))
                 for wire in self.scene.wires
@@ -259,7 +263,7 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
-        for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             component = self.components[name]
             component.context.consumers = [
                 Consumer(wire.target, wire.input, self._asked(wire.target, "request", wire.input))

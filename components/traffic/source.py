@@ -4,12 +4,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
+from components.known_flights import Flights, KnownFlights
 from components.known_targets import KnownTraffic
 from components.reach import FarthestLook, farthest_look
 from components.steering import Manoeuvres
@@ -33,7 +35,7 @@ from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Arrivals, Wake
+from dsa_des.wake import Wake
 
 
 class SourceParameters(Parameters):
@@ -111,6 +113,10 @@ class TrafficSource(Component):
         duration_s = float(self.context.duration_s) + lasts_s
         return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
 
+    def serves_replicas(self) -> bool:
+        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        return super().serves_replicas() and not self.context.producers
+
     def setup(self) -> None:
         """Learn how far anybody looks; what stays beyond it is not moved."""
         terrain = self.context.sections.get("terrain")
@@ -125,6 +131,9 @@ class TrafficSource(Component):
             self._cull(look)
         if self.context.producers:
             self.own = SteeredFlight(self.own)
+        self._flights_now: Flights = partial(self.flights, self.own)
+        #: Manoeuvres (tick, turn and rate) that have come, and are not flown by any row yet.
+        self._told: list[tuple[int, float, float]] = []
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where somebody knows how far anybody looks."""
@@ -158,8 +167,7 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        for new in wake.arrivals("manoeuvres"):
-            self._steer(new)
+        flights = self._steer(wake)
         time_s = wake.time_s
         columns, fleet, near = self._everybody, self.fleet, None
         if self._steered_culling is not None:
@@ -192,16 +200,18 @@ class TrafficSource(Component):
             roster=self.roster,
             columns=columns,
             culled=culled,
-            flights=self.flights if self._flights_asked_for else None,
+            flights=flights,
         )
 
     def flights(
-        self, columns: IntArray, time_s: FloatArray
+        self, own: Trajectory, columns: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
         Parameters
         ----------
+        own : Trajectory
+            The ownship's flight, as far as it is known.
         columns : (targets,) of int
         time_s : (rows, targets)
             With an ``update_rate_hz``, the last publication up to then counts.
@@ -219,16 +229,36 @@ class TrafficSource(Component):
         if self._culling is not None:
             near = self._culling.intervals.holds(everyone, times)
             others = replace(others, present=others.present & near)
-        return self.own.at(time_s), others.reshaped(time_s.shape)
+        return own.at(time_s), others.reshaped(time_s.shape)
 
-    def _steer(self, new: Arrivals) -> None:
-        """Turn the ownship at the times at which manoeuvres have come."""
-        told = zip(new.tick.tolist(), new.message.turn_rad, new.message.rate_rad_s, strict=True)
+    def _steer(self, wake: Wake) -> KnownFlights | None:
+        """Turn the ownship at the times at which manoeuvres have come.
+
+        Returns
+        -------
+        KnownFlights or None
+            The flights as they are known at each row, where somebody asks for them: a row knows
+            the manoeuvres that have come by its own instant, whatever came later in this wake.
+        """
+        for new in wake.arrivals("manoeuvres"):
+            turns = new.message.turn_rad.tolist(), new.message.rate_rad_s.tolist()
+            self._told = [*self._told, *zip(new.tick.tolist(), *turns, strict=True)]
+        last = int(wake.ticks[-1])
+        # What comes after the last row is for the next wake: what is flown at the end of a run
+        # must not depend on how far a window reached beyond it.
+        told = [turn for turn in self._told if turn[0] <= last]
+        self._told = self._told[len(told) :]
+        known = [self._flights_now]
         for tick, turn_rad, rate_rad_s in told:
             assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.turned(
-                tick / self.context.ticks_per_s, float(turn_rad), float(rate_rad_s)
-            )
+            self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
+            known.append(partial(self.flights, self.own))
+        self._flights_now = known[-1]
+        if not self._flights_asked_for:
+            return None
+        # A manoeuvre has come before anything runs at its instant.
+        came = np.array([tick for tick, _, _ in told], dtype=np.int64)
+        return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""
