@@ -137,13 +137,14 @@ def test_hostile_names_in_the_cost_of_accuracy(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_hostile_names_in_a_study(tmp_path: Path, kind: str) -> None:
     text = KINDS[kind]
+    value = text.replace("[", "<").replace("/", "|")[:200]  # no pattern of files
     scene = scene_of(tmp_path, text)
     study = tmp_path / "study.toml"
     tables = {
         "title": text, "description": text, "scene": str(scene), "replicas": 3,
         "metrics": ["first_detection", "detection_share"], "set": {"duration_s": 4},
-        "axes": {"title": [text, text + "2", "[/]"]},
-        "compare": {"axis": "title", "baseline": "[/]"},
+        "axes": {"title": [value, value + "2", "plain"]},
+        "compare": {"axis": "title", "baseline": "plain"},
     }  # fmt: skip
     study.write_text(to_toml(tables), encoding="utf-8")
     folder = tmp_path / "out"
@@ -178,7 +179,7 @@ def test_hostile_arguments(arguments: tuple[object, ...]) -> None:
 
 
 def test_hostile_file_names(tmp_path: Path) -> None:
-    folder = tmp_path / "\x1b[31m\n\u202e[/]$x^{$"
+    folder = tmp_path / "\x1b[31m\n\u202e[bold]$x^{$"
     folder.mkdir()
     path = folder / "\x9bscene.toml"
     path.write_text(f"extends = {json.dumps(str(SCENE))}\nduration_s = 2\n", encoding="utf-8")
