@@ -3,6 +3,7 @@
 Next to nothing is imported before that is so.
 """
 
+import os
 import signal
 
 from dsa_des.interruption import plain_ending
@@ -16,9 +17,9 @@ def start() -> None:
 
             main()
     finally:
-        # All that is left is Python's own end, which has no patience with ctrl-C.
+        # All that is left is Python's own end, which would show ctrl-C as a traceback.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            signal.signal(signal.SIGINT, lambda number, frame: os._exit(128 + number))
 
 
 if __name__ == "__main__":

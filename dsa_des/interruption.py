@@ -6,7 +6,6 @@ SIGTERM.
 
 import signal
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -90,12 +89,12 @@ def _handling(handler: Any, replaces: Any) -> Iterator[None]:
     before: dict[int, Any] = {}
     try:
         # Python hands signals to the main thread only, and lets no other one set handlers.
-        if threading.current_thread() is threading.main_thread():
+        with suppress(ValueError):
             for number in _SIGNALS:
                 there = signal.getsignal(number)
                 if there is not None and replaces(there):
-                    before[number] = there
                     signal.signal(number, handler)
+                    before[number] = there
         yield
     finally:
         for number, there in before.items():
