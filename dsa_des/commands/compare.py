@@ -23,7 +23,8 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.scene import load_scene
 from dsa_des.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
-from dsa_des.studies.folder import STUDY_JSON, StudyFolder, claim_folder
+from dsa_des.studies.folder import STUDY_JSON, StudyFolder
+from dsa_des.studies.folder_names import claim_folder
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
 from dsa_des.studies.printing import short, times

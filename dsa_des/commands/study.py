@@ -12,7 +12,8 @@ from dsa_des import terminal
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.safe_text import shortened
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import STUDY_JSON, StudyFolder, claim_folder, latest_folder
+from dsa_des.studies.folder import STUDY_JSON, StudyFolder
+from dsa_des.studies.folder_names import claim_folder, latest_folder
 from dsa_des.studies.metric import Result
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import show

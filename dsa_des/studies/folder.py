@@ -1,24 +1,20 @@
 """The folder of a study: one Parquet part per chunk, each there as a whole or not at all."""
 
-import hashlib
 import io
-import json
 import os
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
-from dsa_des import __version__
 from dsa_des.errors import UsageError
-from dsa_des.studies.record import StudyHead, StudyRecord, record_text
+from dsa_des.studies.identity import description_text
+from dsa_des.studies.record import StudyHead, StudyRecord
 from dsa_des.studies.safe_files import open_lock, read_regular, write_whole
 from dsa_des.studies.seal import is_sealed, sealed
 from dsa_des.studies.study import Study
-from dsa_des.studies.study_tables import json_safe
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -296,88 +292,3 @@ def _fits(table: "pa.Table", record: StudyRecord) -> bool:
         return False
     cells = pc.min_max(table["cell"]).as_py()
     return table.num_rows > 0 and cells["min"] >= 0 and cells["max"] < record.cells
-
-
-def claim_folder(parent: Path, stem: str) -> Path:
-    """Make the first of ``parent/stem-001``, ``-002``, ... that is free; nobody else gets it.
-
-    Raises
-    ------
-    UsageError
-        If no folder can be made there.
-    """
-    number = 1
-    while True:
-        path = parent / f"{stem}-{number:03d}"
-        try:
-            path.mkdir(parents=True)
-            return path
-        except FileExistsError as error:
-            if not os.path.lexists(path):
-                raise UsageError(f"{parent}: cannot be written: {error.strerror}") from None
-            number += 1
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be made: {error.strerror}") from None
-
-
-def latest_folder(parent: Path, stem: str) -> Path | None:
-    """Return the ``parent/stem-NNN`` with the highest number; None if there is none."""
-    form = re.compile(re.escape(stem) + r"-(\d{3,})")
-    try:
-        names = [entry.name for entry in parent.iterdir() if form.fullmatch(entry.name)]
-    except OSError:
-        return None
-    return parent / max(names, key=lambda name: int(name[len(stem) + 1 :])) if names else None
-
-
-def description_text(study: Study) -> str:
-    """Return the content of ``study.json``: what fixes every result, and how to read them."""
-    identity: dict[str, Any] = {
-        "scene": study.base.data,
-        "seed": study.seed,
-        "replicas": study.replicas,
-        "axes": [[axis.key, axis.labels, axis.sets, axis.swaps] for axis in study.axes],
-        "draws": [[draw.key, draw.kind, draw.values, draw.stratified] for draw in study.draws],
-        "metrics": [[spec.name, spec.keys] for spec in study.metrics],
-        "sets": study.sets,
-        "swaps": study.swaps,
-        "runs_per_chunk": study.runs_per_chunk,
-        "stop_when": None if study.stop_when is None else vars(study.stop_when),
-        "version": __version__,
-    }
-    files = _files_in([study.base.data, study.sets, [axis.sets for axis in study.axes]])
-    try:
-        identity["files"] = {str(path): _sha256(path) for path in sorted(files)}
-    except OSError as error:
-        raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
-    text = json.dumps(json_safe(identity), sort_keys=True)
-    return record_text(study, hashlib.sha256(text.encode()).hexdigest())
-
-
-def description(study: Study) -> dict[str, Any]:
-    """Return the content of ``study.json`` as a table."""
-    content: dict[str, Any] = json.loads(description_text(study))
-    return content
-
-
-def _files_in(value: Any) -> set[Path]:
-    """Return the files that values name: encounters, terrain, tables.
-
-    Their content fixes results as much as the values do.
-    """
-    if isinstance(value, Mapping):
-        return _files_in(list(value.values()))
-    if isinstance(value, list | tuple):
-        return set().union(*map(_files_in, value))
-    if not isinstance(value, str):
-        return set()
-    try:
-        path = getattr(value, "folder", Path()) / Path(value)
-        return {path.resolve()} if path.is_absolute() and path.is_file() else set()
-    except (OSError, ValueError):  # a text that can be no path
-        return set()
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

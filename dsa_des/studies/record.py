@@ -131,7 +131,7 @@ class StudyRecord(StudyHead):
     @staticmethod
     def of(study: Study) -> "StudyRecord":
         """Return the record of a study."""
-        from dsa_des.studies.folder import description_text
+        from dsa_des.studies.identity import description_text
 
         return StudyRecord.model_validate_json(description_text(study))
 
