@@ -107,7 +107,7 @@ def test_one_instance_serves_clocks_that_differ(lock, change):
 
 @pytest.mark.parametrize("change", CLOCKS)
 def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
-    """Such a radar reads its clock, so it is split; what it asks of the traffic must be the same."""
+    """Such a radar reads its clock, so it is split; its requests must stay the same."""
     scene = near("blocks.radar.beam_sweep=true", "blocks.gate.latency_s=0.25", duration_s="15")
     changes = {f"blocks.radar.{name}": value for name, value in change.items()}
     scenes = lock.replicas_of(scene, {}, changes, changes)
