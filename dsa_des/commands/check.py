@@ -2,6 +2,7 @@
 
 import click
 
+from dsa_des.collection import no_collection
 from dsa_des.commands.loading import load
 from dsa_des.simulation import Simulation
 
@@ -14,8 +15,9 @@ def check_scene_file(
     duration: str | None,
 ) -> None:
     """Load a scene, prepare its blocks (files are read), and say what was found."""
-    loaded = load(scene, sets, swaps, seed, duration)
-    simulation = Simulation(loaded)
+    with no_collection():
+        loaded = load(scene, sets, swaps, seed, duration)
+        simulation = Simulation(loaded)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     click.echo(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "
