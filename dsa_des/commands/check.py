@@ -1,5 +1,6 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
+from dsa_des.collection import no_collection
 from dsa_des.commands.loading import load
 from dsa_des.foreign import Foreign, Imports, imports
 from dsa_des.simulation import Simulation
@@ -25,7 +26,7 @@ def check_scene_file(
         verb = "does not import" if no_import else "imports"
         say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
 
-    with imports(Imports(allowed=not no_import, announce=announce)) as policy:
+    with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
         loaded = load(scene, sets, swaps, seed, duration)
         if no_import and policy.seen:
             say(
