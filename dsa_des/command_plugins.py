@@ -4,17 +4,43 @@ Each entry point is a `click.Command` in a module that imports click only, so th
 instant: a command imports what it needs when it is called.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import click
 
 from dsa_des.entry_points import registered
+from dsa_des.safe_text import printable
 
 COMMANDS = "dsa_des.commands"
 
 
+@contextmanager
+def _printable_errors() -> Iterator[None]:
+    """Escape what click repeats of the arguments in its own errors."""
+    try:
+        yield
+    except click.ClickException as error:
+        attributes = vars(error)  # click calls them final
+        for name in ("message", "ui_filename"):
+            if name in attributes:
+                attributes[name] = printable(attributes[name])
+        raise
+
+
 class PluginGroup(click.Group):
     """A command group whose registered commands are loaded when they are named or listed."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Read the arguments as click does."""
+        with _printable_errors():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the command that is named, as click does."""
+        with _printable_errors():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return our own commands and the registered ones, sorted."""

@@ -32,6 +32,17 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     return f"; allowed: {shown}"
 
 
+class Lines(str):
+    """A message of several lines, each of which is printable already."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, lines: Iterable[object]) -> "Lines":
+        """Return lines, made printable, as one message."""
+        return cls("\n".join(printable(line) for line in lines))
+
+
 _UNSET: Any = object()
 
 
@@ -61,7 +72,8 @@ class Problem:
         if self.value is not _UNSET:
             where += f" = {shortened(repr(self.value), MOST_OF_A_VALUE)}"
         # On one line whatever stands in a name: nobody can write a message of ours.
-        return printable(f"{where}: {self.message}")
+        several = isinstance(self.message, Lines)
+        return f"{printable(where)}: {printable(self.message, lines=several)}"
 
 
 class SceneError(Exception):

@@ -125,6 +125,10 @@ def check_activity(
     problems: list[Problem],
 ) -> None:
     """Add blocks that would never run, and wires that hold a message for a queued input."""
+    faults: list[Problem] = []
+    clocks = _clocks(scene, blocks, faults)
+    if faults:  # said before
+        return
     woken = {
         wire.target
         for wire in wires
@@ -132,7 +136,7 @@ def check_activity(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
-        if not alive and block.cls.clock_of(block.parameters) is None:
+        if not alive and name not in clocks:
             message = (
                 "would never run: it has no scan clock, no process of its own, and no wire into "
                 "a trigger input"

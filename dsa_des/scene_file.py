@@ -13,6 +13,7 @@ from typing import Any
 
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, SceneError
+from dsa_des.toml_reason import toml_reason
 
 Key = tuple[str | int, ...]
 COMMAND_LINE = "command line"
@@ -84,7 +85,7 @@ class _Reader:
         try:
             table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
-            self.problems.append(Problem(str(path), "", f"is not valid TOML: {error}"))
+            self.problems.append(Problem(str(path), "", f"is not valid TOML: {toml_reason(error)}"))
             return {}
         self.sources[at] = str(path)
         return self._table(table, path, at, (*chain, path.resolve()))
