@@ -8,7 +8,11 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
+from dsa_des.strangers import raised_in, told
 from dsa_des.terminal import say, say_lines
+
+# Who may end a command; whoever else does is a stranger's code in a place not foreseen.
+_OURS = ("dsa_des", "components", "click")
 
 
 def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
@@ -24,6 +28,12 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
         except (BlockFailure, OutputError) as error:
             say_lines(f"error: {error}", err=True)
             sys.exit(getattr(error, "exit_code", 1))
+        except SystemExit as error:
+            module = raised_in(error.__traceback__)
+            if module.partition(".")[0] in _OURS:
+                raise
+            say(f"error: the module {module!r} left with {told(error)}", err=True)
+            sys.exit(2)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()
             sys.exit(1)

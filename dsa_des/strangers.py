@@ -21,10 +21,11 @@ def is_ours_to_obey(error: BaseException) -> bool:
         return False
     if isinstance(error, KeyboardInterrupt | GeneratorExit):
         return True
-    return _raised_in(error.__traceback__).startswith("dsa_des.")
+    return raised_in(error.__traceback__).startswith("dsa_des.")
 
 
-def _raised_in(trace: TracebackType | None) -> str:
+def raised_in(trace: TracebackType | None) -> str:
+    """Return the name of the module in which an exception was raised."""
     name = ""
     while trace is not None:
         name = str(trace.tb_frame.f_globals.get("__name__", ""))

@@ -115,6 +115,18 @@ class Runs(Plain):
     assert not (tmp_path / "o").exists()
 
 
+def test_a_metric_that_leaves_does_not_end_a_study_without_a_word(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import sys\nfrom components.metrics.detection import FirstDetection\n"
+        "class Left(FirstDetection):\n    def results(self): sys.exit(0)\n"
+    )
+    (tmp_path / "study.toml").write_text(
+        f'scene = "{SCENE}"\nreplicas = 1\nmetrics = ["mine:Left"]\nset.duration_s = 1\n'
+    )
+    done = call(tmp_path, "study", "study.toml", "--workers", "1", "--out", "s")
+    assert "'mine' left with SystemExit: 0" in one_error(done)
+
+
 def test_nothing_beside_the_scene_stands_in_for_an_installed_package(tmp_path: Path) -> None:
     for name in ("pyarrow", "numpy", "components", "rich", "optional_and_not_installed"):
         (tmp_path / f"{name}.py").write_text("open('ran', 'w')")
