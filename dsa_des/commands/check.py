@@ -2,7 +2,7 @@
 
 import click
 
-from dsa_des.commands.loading import load
+from dsa_des.commands.loading import load, say_if_long
 from dsa_des.simulation import Simulation
 
 
@@ -16,6 +16,7 @@ def check_scene_file(
     """Load a scene, prepare its blocks (files are read), and say what was found."""
     loaded = load(scene, sets, swaps, seed, duration)
     simulation = Simulation(loaded)
+    say_if_long(simulation)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     click.echo(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

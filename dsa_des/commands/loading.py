@@ -5,6 +5,18 @@ from collections.abc import Iterable
 import click
 
 from dsa_des.scene import Scene, load_scene
+from dsa_des.simulation import Simulation
+
+
+# Most scenes make some thousand scans in a second of the processor.
+_MANY_SCANS = 1e8
+
+
+def say_if_long(simulation: Simulation) -> None:
+    """Say on standard error that a run will take long: nobody should wait for it unawares."""
+    if simulation.scans > _MANY_SCANS:
+        message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
+        click.echo(f"{message}{simulation.scans:.2g} scans", err=True)
 
 
 def load(

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from dsa_des import __version__
-from dsa_des.commands.loading import load
+from dsa_des.commands.loading import load, say_if_long
 from dsa_des.pacing import Pacer, parse_factor
 from dsa_des.plain_json import json_text
 from dsa_des.recording import ObserverSink, Recorder
@@ -78,6 +78,7 @@ def record_run(
     check_target(target)
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
+    say_if_long(simulation)
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()

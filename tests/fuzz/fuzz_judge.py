@@ -4,6 +4,7 @@ A case of a few milliseconds then takes no second of imports, and one that hangs
 ended without harm to the others.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -109,7 +110,7 @@ def _be_the_case(case: Case, home: Path, limit_s: float) -> None:
             flags = os.O_RDONLY if number == 0 else os.O_WRONLY | os.O_CREAT | os.O_TRUNC
             os.dup2(os.open(name, flags, 0o600), number)
         sys.stdin, sys.stdout, sys.stderr = (
-            open(number, mode, encoding="utf-8", errors="surrogateescape", closefd=False)
+            open(number, mode, encoding="utf-8", errors="surrogateescape", closefd=False)  # noqa: SIM115
             for number, mode in ((0, "r"), (1, "w"), (2, "w"))
         )
         seconds = int(limit_s)
@@ -189,10 +190,8 @@ def import_everything() -> None:
         "scipy.special", "scipy.stats", "components.display.figures", "trimesh",
         "components.optical.comparison_command", "components.optical.mesh",
     ):  # fmt: skip
-        try:
+        with contextlib.suppress(ImportError):
             importlib.import_module(module)
-        except ImportError:
-            pass
     from fuzz_scenes import known_keys
 
     known_keys()
