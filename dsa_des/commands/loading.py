@@ -7,9 +7,8 @@ import click
 from dsa_des.scene import Scene, load_scene
 from dsa_des.simulation import Simulation
 
-
-# Most scenes make some thousand scans in a second of the processor.
-_MANY_SCANS = 1e8
+# Half a minute of the processor, for most scenes.
+_MANY_SCANS = 1e7
 
 
 def say_if_long(simulation: Simulation) -> None:
