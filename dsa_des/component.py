@@ -95,7 +95,7 @@ class ClockedParameters(Parameters):
         default=Fraction(0), description="Time of the first scan, s."
     )
     rate_error_ppm: Rational = Field(
-        default=Fraction(0), description="Error of the scan rate, parts per million."
+        default=Fraction(0), le=1_000_000, description="Error of the scan rate, parts per million."
     )
     jitter_s: float = Field(
         default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."

@@ -38,6 +38,8 @@ from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
+# At a microsecond each, the fewest that anything takes, eleven days.
+_MOST_SCANS = 1e12
 # What a block raises, before anything runs, because of what its table says: nothing it can be
 # made of, or nothing that can be computed or held in memory.
 _REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
@@ -145,7 +147,9 @@ class Simulation:
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
         connect(scene, self.nodes, self.replicas)
-        check_reach(scene, self.nodes, self.end_tick)
+        if self.replicas is None:  # replicas in lock step were judged one by one
+            check_reach(scene, self.nodes, self.end_tick)
+            self._refuse_endless_work()
         self.window_ticks = self._window_length(window)
 
     #: Whether a failure inside a window is traced to its instant by running the scene again.
@@ -322,6 +326,20 @@ class Simulation:
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
             self.recorder.record(block, message)
+
+    @property
+    def scans(self) -> float:
+        """How many scans of all clocks together the run has, about."""
+        clocks = [node.clock for node in self.nodes.values() if node.clock is not None]
+        return float(sum(self.end_tick / clock.period for clock in clocks))
+
+    def _refuse_endless_work(self) -> None:
+        if self.scans > _MOST_SCANS:
+            message = (
+                f"is {float(self.duration_s):.4g} s, in which the clocks of this scene make "
+                f"{self.scans:.2g} scans: at most {_MOST_SCANS:.0e} are simulated"
+            )
+            raise SceneError([self._problem("duration_s", message)])
 
     def _window_length(self, window: int | None) -> int:
         """Return the ticks of a window that holds about the wanted number of scans."""

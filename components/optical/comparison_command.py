@@ -133,11 +133,13 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
             )
         return dict(zip(_AREAS, values, strict=True))
     try:
-        table = parse_toml(read_input_text(options.aircraft, LARGEST_TOML_BYTES)).get("eo")
+        content = parse_toml(read_input_text(options.aircraft, LARGEST_TOML_BYTES))
     except ValueError as error:
         raise ValueError(f"--aircraft {options.aircraft}: {error}") from None
+    eo = content.get("eo")
+    table: dict[str, Any] = eo if isinstance(eo, dict) else {}
     for name in _AREAS:
-        value = table.get(name) if isinstance(table, dict) else None
+        value = table.get(name)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(f"{options.aircraft} has no number eo.{name}: --aircraft needs it")
     assert isinstance(table, dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -192,6 +193,10 @@ def load_mesh(
         raise ImportError(
             "reading a mesh needs the library trimesh: pip install 'dsa-des[mesh]'"
         ) from error
+    # What trimesh cannot read is said once, below; by itself it would print tracebacks as well.
+    log = logging.getLogger("trimesh")
+    if not log.handlers:
+        log.addHandler(logging.NullHandler())
     try:
         status_of(Path(path))
         loaded: Any = trimesh.load(str(path), force="mesh")

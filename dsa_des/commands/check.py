@@ -1,7 +1,7 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
 from dsa_des.collection import no_collection
-from dsa_des.commands.loading import load
+from dsa_des.commands.loading import load, say_if_long
 from dsa_des.foreign import Foreign, Imports, imports
 from dsa_des.simulation import Simulation
 from dsa_des.terminal import say
@@ -36,6 +36,7 @@ def check_scene_file(
             )
             return
         simulation = Simulation(loaded)
+    say_if_long(simulation)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

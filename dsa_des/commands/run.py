@@ -11,7 +11,7 @@ from typing import Any
 
 from dsa_des import __version__, terminal
 from dsa_des.attempts import attempt
-from dsa_des.commands.loading import load
+from dsa_des.commands.loading import load, say_if_long
 from dsa_des.output_file import write_file
 from dsa_des.output_folder import OutputFolder
 from dsa_des.pacing import Pacer, parse_factor
@@ -82,6 +82,7 @@ def record_run(
     target.check()
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
+    say_if_long(simulation)
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-KINDS = ("scene", "file", "study", "override")
+KINDS = ("scene", "file", "study", "override", "sweep")
 
 
 @dataclass
@@ -47,6 +47,7 @@ def make_case(kind: str, seed: int, number: int) -> Case:
     from fuzz_overrides import override_case
     from fuzz_scenes import scene_case
     from fuzz_studies import study_case
+    from fuzz_sweep import sweep_case
 
     makers: dict[str, Callable[[random.Random, Case], Case]] = {
         "scene": scene_case,
@@ -55,4 +56,6 @@ def make_case(kind: str, seed: int, number: int) -> Case:
         "override": override_case,
     }
     name = f"{kind}-{seed}-{number}"
+    if kind == "sweep":
+        return sweep_case(number, Case(name))
     return makers[kind](random.Random(name), Case(name))

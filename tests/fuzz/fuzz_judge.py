@@ -4,6 +4,7 @@ A case of a few milliseconds then takes no second of imports, and one that hangs
 ended without harm to the others.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -46,7 +47,8 @@ def judge(case: Case, limit_s: float = LIMIT_S) -> tuple[int | None, list[str]]:
 def _faults(case: Case, code: int | None, out: str, error: str, left: set[str]) -> list[str]:
     found = []
     if code is None:
-        return ["hang"]
+        # A long run is no fault where it was said to be one.
+        return [] if re.search(r"^note: .* scans$", error, re.MULTILINE) else ["hang"]
     if "Traceback (most recent call last)" in error + out:
         found.append("traceback: " + error.strip().splitlines()[-1][:150])
     if "Warning: " in error:
@@ -109,7 +111,7 @@ def _be_the_case(case: Case, home: Path, limit_s: float) -> None:
             flags = os.O_RDONLY if number == 0 else os.O_WRONLY | os.O_CREAT | os.O_TRUNC
             os.dup2(os.open(name, flags, 0o600), number)
         sys.stdin, sys.stdout, sys.stderr = (
-            open(number, mode, encoding="utf-8", errors="surrogateescape", closefd=False)
+            open(number, mode, encoding="utf-8", errors="surrogateescape", closefd=False)  # noqa: SIM115
             for number, mode in ((0, "r"), (1, "w"), (2, "w"))
         )
         seconds = int(limit_s)
@@ -156,7 +158,7 @@ def _simulate(argv: list[str]) -> None:
     @_scene_options
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
-        from dsa_des.commands.loading import load
+        from dsa_des.commands.loading import load, say_if_long
         from dsa_des.plain_json import json_text
         from dsa_des.recording import MemorySink, ObserverSink, Recorder
         from dsa_des.reports import load_reports
@@ -166,6 +168,7 @@ def _simulate(argv: list[str]) -> None:
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
         recorder = Recorder([MemorySink()])
         simulation = Simulation(loaded, recorder=recorder)
+        say_if_long(simulation)
         observers = ObserverSink(
             o for report in load_reports() for o in report.observers(simulation)
         )
@@ -189,10 +192,8 @@ def import_everything() -> None:
         "scipy.special", "scipy.stats", "components.display.figures", "trimesh",
         "components.optical.comparison_command", "components.optical.mesh",
     ):  # fmt: skip
-        try:
+        with contextlib.suppress(ImportError):
             importlib.import_module(module)
-        except ImportError:
-            pass
     from fuzz_scenes import known_keys
 
     known_keys()

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Command lines: ``--set``, ``--swap``, ``--seed``, ``--duration`` and names of all sorts."""
 
 import random

@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Scenes with one to four things wrong with them: values, keys, wiring, text."""
 
 import copy
@@ -164,13 +165,21 @@ def set_parameter(rng: random.Random, scene: dict[str, Any], item: Any) -> str:
     names = known_keys()[known]
     if not names:
         return ""
-    *inner, last = rng.choice(names).split(".")
-    table, key = scene, ""
+    return place_of(scene, path, rng.choice(names), item, rng.randrange(9))
+
+
+def place_of(
+    scene: dict[str, Any], path: tuple[str, ...], name: str, item: Any, place: int = 0
+) -> str:
+    """Put a value at a dotted name below a table of a scene; return its key, or nothing."""
+    *inner, last = name.split(".")
+    table: Any = scene
+    key = ""
     for part in (*path, *inner):
         table = table.setdefault(part, {})
         key += f".{part}" if key else part
         if isinstance(table, list):
-            position = rng.randrange(len(table)) if table else 0
+            position = place % len(table) if table else 0
             if not table:
                 table.append({})
             table = table[position]

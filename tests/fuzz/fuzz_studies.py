@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Studies with something wrong in them: axes, draws, metrics, figures, texts."""
 
 import copy
