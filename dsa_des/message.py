@@ -7,7 +7,6 @@ when they run in a look-ahead window. Physics written over rows serves both.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -21,6 +20,8 @@ STATIC = "static"  # the same for all rows
 
 #: Row and entry fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+#: Fields that hold instants beside `Message.tick`.
+_TICK_FIELDS: dict[type, tuple[str, ...]] = {}
 
 
 def per_row(**kwargs: Any) -> Any:
@@ -59,9 +60,11 @@ def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return _LAYOUTS[message_type]
 
 
-@lru_cache(maxsize=None)
 def _tick_fields(message_type: type) -> tuple[str, ...]:
-    return tuple(item.name for item in fields(message_type) if item.metadata.get("is_tick"))
+    if message_type not in _TICK_FIELDS:
+        names = (item.name for item in fields(message_type) if item.metadata.get("is_tick"))
+        _TICK_FIELDS[message_type] = tuple(names)
+    return _TICK_FIELDS[message_type]
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +206,7 @@ def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
     if result is None:
         return {}
     if not isinstance(result, Message):
-        return result  # type: ignore[no-any-return]
+        return result
     if len(outputs) != 1:
         raise TypeError(
             f"returned one message but has {len(outputs)} outputs; return a dict of "

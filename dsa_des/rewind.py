@@ -67,9 +67,7 @@ def _optional(
     return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
 
 
-def telling_order(
-    graph: nx.DiGraph, classes: Mapping[str, type[Component]]
-) -> dict[str, int]:
+def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
     """Return the place of each block in the order in which blocks tell each other what they offer.
 
     Requests go the other way. Both pass over wires with and without delay; loops are opened where

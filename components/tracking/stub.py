@@ -28,8 +28,8 @@ class TrackerStub(Component):
     """Holds the last fused measurement of each target, its age, and which sensors gave it.
 
     Tracks are sent at every instant at which at least one target was updated: that is when the
-    measurement has come, whenever the fusion sent it, and ages count from then on. A false alarm belongs
-    to no target and is left out: a stub does not start tracks.
+    measurement has come, whenever the fusion sent it, and ages count from then on. A false alarm
+    belongs to no target and is left out: a stub does not start tracks.
     """
 
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
