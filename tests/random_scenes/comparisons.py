@@ -121,7 +121,7 @@ def ways(case: Case, scene: Scene, dice: Dice, folder: Path) -> Iterator[tuple[s
     cuts = sorted({dice.randrange(end) for _ in range(dice.randint(1, 12))})
     window = dice.pick(None, None, 29)
     yield f"cuts={cuts}, window={window}", run(cuts=cuts, window=window)
-    ties, window = dice.randrange(100), dice.pick(None, 1, 5)
+    ties, window = dice.randrange(100), dice.pick(None, None, 5)
     yield f"shuffle_ties={ties}, window={window}", run(shuffle_ties=ties, window=window)
 
     def reordered() -> Any:
