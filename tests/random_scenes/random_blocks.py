@@ -4,7 +4,7 @@ from typing import Any
 
 from dice import Dice
 
-TRANSFORMS = ("ellipsoid", "ellipsoid", "geodesic", "local_radii", "flat_earth")
+TRANSFORMS = (*["ellipsoid"] * 4, "geodesic", *["local_radii", "flat_earth"] * 2)
 SENSORS = (
     "radar.threshold", "radar.threshold", "radar.swerling", "radar.swerling",
     "radar.range_boundary", "optical.eo", "optical.ir", "optical.projection",

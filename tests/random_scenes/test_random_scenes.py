@@ -13,8 +13,8 @@ from dice import Dice
 from random_scene import legal_case
 
 LIMIT_S = 60.0
-FEW = range(9_000_000, 9_000_024)
-MORE = range(9_100_000, 9_100_200)
+FEW = range(9_000_000, 9_000_016)
+MORE = range(9_100_000, 9_100_040)
 
 
 @pytest.mark.parametrize("seed", FEW)
@@ -37,12 +37,12 @@ def test_a_scene_is_a_function_of_its_seed(tmp_path):
 
 
 def test_hash_seeds_change_nothing(tmp_path):
-    paths = [legal_case(seed, tmp_path / str(seed)).write(tmp_path / str(seed)) for seed in FEW[:4]]
+    paths = [legal_case(seed, tmp_path / str(seed)).write(tmp_path / str(seed)) for seed in FEW[:3]]
     assert studies.hash_seeds_differ(paths, 10 * LIMIT_S) == ""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", FEW[:6])
+@pytest.mark.parametrize("seed", FEW[:3])
 def test_a_random_study_gives_the_same_with_one_and_two_workers(seed, tmp_path):
     case = legal_case(seed, tmp_path)
     study = studies.write_study(case, tmp_path, Dice(seed))
@@ -67,7 +67,7 @@ def test_what_differs_is_seen(tmp_path):
 def test_the_generator_leaves_nothing_out(tmp_path):
     """Over some hundred scenes every type of block, loop, beam and fault on the way occurs."""
     features: set[str] = set()
-    for seed in range(9_200_000, 9_200_150):
+    for seed in range(9_200_000, 9_200_120):
         features |= legal_case(seed, tmp_path).features
     wanted = {
         "closed loop", "sweeping beam in a loop", "update_rate_hz", "shared processors",
