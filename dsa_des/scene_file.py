@@ -30,7 +30,7 @@ COMMAND_LINE = "command line"
 _LONGEST_CHAIN = 32
 # Values taken from files, counted each time that a file is extended: files that extend the next
 # one twice would double them at every step.
-_MOST_VALUES = 2_000_000
+_MOST_VALUES = 20_000_000
 # What a file counts for, however short it is.
 _VALUES_PER_FILE = 20
 
