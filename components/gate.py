@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from components.reach import Decision, FarthestLook, Reach, farthest_look
-from components.target_messages import GatedTargets, RelativeTargets
-from dsa_des.component import Component
-from dsa_des.message import Message
-from dsa_des.ports import Input, Output
-from dsa_des.wake import Wake
+from components.messages.reach import Decision, FarthestLook, Reach, farthest_look
+from components.messages.targets import GatedTargets, RelativeTargets
+from dsa_des.block.component import Component
+from dsa_des.block.message import Message
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
 
 
 class Gate(Component):

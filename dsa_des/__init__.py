@@ -1,7 +1,7 @@
 """The engine of dsa_des: time, ports, graph, runs and recording of block simulations.
 
 The package knows no radar. Blocks are found by their registered names (see
-`dsa_des.registry`), so this package never imports `components`.
+`dsa_des.block.registry`), so this package never imports `components`.
 """
 
 from typing import Any
@@ -10,14 +10,14 @@ __version__ = "0.1.0"
 
 # Names are looked up on first use: `dsa-des --help` must not pay for NumPy or Arrow.
 _PUBLIC = {
-    "read_run": "dsa_des.run_folder",
-    "load_scene": "dsa_des.scene",
-    "Simulation": "dsa_des.simulation",
-    "Component": "dsa_des.component",
-    "Parameters": "dsa_des.component",
-    "Input": "dsa_des.ports",
-    "Output": "dsa_des.ports",
-    "Message": "dsa_des.message",
+    "read_run": "dsa_des.record.run_folder",
+    "load_scene": "dsa_des.scene.scene",
+    "Simulation": "dsa_des.run.simulation",
+    "Component": "dsa_des.block.component",
+    "Parameters": "dsa_des.block.component",
+    "Input": "dsa_des.block.ports",
+    "Output": "dsa_des.block.ports",
+    "Message": "dsa_des.block.message",
 }
 
 __all__ = [

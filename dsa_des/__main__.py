@@ -6,7 +6,7 @@ Next to nothing is imported before that is so.
 import os
 import signal
 
-from dsa_des.interruption import plain_ending
+from dsa_des.terminal.interruption import plain_ending
 
 
 def start() -> None:

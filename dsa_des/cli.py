@@ -11,8 +11,8 @@ from typing import Any
 import click
 
 from dsa_des import __version__
-from dsa_des.command_plugins import PluginGroup
-from dsa_des.plain_errors import plain_errors
+from dsa_des.commands.plain_errors import plain_errors
+from dsa_des.commands.plugins import PluginGroup
 
 
 def _scene_options(

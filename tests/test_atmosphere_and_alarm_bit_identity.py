@@ -15,7 +15,7 @@ from components.atmosphere.visibility import (
     fog_visibility_m,
     rain_visibility_m,
 )
-from components.navigation_error import attitude_with_error, position_with_error
+from components.navigation.error_model import attitude_with_error, position_with_error
 from components.optical.false_alarms import false_alarm_direction, false_alarm_in_frame
 from components.radar.beam_sweep import illumination_offset_s
 from components.radar.clutter import clutter_detection_probability

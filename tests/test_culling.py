@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster
 from components.geometry.ellipsoid import line_of_sight
-from components.target_messages import TrafficStates
+from components.messages.targets import TrafficStates
 from components.traffic.culling import Culling
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints
 from components.traffic.trajectory import SampledTrajectory
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 OWN = ScriptedTrajectory("own", lat_deg=52.0, lon_deg=4.0, alt_m=1000, speed_mps=50)
 

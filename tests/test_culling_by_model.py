@@ -7,16 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.aircraft import Roster
+from components.aircraft.aircraft import Roster
+from components.aircraft.known_targets import KnownTraffic
 from components.geometry import ellipsoid
-from components.geometry.transform import LINES_OF_SIGHT
-from components.geometry.true_reach import true_reach_m
-from components.known_targets import KnownTraffic
-from components.reach import FarthestLook
-from components.traffic.enu import enu_to_geodetic
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from components.geometry.enu import enu_to_geodetic
+from components.line_of_sight.transform import LINES_OF_SIGHT
+from components.line_of_sight.true_reach import true_reach_m
+from components.messages.reach import FarthestLook
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 # Two rings of slow targets about the radar's 15 km: flat Earth sees some of them half a per cent
 # nearer, and some farther, than they are.

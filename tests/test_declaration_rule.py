@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.declaration import (
+from components.sensor.declaration import (
     declaration_probability,
     declare,
     declare_looks,

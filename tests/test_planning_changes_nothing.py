@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.environment import Weather
+from components.environment.tables import Weather
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
-from dsa_des.arrow import ParquetSink
-from dsa_des.component import Context
-from dsa_des.effects import plan
-from dsa_des.randomness import Streams
-from dsa_des.recording import Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.block.component import Context
+from dsa_des.block.effect import plan
+from dsa_des.record.arrow import ParquetSink
+from dsa_des.record.recording import Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.randomness import Streams
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 SCENES = sorted(p for p in CONFIGS.glob("*.toml") if p.name != "detect_and_sense.toml")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from components.arguments.checks import FloatArray, as_numbers, not_negative, refuse
 from components.atmosphere.fog import fog_specific_attenuation
 from components.atmosphere.gas import gas_specific_attenuation
 from components.atmosphere.rain import RainCoefficients, polarisation_balance, rain_coefficients
@@ -14,7 +15,6 @@ from components.atmosphere.standard_atmosphere import (
     SEA_LEVEL_VAPOUR_DENSITY_G_M3,
     standard_atmosphere,
 )
-from components.checks import FloatArray, as_numbers, not_negative, refuse
 
 BOTTOM_M = -1_000.0
 TOP_M = 40_000.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, not_negative, unflatten
+from components.arguments.checks import broadcast_flat, not_negative, unflatten
 
 
 def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: ArrayLike) -> Any:

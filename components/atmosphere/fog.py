@@ -6,8 +6,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from components.atmosphere.inputs import checked_frequency, within
-from components.checks import broadcast_flat, not_negative, unflatten
+from components.arguments.checks import broadcast_flat, not_negative, unflatten
+from components.arguments.frequencies import checked_frequency, within
 
 HIGHEST_FREQUENCY_HZ = 200e9
 

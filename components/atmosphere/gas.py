@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.atmosphere.inputs import checked_frequency, within
+from components.arguments.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.frequencies import checked_frequency, within
 from components.atmosphere.recommendation_tables import columns
-from components.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
 
 HIGHEST_FREQUENCY_HZ = 1e12
 

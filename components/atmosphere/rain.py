@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.atmosphere.inputs import checked_frequency, within
+from components.arguments.checks import FloatArray, broadcast_flat, not_negative, unflatten
+from components.arguments.detection import one_of
+from components.arguments.frequencies import checked_frequency, within
 from components.atmosphere.recommendation_tables import rows
-from components.checks import FloatArray, broadcast_flat, not_negative, unflatten
-from components.radar.inputs import one_of
 
 HIGHEST_FREQUENCY_HZ = 1e12
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 
 _FOLDER = Path(__file__).parent / "data"
 

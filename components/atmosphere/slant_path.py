@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.arguments.checks import FloatArray, broadcast_flat, finite, not_negative, unflatten
 from components.atmosphere.altitude_table import BOTTOM_M, STEP_M, AttenuationTable
-from components.checks import FloatArray, broadcast_flat, finite, not_negative, unflatten
 
 EARTH_RADIUS_M = 6_371_000.0
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.atmosphere.inputs import within
+from components.arguments.checks import broadcast_flat, not_negative, unflatten
+from components.arguments.frequencies import within
 from components.atmosphere.recommendation_tables import columns
-from components.checks import broadcast_flat, not_negative, unflatten
 
 LOWEST_ALTITUDE_M = -5_000.0
 HIGHEST_ALTITUDE_M = 80_000.0

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
 from components.optical.contrast import KOSCHMIEDER
 
 __all__ = [

@@ -6,11 +6,11 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.messages import Tracks
-from components.steering import Manoeuvres
-from dsa_des.component import Component, NonNegativeRational, Parameters
-from dsa_des.ports import Input, Output
-from dsa_des.wake import Wake
+from components.messages.detections import Tracks
+from components.messages.steering import Manoeuvres
+from dsa_des.block.component import Component, NonNegativeRational, Parameters
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
 
 
 class TurnAwayParameters(Parameters):

@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""A detect-and-sense run summed up, as tables and as figures."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.types import AnyArray, BoolArray
+from dsa_des.arrays.types import AnyArray, BoolArray
 
 
 def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

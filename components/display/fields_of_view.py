@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.display.figures import style_of
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 
 @dataclass

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dsa_des.drawing import DPI, drawing, figure_text
+from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
 
 #: Okabe and Ito's colours, told apart with any kind of colour vision, each with its marker and
 #: its size in points. Sensors see the same target in the same place: big open marks first and

@@ -9,10 +9,10 @@ import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
 from components.traffic.source import TrafficSource
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
 
 MOST_POINTS = 30_000
 """Points of all tracks together."""

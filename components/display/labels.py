@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 FONT_SIZE = 8
 _LINE_PX = FONT_SIZE * 1.9

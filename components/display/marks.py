@@ -8,7 +8,7 @@ import numpy as np
 
 from components.display.row_groups import each_row_group
 from components.display.thinned_stream import ThinnedStream
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""

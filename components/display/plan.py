@@ -14,12 +14,12 @@ from components.display.marks import Detected
 from components.display.positions import positions
 from components.display.terminal import distance_text
 from components.display.thinning import evenly, staggered
-from components.mounting import BodyAxes
-from components.reach import Reach
-from dsa_des.types import FloatArray
+from components.messages.reach import Reach
+from components.sensor.mounting import BodyAxes
+from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
 
 MOST_NAMED = 8
 # Inches around the map.

@@ -5,7 +5,7 @@ import numpy as np
 from components.display.flights import Flights, Track
 from components.display.marks import Detected
 from components.display.thinning import by_target, evenly
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 MOST_MARKS = 20_000
 """Detections whose position is worked out; fewer are drawn."""

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from components.display.summary import FusedSummary, SensorSummary
-from components.messages import Detections
-from dsa_des.recording import Observer
+from components.messages.detections import Detections
+from dsa_des.record.recording import Observer
 
 if TYPE_CHECKING:
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
 
 
 class DetectAndSenseReport:

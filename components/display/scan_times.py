@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.display.row_groups import RowGroups, each_row_group, row_groups
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 _COLUMNS = ("block", "time_s", "detected")
 

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages import Detections
-from dsa_des.message import Text
-from dsa_des.recording import Columns
-from dsa_des.types import IntArray
+from components.messages.detections import Detections
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.message import Text
+from dsa_des.record.recording import Columns
 
 _SKIPPED = "skipped_"
 SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.startswith(_SKIPPED))

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from dsa_des.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shortened
 
 MOST_TARGETS = 10
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 
 def staggered(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:

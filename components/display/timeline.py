@@ -14,7 +14,7 @@ from components.display.scan_times import ScansShown, SensorScans, read_scans, s
 from components.display.thinning import by_target, evenly, staggered
 
 if TYPE_CHECKING:
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
 
 Scans = dict[str, SensorScans]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from components.embedding.host_traffic import HostTraffic, HostTrafficParameters, Plane
-from components.target_messages import TrafficStates
-from dsa_des.component import Component
+from components.messages.targets import TrafficStates
+from dsa_des.block.component import Component
+from dsa_des.block.registry import UnknownType, find
 from dsa_des.errors import Problem, SceneError, UsageError
-from dsa_des.registry import UnknownType, find
-from dsa_des.scene import Block, Scene, load_tables
-from dsa_des.scene_file import SceneFile, read_scene_file
+from dsa_des.scene.scene import Block, Scene, load_tables
+from dsa_des.scene.scene_file import SceneFile, read_scene_file
 
 HOST = "traffic.host"
 #: What the source is called in a scene that has none; its wires then name it so.

@@ -5,10 +5,10 @@ from typing import Any
 
 from pydantic import Field
 
-from components.aircraft import Aircraft, Roster
-from components.target_messages import TrafficStates
-from dsa_des.component import Component, Parameters
-from dsa_des.ports import Output
+from components.aircraft.aircraft import Aircraft, Roster
+from components.messages.targets import TrafficStates
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.ports import Output
 
 # A host says itself when it ends; effects that ask for the length of the run are told a year.
 _NO_END_S = Fraction(365 * 86400)

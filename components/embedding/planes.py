@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
-from components.aircraft import Aircraft
+from components.aircraft.aircraft import Aircraft
 from components.embedding.host_traffic import Plane
+from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.parameter_errors import explain
-from dsa_des.scene_file import SceneFile, merge, read_scene_file
-from dsa_des.types import FloatArray
+from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 
 _CALL = "add_plane"
 

@@ -7,9 +7,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from components.messages import Detections, FusedDetections
-from dsa_des.message import Message
-from dsa_des.types import FloatArray
+from components.messages.detections import Detections, FusedDetections
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.message import Message
 
 _NAN = math.nan
 

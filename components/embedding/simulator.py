@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.aircraft import Aircraft
+from components.aircraft.aircraft import Aircraft
 from components.embedding.host_scene import load_for_host, planes_known_to, source_of, with_host
 from components.embedding.planes import FixedPath, number_of, plane_of
 from components.embedding.result import Result, Sighting, sightings_of
 from components.embedding.states import checked_rows, traffic_states
-from components.messages import Detections, FusedDetections
+from components.messages.detections import Detections, FusedDetections
 from dsa_des.embed import HostDriven, Step
 from dsa_des.errors import Problem, SceneError
-from dsa_des.scene import Scene
+from dsa_des.scene.scene import Scene
 
 
 class Simulator:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.aircraft import Roster
-from components.geometry.inputs import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
-from components.target_messages import TrafficStates
-from dsa_des.types import FloatArray
+from components.aircraft.aircraft import Roster
+from components.arguments.positions import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
+from components.messages.targets import TrafficStates
+from dsa_des.arrays.types import FloatArray
 
 _NAMES = ("latitude", "longitude", "altitude", "yaw", "pitch", "roll")
 # A latitude of 90° that came through radians may be a last place above pi/2.

@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""Which detections of several sensors belong together, and what they say."""

@@ -6,8 +6,8 @@ that counts there, or -1.
 
 import numpy as np
 
-from dsa_des.types import IntArray
-from dsa_des.wake import Arrivals
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.wake import Arrivals
 
 
 def same_instant(keys: IntArray, asked: IntArray) -> IntArray:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from components.false_detections import FALSE_TARGET
-from components.messages import FusedDetections, mask_type
-from dsa_des.types import IntArray
-from dsa_des.wake import Arrivals
+from components.messages.detections import FusedDetections, mask_type
+from components.messages.false_detections import FALSE_TARGET
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.wake import Arrivals
 
 
 def pass_false_alarms(

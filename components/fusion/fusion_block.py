@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from components.messages import Detections, FusedDetections, SensorOffer, mask_type
-from dsa_des.component import Component
-from dsa_des.message import offsets_of
-from dsa_des.ports import Input, Output
-from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Arrivals
+from components.messages.detections import Detections, FusedDetections, SensorOffer, mask_type
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Arrivals
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (

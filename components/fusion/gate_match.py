@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 
 def nearest_in_gate(

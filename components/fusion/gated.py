@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.false_detections import FALSE_TARGET
 from components.fusion.fusion_block import Fusion
 from components.fusion.gate_match import nearest_in_gate
 from components.fusion.ladder import FUSION
-from components.messages import FusedDetections
-from dsa_des.component import NonNegativeRational, Parameters
-from dsa_des.types import IntArray
-from dsa_des.wake import Arrivals, Wake
+from components.messages.detections import FusedDetections
+from components.messages.false_detections import FALSE_TARGET
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import NonNegativeRational, Parameters
+from dsa_des.block.wake import Arrivals, Wake
 
 
 class GatedParameters(Parameters):

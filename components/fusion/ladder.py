@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from components.ladder_values import angle_apart_mrad, direction
-from components.true_entries import true_entries
-from dsa_des.component import Component
-from dsa_des.ladder import Ladder, Quantity, Rung
-from dsa_des.types import AnyArray, FloatArray, IntArray
-from dsa_des.wake import Wake
+from components.messages.true_entries import true_entries
+from components.sensor.ladder_values import angle_apart_mrad, direction
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.wake import Wake
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:

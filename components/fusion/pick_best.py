@@ -10,12 +10,12 @@ from components.fusion.coincidence import latest_in_gate, same_instant
 from components.fusion.false_alarms import pass_false_alarms
 from components.fusion.fusion_block import Fusion
 from components.fusion.ladder import FUSION
-from components.messages import FusedDetections
-from components.true_entries import true_entries
-from dsa_des.component import NonNegativeRational, Parameters
-from dsa_des.sorted_union import sorted_union
-from dsa_des.types import IntArray
-from dsa_des.wake import Arrivals, Wake
+from components.messages.detections import FusedDetections
+from components.messages.true_entries import true_entries
+from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import NonNegativeRational, Parameters
+from dsa_des.block.wake import Arrivals, Wake
 
 
 class PickBestParameters(Parameters):

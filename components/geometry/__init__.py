@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""Directions, rotations and the ellipsoid, as pure functions over arrays."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.inputs import FloatArray, common_shape, finite, shaped
+from components.arguments.positions import FloatArray, common_shape, finite, shaped
 
 TWO_PI = 2.0 * np.pi
 # What the double nearest to 2 pi leaves out of it (6.28318530717958647692528676655900577).

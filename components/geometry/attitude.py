@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from components.arguments.positions import FloatArray, common_shape, finite, shaped
 from components.geometry.angles import (
     sine_and_cosine,
     wrap_pi,
 )
-from components.geometry.inputs import FloatArray, common_shape, finite, shaped
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from components.arguments.positions import FloatArray, positions, shaped
 from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
@@ -12,7 +13,6 @@ from components.geometry.angles import (
     positive_turn,
     slope_angle,
 )
-from components.geometry.inputs import FloatArray, positions, shaped
 
 SEMI_MAJOR_AXIS_M = 6378137.0
 """WGS-84 equatorial radius (NIMA TR8350.2)."""

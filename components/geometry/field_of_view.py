@@ -7,8 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from components.arguments.positions import FloatArray, common_shape, finite
 from components.geometry.angles import TWO_PI, wrap_pi_unchecked
-from components.geometry.inputs import FloatArray, common_shape, finite
 
 BoolArray = npt.NDArray[np.bool_]
 

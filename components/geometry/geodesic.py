@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from components.arguments.positions import FloatArray, positions, shaped
 from components.geometry.angles import RAD_PER_DEG, positive_turn
-from components.geometry.inputs import FloatArray, positions, shaped
 
 BACKENDS = ("geographiclib", "pyproj")
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from components.arguments.positions import FloatArray, shaped
 from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
     azimuth_off_nose,
@@ -19,7 +20,6 @@ from components.geometry.attitude import (
     unit_vector,
     unit_vector_unchecked,
 )
-from components.geometry.inputs import FloatArray, shaped
 
 MODELS = ("exact", "small_angle")
 

@@ -1,1 +1,1 @@
-"""What studies measure of a detect-and-sense run: detection, declaration, fusion, encounters."""
+"""What a study measures of an encounter: detection, declaration, fusion, tracks."""

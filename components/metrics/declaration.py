@@ -15,9 +15,9 @@ from components.metrics.rows import (
     sensors_of,
     taken,
 )
-from dsa_des.scene import Scene
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
-from dsa_des.types import FloatArray, IntArray
 
 ANY = "any"
 

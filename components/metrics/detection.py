@@ -17,9 +17,9 @@ from components.metrics.rows import (
     taken,
     with_trials,
 )
-from dsa_des.scene import Scene
+from dsa_des.arrays.types import FloatArray
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Result, recorded_by
-from dsa_des.types import FloatArray
 
 _ROWS = ("block", "target", "time_s", "true_range_m")
 

@@ -13,10 +13,10 @@ from pydantic import Field
 
 from components.metrics.declaration import ANY, DeclarationParameters, declarations
 from components.metrics.rows import TargetMetric, sensors_of
-from components.separation import Flight, closest, first_inside, separations, traffic_block
-from dsa_des.scene import Scene
+from components.metrics.separation import Flight, closest, first_inside, separations, traffic_block
+from dsa_des.arrays.types import FloatArray
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
-from dsa_des.types import FloatArray
 
 FOOT_M = 0.3048
 WELL_CLEAR_M = (2000 * FOOT_M, 250 * FOOT_M)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from components.clock_coincidence import coincidence_share
-from components.jittered_coincidence import mean_coincidence_share
+from components.metrics.clock_coincidence import coincidence_share
+from components.metrics.jittered_coincidence import mean_coincidence_share
 from components.metrics.rows import (
     FUSED,
     SensorParameters,
@@ -19,11 +19,11 @@ from components.metrics.rows import (
     sensors_of,
     with_trials,
 )
-from dsa_des.clock import ClockSpec
-from dsa_des.message import Text
-from dsa_des.scene import Scene
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.message import Text
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.time.clock import ClockSpec
 
 
 class FusedShare(TargetMetric):

@@ -7,12 +7,12 @@ import numpy as np
 from pydantic import Field
 
 from components.traffic.source import TrafficSource
-from dsa_des.component import Component, Parameters
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
-from dsa_des.message import Columns, Text
-from dsa_des.scene import Scene
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Metric, recorded_by
-from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
 
 FUSED = "fused"
 

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from dsa_des.clock import ClockSpec
-from dsa_des.scene import Scene
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
 from dsa_des.studies.metric import recorded_by
-from dsa_des.wiring import Wire
+from dsa_des.time.clock import ClockSpec
 
 
 @dataclass(frozen=True)

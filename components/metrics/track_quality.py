@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
+from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
 from components.metrics.rows import (
     FUSED,
     TargetMetric,
@@ -17,10 +17,10 @@ from components.metrics.rows import (
     of_target,
 )
 from components.metrics.single_sensor import only_feed
-from dsa_des.message import Text
-from dsa_des.scene import Scene
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.message import Text
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Result, recorded_by
-from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
 class _Lines:

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft import Roster
+from components.aircraft.aircraft import Roster
 from components.optical.infrared_area import infrared_area
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
 from components.optical.tabulated_area import area_by_table, table_of_targets
-from components.sensor import Cells
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
 
 # Cells worked on together, so that what is in flight stays in the processor's cache.
 CELLS_AT_ONCE = 8192

@@ -7,16 +7,16 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from components.known_targets import known_targets
+from components.aircraft.known_targets import known_targets
 from components.optical.area_of_cells import check_silhouette
 from components.optical.dynamic_signature import DynamicSignature
 from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
-from components.sensor import Cells, Look, Sensor, SensorParameters
-from dsa_des.effects import Effect
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells, Look, Sensor, SensorParameters
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect
 
 CellValues = Callable[[Cells], FloatArray]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, not_negative, positive, unflatten
+from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
 from components.optical.line_of_sight_rate import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
 

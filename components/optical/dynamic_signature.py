@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from components.optical.line_of_sight_rate import line_of_sight_rate
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 class DynamicSignature(Effect):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, finite, refuse, unflatten
+from components.arguments.checks import broadcast_flat, finite, refuse, unflatten
 
 #: AFRL flight tests with a Beech Bonanza (thesis section 2.4.1): 0.045 % and 0.01 %, read as the
 #: probability of a false detection per frame (assumption).

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.known_targets import known_targets
+from components.aircraft.known_targets import known_targets
 
 # Covers the rounding of areas, pixels and signatures many times over.
 _MARGIN = 1.0 + 1e-9

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from components.false_detections import add_false_detections
-from components.messages import Detections
+from components.messages.detections import Detections
+from components.messages.false_detections import add_false_detections
 from components.optical.false_alarms import false_alarm_direction, false_alarm_in_frame
-from dsa_des.effects import Effect, Verdict
+from dsa_des.block.effect import Effect, Verdict
 
 # Draws 1 and 2 of a frame say where, draw 0 whether.
 _WHETHER, _AZIMUTH, _ELEVATION = range(3)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, not_negative, unflatten
-from components.optical.arrays import angle
+from components.arguments.angles import angle
+from components.arguments.checks import broadcast_flat, not_negative, unflatten
 from components.optical.silhouette import visible_area
 from components.optical.silhouette_exact import line_of_sight_in_target_axes
 

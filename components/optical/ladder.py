@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from components.ladder_values import over_cells
 from components.optical.convex_hull import union_area
-from components.sensor import Cells
-from dsa_des.component import Component
-from dsa_des.ladder import Ladder, Quantity, Rung, Unavailable
-from dsa_des.types import AnyArray, FloatArray, IntArray
-from dsa_des.wake import Wake
+from components.sensor.ladder_values import over_cells
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
+from dsa_des.block.wake import Wake
 
 _AREA = Quantity("area", "m²")
 

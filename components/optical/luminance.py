@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import (
+from components.arguments.angles import angle
+from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
     finite,
@@ -16,7 +17,6 @@ from components.checks import (
     refuse,
     unflatten,
 )
-from components.optical.arrays import angle
 from components.optical.line_of_sight_rate import angle_between
 from components.optical.sun_and_sky import (
     beam_illuminance,

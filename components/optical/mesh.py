@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.checks import FloatArray, finite
-from components.optical.aspect_table import AspectTable
-from dsa_des.input_files import InputFileError, status_of
-from dsa_des.safe_text import shortened
+from components.aircraft.silhouette_table import AspectTable
+from components.arguments.checks import FloatArray, finite
+from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.text.safe_text import shortened
 
 DEFAULT_ROWS = 1024
 

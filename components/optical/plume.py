@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from components.known_targets import known_targets
+from components.aircraft.known_targets import known_targets
 from components.optical.infrared_area import PLUME_SHARE_OF_BACK, plume_area
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 class Plume(Effect):

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import INFRARED, VISIBLE
-from components.sensor import Cells
-from dsa_des.ladder import Ladder
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.ladder import Ladder
 
 
 class ProjectionParameters(CameraParameters):

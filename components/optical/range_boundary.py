@@ -4,7 +4,7 @@ import numpy as np
 from pydantic import Field
 
 from components.optical.ladder import VISIBLE
-from components.sensor import Cells, Look, Sensor, SensorParameters
+from components.sensor.sensor import Cells, Look, Sensor, SensorParameters
 
 
 class RangeBoundaryParameters(SensorParameters):

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.optical.arrays import FloatArray
-from components.optical.aspect_table import AspectTable
+from components.aircraft.silhouette_table import AspectTable
+from components.arguments.angles import FloatArray
 from components.optical.convex_hull import PLATE_ASPECT_RATIO, union_area
 from components.optical.mesh import TriangleMesh
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import broadcast_flat, finite, not_negative, positive, unflatten
-from components.optical.arrays import FloatArray
+from components.arguments.angles import FloatArray
+from components.arguments.checks import broadcast_flat, finite, not_negative, positive, unflatten
 from components.optical.line_of_sight_rate import line_of_sight_rate
 
 __all__ = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 from components.optical.silhouette_exact import front_and_back_area
 
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft import Roster
+from components.aircraft.aircraft import Roster
 from components.optical.silhouette import visible_area
-from components.sensor import Cells
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
 
 
 def table_of_targets(roster: Roster, path: str) -> list[Any]:

@@ -10,11 +10,11 @@ from components.atmosphere.visibility import (
     fog_visibility_m,
     rain_visibility_m,
 )
-from components.environment import Weather
+from components.environment.tables import Weather
 from components.optical.contrast import visibility_transmission
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 class Visibility(Effect):

@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""Radars: the radar equation, detection probability, clutter and RCS."""

@@ -3,8 +3,8 @@
 import numpy as np
 
 from components.geometry.attitude import aspect_angles
-from components.sensor import Cells
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
 
 
 def mean_rcs_m2(cells: Cells) -> FloatArray:

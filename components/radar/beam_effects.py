@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from components.messages import Detections
+from components.messages.detections import Detections
+from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
+from components.messages.targets import GatedTargets, RelativeTargets
 from components.radar.beam_sweep import first_illumination, illumination_offset_s
 from components.radar.field_of_view import azimuth_width_rad
-from components.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
-from components.target_messages import GatedTargets, RelativeTargets
-from dsa_des.effects import Effect, Verdict
-from dsa_des.message import per_row
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.message import per_row
 
 
 class BeamSweep(Effect):
@@ -21,7 +21,7 @@ class BeamSweep(Effect):
     Everything about a target is then that of this instant, which is recorded as
     ``illuminated_s``: whether it is in reach, its SNR, its measured and true position. A target
     that the beam does not meet counts as outside the field of view. What the ownship believes of
-    itself (`components.navigation`) stays that of the scan's start.
+    itself (`components.navigation.effects`) stays that of the scan's start.
     """
 
     name = "beam sweep"

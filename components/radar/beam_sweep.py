@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import FloatArray, broadcast_flat, finite, positive, unflatten
+from components.arguments.checks import FloatArray, broadcast_flat, finite, positive, unflatten
 from components.geometry.angles import wrap_pi
-from dsa_des.types import BoolArray
+from dsa_des.arrays.types import BoolArray
 
 _TURN = 2.0 * math.pi
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding

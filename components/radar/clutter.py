@@ -36,9 +36,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
+from components.arguments.detection import checked_model, checked_probability, one_of
 from components.radar.detection import detection_probability
-from components.radar.inputs import checked_model, checked_probability, one_of
 from components.radar.marcum import marcum_q1
 
 KINDS = ("constant", "fluctuating")

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from components.radar.ground_clutter import ground_clutter_rcs_m2, height_above_terrain_m
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 _CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
 

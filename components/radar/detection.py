@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import FloatArray, broadcast_flat, unflatten
-from components.radar.detection_albersheim import albersheim_probability
-from components.radar.detection_exact import exact_probability
-from components.radar.detection_gram_charlier import gram_charlier_probability
-from components.radar.detection_shnidman import shnidman_probability
-from components.radar.detection_table import table_probability
-from components.radar.inputs import (
+from components.arguments.checks import FloatArray, broadcast_flat, unflatten
+from components.arguments.detection import (
     checked_model,
     checked_probability,
     checked_pulses,
     checked_snr,
     one_of,
 )
+from components.radar.detection_albersheim import albersheim_probability
+from components.radar.detection_exact import exact_probability
+from components.radar.detection_gram_charlier import gram_charlier_probability
+from components.radar.detection_shnidman import shnidman_probability
+from components.radar.detection_table import table_probability
 from components.radar.threshold import detection_threshold
 
 __all__ = ["METHODS", "detection_probability", "detection_threshold", "miss_probability"]

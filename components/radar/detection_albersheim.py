@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 
 _PD_RANGE = (0.1, 0.9)
 _PFA_RANGE = (1e-7, 1e-3)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 from components.radar.detection_series import (
     chain_gain,
     chain_miss,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 from components.radar.threshold import threshold_of
 
 

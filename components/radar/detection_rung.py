@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from components.known_targets import known_targets
-from dsa_des.effects import Effect, Verdict
+from components.aircraft.known_targets import known_targets
+from dsa_des.block.effect import Effect, Verdict
 
 #: Largest absolute error of ``method="table"`` over all SNR (its contract; 2.9e-8 was measured).
 TABLE_ERROR = 1e-6

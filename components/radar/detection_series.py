@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 from components.radar.poisson_terms import negative_binomial, poisson
 from components.radar.threshold import NoiseTerms
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 
 _PD_RANGE = (0.1, 0.99)
 _PFA_RANGE = (1e-9, 1e-3)

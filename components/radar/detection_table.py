@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 from components.radar.detection_exact import exact_probability
 
 _CELL_BITS = 6

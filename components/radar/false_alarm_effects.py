@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from components.false_detections import add_false_detections
-from components.messages import Detections
+from components.messages.detections import Detections
+from components.messages.false_detections import add_false_detections
+from components.messages.targets import RelativeTargets
 from components.radar.false_alarms import false_alarm_count, false_alarm_snr
 from components.radar.field_of_view import cells_of_radar
-from components.target_messages import RelativeTargets
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import IntArray
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.effect import Effect, Verdict
 
 MOST_PER_SCAN = 1e5
 

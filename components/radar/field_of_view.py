@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
+from components.messages.reach import Reach
 from components.radar.resolution_cells import ResolutionCells, resolution_cells
-from components.reach import Reach
 
 
 def azimuth_width_rad(reach: Reach) -> float:

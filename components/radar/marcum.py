@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 
 # Elements per pass, so that the working arrays stay in the cache.
 _CHUNK = 4096

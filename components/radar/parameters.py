@@ -6,8 +6,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
-from components.sensor import SensorParameters
-from dsa_des.component import Parameters
+from components.sensor.sensor import SensorParameters
+from dsa_des.block.component import Parameters
 
 
 class RadarParameters(SensorParameters):

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from components.checks import FloatArray
+from components.arguments.checks import FloatArray
 
 _TWO_PI = 2.0 * math.pi
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from components.messages.reach import farthest_look
+from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
-from components.reach import farthest_look
-from components.sensor import Cells, Sensor
-from components.target_messages import RelativeTargets
-from dsa_des.types import FloatArray, IntArray
+from components.sensor.sensor import Cells, Sensor
+from dsa_des.arrays.types import FloatArray, IntArray
 
 CellFactor = Callable[[Cells], FloatArray]
 

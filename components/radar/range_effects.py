@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from components.radar.radar_block import CellFactor
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 class BlindRange(Effect):

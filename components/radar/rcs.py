@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import (
+from components.aircraft.table_rows import row_values, table_rows
+from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
     finite,
@@ -18,8 +19,7 @@ from components.checks import (
     refuse,
     unflatten,
 )
-from components.radar.inputs import checked_model
-from components.table_rows import row_values, table_rows
+from components.arguments.detection import checked_model
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft import Aircraft
-from components.known_targets import known_targets
+from components.aircraft.aircraft import Aircraft
+from components.aircraft.known_targets import known_targets
 from components.radar.aspect_rcs import mean_rcs_m2
-from components.sensor import Cells
-from dsa_des.component import Context
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Context
+from dsa_des.block.effect import Effect, Verdict
 
 #: Swerling models with the cells that each holds for.
 ModelsOfCells = Callable[[Cells], list[tuple[int, Any]]]

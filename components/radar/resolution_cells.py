@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from components.checks import positive
+from components.arguments.checks import positive
 
 MOST_CELLS = 10**15
 

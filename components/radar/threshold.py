@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.checks import FloatArray, broadcast_flat, unflatten
-from components.radar.inputs import checked_probability, checked_pulses
+from components.arguments.checks import FloatArray, broadcast_flat, unflatten
+from components.arguments.detection import checked_probability, checked_pulses
 from components.radar.poisson_terms import poisson
 
 

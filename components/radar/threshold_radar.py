@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from components.aircraft import Roster
-from components.known_targets import known_targets
-from components.messages import Detections
+from components.aircraft.aircraft import Roster
+from components.aircraft.known_targets import known_targets
+from components.messages.detections import Detections
 from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.clutter_effects import GroundClutter
@@ -21,10 +21,10 @@ from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.weather_effects import WEATHER_EFFECTS
-from components.sensor import Cells, Look
-from dsa_des.effects import Effect
-from dsa_des.types import FloatArray
-from dsa_des.wake import Wake
+from components.sensor.sensor import Cells, Look
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect
+from dsa_des.block.wake import Wake
 
 
 class ThresholdParameters(LinkBudgetParameters):

@@ -7,12 +7,12 @@ import numpy as np
 
 from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
 from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
-from components.environment import Weather
+from components.environment.tables import Weather
 from components.radar.radar_block import CellFactor
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
-from components.sensor import Cells
-from dsa_des.effects import Effect, Verdict
-from dsa_des.types import FloatArray
+from components.sensor.sensor import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
 
 
 class Attenuation(Effect):

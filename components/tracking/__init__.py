@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""What is remembered of a target between detections."""

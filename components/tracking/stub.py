@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.messages import FusedDetections, Tracks
-from components.true_entries import true_entries
-from dsa_des.component import Component, Parameters
-from dsa_des.message import offsets_of
-from dsa_des.ports import Input, Output
-from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Wake
+from components.messages.detections import FusedDetections, Tracks
+from components.messages.true_entries import true_entries
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
 
 _HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "tick")
 

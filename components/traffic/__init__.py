@@ -1,1 +1,1 @@
-"""Blocks and their physics."""
+"""Where aircraft fly: scripted, random and recorded flights."""

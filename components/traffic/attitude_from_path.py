@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from components.traffic.normals import (
+from components.geometry.normals import (
     FloatArray,
     Vector,
     local_axes,

@@ -15,7 +15,7 @@ import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
 from components.traffic.sample_times import SampleTimes
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 # As in `near_intervals`: speeds of turns and long legs hold to 2e-4, positions to under a metre.
 _SPEED_MARGIN = 1.001

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 
-from components.traffic.normals import FloatArray
+from components.geometry.normals import FloatArray
 from components.traffic.sample_table import UNITS, Column, SampleTable, enu_velocity, unit_factor
 from components.traffic.text_rows import read_lines
 from components.traffic.traffic_file import (

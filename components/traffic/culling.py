@@ -7,7 +7,7 @@ import numpy as np
 
 from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
 from components.traffic.near_intervals import NearIntervals, near_intervals
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class Culling:

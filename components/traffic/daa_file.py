@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from components.traffic.enu import enu_to_geodetic
-from components.traffic.normals import FloatArray, local_axes
+from components.geometry.enu import enu_to_geodetic
+from components.geometry.normals import FloatArray, local_axes
 from components.traffic.sample_table import (
     UNITS,
     Column,

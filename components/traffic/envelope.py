@@ -15,7 +15,7 @@ from components.geometry.ellipsoid import (
     SEMI_MAJOR_AXIS_M,
     line_of_sight,
 )
-from components.reach import REACH_MARGIN
+from components.messages.reach import REACH_MARGIN
 from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.trajectory import SampledTrajectory

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.aircraft import Aircraft
+from components.aircraft.aircraft import Aircraft
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
 from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
 from components.traffic.traffic_file import TrafficFile
-from dsa_des.component import ScenePath
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import ScenePath
 
 
 class FileParameters(SourceParameters):

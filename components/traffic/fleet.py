@@ -8,11 +8,11 @@ from copy import copy
 import numpy as np
 import numpy.typing as npt
 
+from components.geometry.normals import FloatArray
 from components.traffic.geodesic_motion import geodesic_state
 from components.traffic.leg_builder import hold_state
 from components.traffic.leg_table import LegTable
 from components.traffic.legs import ScriptedTrajectory
-from components.traffic.normals import FloatArray
 from components.traffic.piece_search import PieceSearch
 from components.traffic.straight_flights import StraightFlights
 from components.traffic.trajectory import (

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.traffic.straight_flights import StraightFlights
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 
 def max_speeds_mps(flights: Sequence[Any]) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
-from components.traffic.normals import (
+from components.geometry.normals import (
     DEG_PER_RAD,
     FloatArray,
     radii_of_curvature,

@@ -10,8 +10,9 @@ from typing import Literal
 import numpy as np
 from geographiclib.geodesic import Geodesic
 
+from components.geometry.enu import enu_to_geodetic
+from components.geometry.normals import FloatArray
 from components.traffic.attitude_from_path import STANDARD_GRAVITY_MPS2
-from components.traffic.enu import enu_to_geodetic
 from components.traffic.geodesic_motion import (
     flight_time_s,
     geodesic_parameters,
@@ -19,7 +20,6 @@ from components.traffic.geodesic_motion import (
     leg_radius_m,
 )
 from components.traffic.leg_types import AnyLeg, Climb, Stationary, Turn, Waypoint, Waypoints
-from components.traffic.normals import FloatArray
 from components.traffic.turn_motion import turn_parameters, turn_state
 
 Position = tuple[float, float, float]

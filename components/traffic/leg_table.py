@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from components.geometry.normals import FloatArray
 from components.traffic.leg_builder import FORMULAS
 from components.traffic.legs import ScriptedTrajectory
-from components.traffic.normals import FloatArray
 from components.traffic.piece_search import PieceSearch
 from components.traffic.straight_flights import StraightFlights
 from components.traffic.trajectory import TrajectoryState

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from components.traffic.enu import enu_to_geodetic
+from components.geometry.enu import enu_to_geodetic
+from components.geometry.normals import wrap_longitude_deg
 from components.traffic.leg_builder import LegBuilder, Segment, segment_state
 from components.traffic.leg_types import (
     AnyLeg,
@@ -21,7 +22,6 @@ from components.traffic.leg_types import (
     Waypoints,
     require,
 )
-from components.traffic.normals import wrap_longitude_deg
 from components.traffic.trajectory import CELLS_AT_ONCE, TrajectoryState
 
 __all__ = [

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 FINEST_S = 0.5
 # The speeds of turns and long legs hold to 2e-4; a metre covers the rounding of positions, and

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from components.traffic.normals import FloatArray
-from dsa_des.types import IntArray
+from components.geometry.normals import FloatArray
+from dsa_des.arrays.types import IntArray
 
 
 class PieceSearch:

@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft import Aircraft, Roster
-from components.traffic.enu import enu_to_geodetic
+from components.aircraft.aircraft import Aircraft, Roster
+from components.geometry.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.sample_times import (
@@ -23,8 +23,8 @@ from components.traffic.sample_times import (
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from components.traffic.straight_flights import Starts, flights_of
-from dsa_des.randomness import target_keys
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
+from dsa_des.time.randomness import target_keys
 
 
 class RandomTrafficParameters(SourceParameters):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.traffic.normals import FloatArray
+from components.geometry.normals import FloatArray
 
 LARGEST = 1e12
 """Times, longitudes and angles beyond this carry no useful digits any more."""

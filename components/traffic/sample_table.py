@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from components.traffic.normals import FloatArray
+from components.geometry.normals import FloatArray
 from components.traffic.traffic_file import (
     MOST_OF_A_CELL,
     MOST_PROBLEMS,
@@ -17,7 +17,7 @@ from components.traffic.traffic_file import (
 )
 from components.traffic.trajectory import SampledTrajectory
 from components.traffic.units import ANGLE_DEG, LENGTH_M, NO_UNIT, SPEED_MPS, TIME_S, clean_token
-from dsa_des.safe_text import shortened
+from dsa_des.text.safe_text import shortened
 
 UNITS = {
     "time": TIME_S,

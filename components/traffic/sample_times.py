@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from components.traffic.piece_search import PieceSearch
-from dsa_des.types import FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 _DIGITS = 9
 

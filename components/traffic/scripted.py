@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from components.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster
+from components.geometry.enu import enu_to_geodetic
 from components.traffic import leg_types
-from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.sample_times import (
@@ -20,8 +20,8 @@ from components.traffic.sample_times import (
 )
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from components.traffic.straight_flights import Starts, flights_of
-from dsa_des.component import Parameters
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Parameters
 
 
 class _Leg(Parameters):

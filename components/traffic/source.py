@@ -10,12 +10,13 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from pydantic import Field
 
-from components.aircraft import Aircraft, Roster
-from components.known_flights import Flights, KnownFlights
-from components.known_targets import KnownTraffic
-from components.reach import FarthestLook, farthest_look
-from components.steering import Manoeuvres
-from components.target_messages import TrafficStates
+from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.known_targets import KnownTraffic
+from components.geometry.state import TrajectoryState
+from components.messages.known_flights import Flights, KnownFlights
+from components.messages.reach import FarthestLook, farthest_look
+from components.messages.steering import Manoeuvres
+from components.messages.targets import TrafficStates
 from components.traffic.closest_approach import (
     Approaches,
     closest_approaches,
@@ -25,17 +26,16 @@ from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
 from components.traffic.sample_times import SampleTimes
-from components.traffic.state import TrajectoryState
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain
-from dsa_des.clock import ClockSpec
-from dsa_des.component import Component, Parameters, PositiveRational
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component, Parameters, PositiveRational
+from dsa_des.block.message import Message
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
-from dsa_des.message import Message
-from dsa_des.ports import Input, Output
-from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Wake
+from dsa_des.time.clock import ClockSpec
 
 
 class SourceParameters(Parameters):

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.geometry.state import TrajectoryState
 from components.traffic.flight_limits import max_speeds_mps
-from components.traffic.state import TrajectoryState
-from dsa_des.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry.state import TrajectoryState
 from components.traffic.legs import AnyLeg, ScriptedTrajectory, Straight, Turn
-from components.traffic.state import TrajectoryState
 
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5

@@ -13,10 +13,10 @@ from typing import overload
 
 import numpy as np
 
+from components.geometry.normals import FloatArray, wrap_longitude_deg
 from components.traffic.geodesic_motion import geodesic_parameter_table
 from components.traffic.leg_builder import Segment
 from components.traffic.legs import LONGEST_FLIGHT_S, MOST_ALT_M, ScriptedTrajectory
-from components.traffic.normals import FloatArray, wrap_longitude_deg
 
 
 @dataclass(eq=False)

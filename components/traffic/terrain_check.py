@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.traffic.state import TrajectoryState
+from components.geometry.state import TrajectoryState
 
 _MOST_SAMPLES = 100_000
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from components.traffic.traffic_file import Problems, did_you_mean
-from dsa_des.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
+from dsa_des.files.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
 
 _SEPARATORS = re.compile(r"[,;]")
 _TOKEN = re.compile(r"\[[^\]]*\]|[^\s,;\[\]]+")

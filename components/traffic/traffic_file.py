@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from components.traffic.trajectory import SampledTrajectory
 from dsa_des.errors import Lines, nearest
-from dsa_des.safe_text import shortened
+from dsa_des.text.safe_text import shortened
 
 MOST_PROBLEMS = 20
 """Problems listed in one error; further ones are only counted."""

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight
-from components.traffic.attitude_from_path import attitude_from_path, fit_path
-from components.traffic.normals import (
+from components.geometry.normals import (
     FloatArray,
     Vector,
     local_axes,
@@ -17,8 +16,9 @@ from components.traffic.normals import (
     wrap_heading_rad,
     wrap_longitude_deg,
 )
+from components.geometry.state import TrajectoryState
+from components.traffic.attitude_from_path import attitude_from_path, fit_path
 from components.traffic.sample_checks import checked_samples
-from components.traffic.state import TrajectoryState
 
 __all__ = ["SampledTrajectory", "TrajectoryState", "evaluate_segments", "locate"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED
-from components.traffic.normals import (
+from components.geometry.normals import (
     FloatArray,
     local_axes,
     normal_to_degrees,

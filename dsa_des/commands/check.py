@@ -1,10 +1,10 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
-from dsa_des.collection import no_collection
+from dsa_des.block.foreign import Foreign, Imports, imports
 from dsa_des.commands.loading import load, say_if_long
-from dsa_des.foreign import Foreign, Imports, imports
-from dsa_des.simulation import Simulation
-from dsa_des.terminal import say
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.collection import no_collection
+from dsa_des.terminal.terminal import say
 
 
 def check_scene_file(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.block.entry_points import registered
 from dsa_des.commands.study import (
     check_workers,
     finish,
@@ -18,10 +19,9 @@ from dsa_des.commands.study import (
     show_study,
     tell_crashed,
 )
-from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.scene import load_scene
-from dsa_des.scene_file import read_scene_file
+from dsa_des.scene.scene import load_scene
+from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import claim_folder
@@ -33,7 +33,7 @@ from dsa_des.studies.safe_files import write_whole
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
-from dsa_des.terminal import console, say
+from dsa_des.terminal.terminal import console, say
 
 _HOME = Path("studies")
 #: A comparison is not continued.

@@ -12,13 +12,13 @@ from pydantic_core import PydanticUndefined
 from rich.table import Table
 from rich.text import Text
 
-from dsa_des import terminal
-from dsa_des.component import Component
-from dsa_des.entry_points import registered
+from dsa_des.block.component import Component
+from dsa_des.block.entry_points import registered
+from dsa_des.block.ladder import Ladder
+from dsa_des.block.registry import UnknownType, find
 from dsa_des.errors import UsageError
-from dsa_des.ladder import Ladder
-from dsa_des.registry import UnknownType, find
-from dsa_des.safe_text import printable
+from dsa_des.terminal import terminal
+from dsa_des.text.safe_text import printable
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",

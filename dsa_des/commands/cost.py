@@ -5,19 +5,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import NotImportable, load_named
+from dsa_des.block.ladder import Ladder, Unavailable
+from dsa_des.block.registry import UnknownType, find
 from dsa_des.costs.front import parse_budgets
 from dsa_des.costs.output import draw_costs, print_costs, write_table
 from dsa_des.costs.study import Compare, RungCost, applies, climb
 from dsa_des.costs.variants import Variants
-from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.foreign import NotImportable, load_named
-from dsa_des.ladder import Ladder, Unavailable
-from dsa_des.output_folder import OutputFolder
-from dsa_des.registry import UnknownType, find
-from dsa_des.reports import load_reports
-from dsa_des.run_folder import write_run_json
-from dsa_des.terminal import say, say_json
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.record.run_folder import write_run_json
+from dsa_des.run.reports import load_reports
+from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from dsa_des import terminal
+from dsa_des.block.effect import Planned
 from dsa_des.commands.loading import load
-from dsa_des.effects import Planned
-from dsa_des.safe_text import shortened
-from dsa_des.scene import Scene
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal import terminal
+from dsa_des.text.safe_text import shortened
 
 _WIDE = 300
 

@@ -7,15 +7,15 @@ from typing import Any
 import networkx as nx
 
 from dsa_des.commands.loading import load
-from dsa_des.drawing import drawing, figure_text
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.graph import depths
-from dsa_des.output_file import check_file
-from dsa_des.output_names import named
-from dsa_des.safe_text import printable, shortened
-from dsa_des.scene import Scene
-from dsa_des.terminal import console, say, say_lines
-from dsa_des.wiring import Wire
+from dsa_des.files.output_file import check_file
+from dsa_des.files.output_names import named
+from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.scene.graph import depths
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
+from dsa_des.terminal.terminal import console, say, say_lines
+from dsa_des.text.safe_text import printable, shortened
 
 
 def show_graph(

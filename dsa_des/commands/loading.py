@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
-from dsa_des.scene import Scene, load_scene
-from dsa_des.simulation import Simulation
-from dsa_des.terminal import say
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.terminal.terminal import say
 
 # Half a minute of the processor, for most scenes.
 _MANY_SCANS = 1e7

@@ -9,20 +9,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from dsa_des import __version__, terminal
-from dsa_des.attempts import attempt
+from dsa_des import __version__
 from dsa_des.commands.loading import load, say_if_long
-from dsa_des.output_file import write_file
-from dsa_des.output_folder import OutputFolder
-from dsa_des.pacing import Pacer, parse_factor
-from dsa_des.recording import ObserverSink, Recorder
-from dsa_des.reports import draw_all, load_reports
-from dsa_des.run_folder import write_run_json
-from dsa_des.safe_text import shortened
-from dsa_des.scene import Scene
-from dsa_des.simulation import Outcome, Simulation
-from dsa_des.terminal import say, say_json
-from dsa_des.toml_text import to_toml
+from dsa_des.files.output_file import write_file
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.toml_text import to_toml
+from dsa_des.record.attempts import attempt
+from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.run_folder import write_run_json
+from dsa_des.run.pacing import Pacer, parse_factor
+from dsa_des.run.reports import draw_all, load_reports
+from dsa_des.run.simulation import Outcome, Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal import terminal
+from dsa_des.terminal.terminal import say, say_json
+from dsa_des.text.safe_text import shortened
 
 _VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
 
@@ -92,7 +93,7 @@ def record_run(
     )
     with target.writing() as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
-        from dsa_des.arrow import ParquetSink
+        from dsa_des.record.arrow import ParquetSink
 
         tables = ParquetSink(folder)
         recorder.sinks += [tables, observers]

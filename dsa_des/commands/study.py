@@ -8,9 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dsa_des import terminal
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.safe_text import shortened
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import claim_folder, latest_folder
@@ -21,7 +19,9 @@ from dsa_des.studies.record import StudyRecord
 from dsa_des.studies.runner import Clock, Stopped, run_study, why_one_by_one
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
-from dsa_des.terminal import say
+from dsa_des.terminal import terminal
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import shortened
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
@@ -259,8 +259,8 @@ def _progress(study: Study) -> Iterator[Any]:
 def _list_metrics() -> None:
     from rich.table import Table
 
+    from dsa_des.block.entry_points import registered
     from dsa_des.commands.components import parameter_rows
-    from dsa_des.entry_points import registered
     from dsa_des.studies.metric import METRICS, find_metric
 
     console = terminal.console(120)

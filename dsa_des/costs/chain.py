@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block.ladder import Unavailable
 from dsa_des.costs.front import on_front
 from dsa_des.costs.study import Compare, RungCost
 from dsa_des.costs.variants import Choice, Variants
-from dsa_des.drawing import drawing, figure_text
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.ladder import Unavailable
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import Scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
 
 MOST = 200
 _REPEATS = 7

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.ladder import Ladder, Truth, Unavailable
 from dsa_des.costs.replay import RungRun
-from dsa_des.ladder import Ladder, Truth, Unavailable
-from dsa_des.types import AnyArray, FloatArray, IntArray
 
 #: Target-scans at which a rung is compared with a far more precise evaluation.
 SAMPLE = 100

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from dsa_des.block.ladder import Ladder, Quantity
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.ladder import Ladder, Quantity
 
 _BUDGET = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S+)\s*")
 

@@ -7,11 +7,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from dsa_des import terminal
 from dsa_des.costs.study import RungCost
-from dsa_des.drawing import drawing, figure_text, tight
-from dsa_des.output_file import write_file
-from dsa_des.safe_text import printable, shortened
+from dsa_des.files.output_file import write_file
+from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.terminal import terminal
+from dsa_des.text.safe_text import printable, shortened
 
 _EFFECT_COLUMNS = (
     ("first seen, m", "first_detection_range_change_m", "+,.0f"),

@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsa_des.component import Component
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import Scene
-from dsa_des.simulation import Simulation
-from dsa_des.wake import Wake
+from dsa_des.block.component import Component
+from dsa_des.block.wake import Wake
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
 
 # Slow rungs are timed fewer times: all passes of one rung together take about this long at most.
 _LONGEST_S = 2.0

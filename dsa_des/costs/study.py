@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.costs.differences import Spread, Values, errors_against, own_errors, values_of
 from dsa_des.costs.front import allowed_error, on_front
 from dsa_des.costs.replay import RungRun, median_and_spread, run_rung, time_interleaved
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.ladder import Ladder, Unavailable
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
 
 #: Compares the recorded tables of the reference's run and of a rung's run.
 Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]

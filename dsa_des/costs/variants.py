@@ -5,11 +5,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsa_des.block.ladder import Ladder, Rung, Unavailable
 from dsa_des.errors import SceneError
-from dsa_des.ladder import Ladder, Rung, Unavailable
-from dsa_des.overrides import apply_swap
-from dsa_des.scene import Scene, check_scene, open_scene
-from dsa_des.scene_file import COMMAND_LINE, SceneFile
+from dsa_des.scene.overrides import apply_swap
+from dsa_des.scene.scene import Scene, check_scene, open_scene
+from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 
 #: Lets the engine replace models by itself; a rung must be what it says.
 _CHOOSES_BY_ITSELF = "accuracy"
@@ -32,7 +32,7 @@ class Variants:
     Parameters
     ----------
     path, sets, swaps, seed, duration_s
-        As for `dsa_des.scene.load_scene`.
+        As for `dsa_des.scene.scene.load_scene`.
 
     Raises
     ------

@@ -9,10 +9,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.clock import parse_rational
-from dsa_des.component import as_written
+from dsa_des.block.component import as_written
 from dsa_des.errors import did_you_mean
-from dsa_des.scene import Scene
+from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import parse_rational
 
 SWAP = "swap."
 _SPEC_KEYS = ("from", "to", "step", "steps", "log", "files", "beat_with", "values", "set")

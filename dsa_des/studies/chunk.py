@@ -12,14 +12,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
-from dsa_des.replicas import Failed, Recorded, Replica, run_replicas
-from dsa_des.scene import Scene
-from dsa_des.strangers import is_ours_to_obey, told
+from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
+from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, wanted_by
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Chunk, Study, set_text
-from dsa_des.types import FloatArray
 
 #: What became of a run: it has results; it failed, and will again; its process died.
 DONE, FAILED, CRASHED = "done", "failed", "crashed"

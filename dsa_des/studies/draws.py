@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.randomness import key_of
-from dsa_des.types import IntArray
+from dsa_des.arrays.types import IntArray
+from dsa_des.time.randomness import key_of
 
 #: No normal draw lies farther out: the smallest probability is 2^-54.
 _MOST_SIGMA = 9.0

@@ -6,7 +6,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from dsa_des.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.studies.summary import Compared, Line
 
 #: Okabe and Ito's colours and markers, told apart with any kind of colour vision.

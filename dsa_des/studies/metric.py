@@ -12,14 +12,14 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from dsa_des.component import Component, Parameters
-from dsa_des.entry_points import registered
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import NotImportable, load_named, load_point
+from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
-from dsa_des.foreign import NotImportable, load_named, load_point
-from dsa_des.message import Columns, Text
-from dsa_des.replicas import Recorded, Replica, scene_of
-from dsa_des.scene import Scene
-from dsa_des.types import FloatArray
+from dsa_des.replicas.replicas import Recorded, Replica, scene_of
+from dsa_des.scene.scene import Scene
 
 METRICS = "dsa_des.metrics"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dsa_des.errors import SceneError, UsageError
-from dsa_des.replicas import scene_of
+from dsa_des.replicas.replicas import scene_of
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.metric import NUMBER

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dsa_des.safe_text import shortened
 from dsa_des.studies.output import Tables
+from dsa_des.text.safe_text import shortened
 
 #: Lines of a table that are printed.
 _MOST_SHOWN = 1000

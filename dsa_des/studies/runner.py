@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from dsa_des.errors import SceneError
-from dsa_des.replicas import why_apart
+from dsa_des.replicas.replicas import why_apart
 from dsa_des.studies.chunk import CRASHED, Done, done_of, joined
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.folder import StudyFolder

@@ -6,7 +6,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from dsa_des.types import FloatArray
+from dsa_des.arrays.types import FloatArray
 
 #: Below this many values (effective trials, for a share) an interval says little.
 FEW = 10

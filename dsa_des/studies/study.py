@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
+from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem
-from dsa_des.overrides import apply_swap, set_value
-from dsa_des.replicas import Replica
-from dsa_des.scene import Scene, check_scene
-from dsa_des.scene_file import SceneFile
-from dsa_des.strangers import Left, strangers_code
+from dsa_des.replicas.replicas import Replica
+from dsa_des.scene.overrides import apply_swap, set_value
+from dsa_des.scene.scene import Scene, check_scene
+from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -252,7 +252,7 @@ def set_text(value: Any) -> str:
     if folder is not None and (path := existing_file(value, folder)) is not None:
         return str(path)
     if isinstance(value, list | dict):
-        from dsa_des.toml_text import inline
+        from dsa_des.files.toml_text import inline
 
         return inline(value)
     return as_text(value)

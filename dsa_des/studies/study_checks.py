@@ -5,10 +5,10 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.replicas import Replica, key_path, scene_of
-from dsa_des.scene import Scene
-from dsa_des.scene_file import Key, SceneFile
-from dsa_des.simulation import Simulation
+from dsa_des.replicas.replicas import Replica, key_path, scene_of
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import TRIALS, Metric, Result
 from dsa_des.studies.study import Study

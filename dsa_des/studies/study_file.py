@@ -8,13 +8,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from dsa_des.component import SourcedText
-from dsa_des.entry_points import registered
+from dsa_des.block.component import SourcedText
+from dsa_des.block.entry_points import registered
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.overrides import apply_set
-from dsa_des.parameter_errors import explain
-from dsa_des.scene import Scene
-from dsa_des.scene_file import Key, SceneFile, read_scene_file
+from dsa_des.scene.overrides import apply_set
+from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene_file import Key, SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
 from dsa_des.studies.figure_tables import read_figures

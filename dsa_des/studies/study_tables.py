@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dsa_des.component import SourcedText
+from dsa_des.block.component import SourcedText
 from dsa_des.studies.draws import KINDS, as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.

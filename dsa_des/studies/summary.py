@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.studies.chunk import CRASHED
 from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
 from dsa_des.studies.statistics import Difference, Estimate, difference, mean, share
-from dsa_des.types import AnyArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pyarrow as pa

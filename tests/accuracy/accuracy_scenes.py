@@ -9,11 +9,11 @@ import numpy as np
 from components.geometry.attitude import unit_vector
 from components.geometry.ellipsoid import line_of_sight
 from components.geometry.sensor_angles import sensor_angles
-from components.reach import EVALUATE
-from components.target_messages import GatedTargets, TrafficStates
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from components.messages.reach import EVALUATE
+from components.messages.targets import GatedTargets, TrafficStates
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
 

@@ -8,13 +8,13 @@ import pytest
 from accuracy_scenes import Listener, run, true_errors, write_scene
 from click.testing import CliRunner
 
-from components.geometry.rung_planning import Rung
+from components.line_of_sight.rung_planning import Rung
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.lockstep import LockStep
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import LockStep
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 # Of 500 (seeds 0 to 499, run once by hand): none off by more than allowed, 83 % cheaper.
 SEEDS = range(60)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.attitude import unit_vector
+from components.geometry.enu import enu_to_geodetic
 from components.geometry.error_bounds import (
     Envelope,
     ErrorBound,
@@ -18,7 +19,6 @@ from components.geometry.error_bounds import (
     error_bound,
 )
 from components.geometry.sensor_angles import sensor_angles
-from components.traffic.enu import enu_to_geodetic
 
 MODELS = {
     "flat_earth": flat_earth.line_of_sight,

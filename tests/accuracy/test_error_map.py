@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from components.geometry.error_bounds import Envelope, error_bound
-from components.geometry.error_map import ALTITUDE_M, ErrorMap, draw_error_map, error_maps
+from components.line_of_sight.error_map import ALTITUDE_M, ErrorMap, draw_error_map, error_maps
 
 LAT = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 89.99])
 RANGE = np.array([1e3, 2e3, 4e3, 8e3, 16e3, 32e3])

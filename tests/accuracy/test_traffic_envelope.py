@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from components.geometry.ellipsoid import line_of_sight
-from components.mounting import MountedAxes
-from components.reach import FarthestLook, Reach, farthest_look
+from components.messages.reach import FarthestLook, Reach, farthest_look
+from components.sensor.mounting import MountedAxes
 from components.traffic.envelope import attitude_extremes_rad, traffic_envelope
 from components.traffic.fleet import SampledFleet, ScriptedFleet
 from components.traffic.legs import Climb, ScriptedTrajectory, Straight, Turn

@@ -2,10 +2,10 @@
 
 import pytest
 
-from components.benchmark import yardstick
-from components.benchmark.cases import CASES, replicas_of, scene_of
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.simulation import Simulation
+from components.evidence.benchmark import yardstick
+from components.evidence.benchmark.cases import CASES, replicas_of, scene_of
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
 
 SHORT = {
     "thesis": "300", "clocks": "60", "hundred": "60", "ten_thousand": "2", "sparse": "2",

@@ -15,12 +15,12 @@ import pytest
 from click.testing import CliRunner, Result
 from pydantic import BaseModel
 
-from dsa_des.block_options import BlockOptions
+from dsa_des.block.registry import find
+from dsa_des.block.sections import section_models
 from dsa_des.cli import main
-from dsa_des.registry import find
-from dsa_des.scene import load_scene
-from dsa_des.sections import section_models
-from dsa_des.toml_text import to_toml
+from dsa_des.files.toml_text import to_toml
+from dsa_des.scene.options import BlockOptions
+from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
 SCENE = CONFIGS / "first_light.toml"
@@ -226,8 +226,8 @@ def test_errors_do_not_repeat_a_file_that_is_no_scene(tmp_path: Path, kind: str)
 def test_progress_bars_show_titles_as_they_are() -> None:
     from rich.progress import Progress
 
-    from dsa_des import terminal
-    from dsa_des.safe_console import SafeConsole
+    from dsa_des.terminal import terminal
+    from dsa_des.terminal.safe_console import SafeConsole
 
     bar: Progress = terminal.progress("text")
     stream = io.StringIO()

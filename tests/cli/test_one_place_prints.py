@@ -1,4 +1,4 @@
-"""Only dsa_des/terminal.py prints, and only dsa_des/drawing.py makes figures."""
+"""Only dsa_des/terminal/terminal.py prints, and only dsa_des/record/drawing.py makes figures."""
 
 import ast
 from collections.abc import Iterator
@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
-PRINTERS = {"dsa_des/terminal.py", "dsa_des/safe_console.py"}
-FIGURES = {"dsa_des/drawing.py"}
+PRINTERS = {"dsa_des/terminal/terminal.py", "dsa_des/terminal/safe_console.py"}
+FIGURES = {"dsa_des/record/drawing.py"}
 FILES = sorted(
     path.relative_to(ROOT).as_posix()
     for room in ("dsa_des", "components")

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from dsa_des.block.entry_points import registered
 from dsa_des.cli import main
-from dsa_des.entry_points import registered
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
 SCENES = sorted(p for p in CONFIGS.glob("*.toml") if p.name != "detect_and_sense.toml")

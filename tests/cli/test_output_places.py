@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
 from dsa_des.commands import run as run_module
-from dsa_des.unfinished import PREFIX
+from dsa_des.files.unfinished import PREFIX
 
 
 def call(*arguments: object) -> Result:
@@ -95,10 +95,10 @@ def test_bad_places_are_refused_before_anything_runs(
         "reproduce": ["reproduce", "table-4.1"],
     }[command]
     for place in (
-        "dsa_des.simulation.Simulation.run",
+        "dsa_des.run.simulation.Simulation.run",
         "dsa_des.commands.cost.climb",
-        "components.geometry.error_map.draw_error_map",
-        "components.thesis.reproduce.make",
+        "components.line_of_sight.error_map.draw_error_map",
+        "components.evidence.thesis.reproduce.make",
     ):
         monkeypatch.setattr(place, lambda *args, **kwargs: pytest.fail("it ran"))
     before = everything_in(places)
@@ -159,7 +159,7 @@ def test_a_folder_that_is_removed_in_mid_run_is_one_error(
         for folder in Path("a/b").glob(f"{PREFIX}*") if what != "all folders" else [Path("a")]:
             shutil.rmtree(folder)
 
-    monkeypatch.setattr("dsa_des.recording.ObserverSink.close", remove)
+    monkeypatch.setattr("dsa_des.record.recording.ObserverSink.close", remove)
     result = call("run", first_light, "--duration", 1, "--out", "a/b/run")
     assert result.exit_code == 1
     assert result.stderr.splitlines() == [
@@ -209,8 +209,12 @@ def test_graph_replaces_links_and_no_devices(places: Path, first_light: Path) ->
 def test_pages_and_rows_are_checked_beforehand(
     places: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("components.thesis.reproduce.make", lambda *a: pytest.fail("it ran"))
-    monkeypatch.setattr("components.benchmark.command._fresh", lambda *a: pytest.fail("it ran"))
+    monkeypatch.setattr(
+        "components.evidence.thesis.reproduce.make", lambda *a: pytest.fail("it ran")
+    )
+    monkeypatch.setattr(
+        "components.evidence.benchmark.command._fresh", lambda *a: pytest.fail("it ran")
+    )
     before = everything_in(places)
     for name in ("run", "pipe", "loop", "no/x", "a" * 300, ""):
         for words in (["reproduce", "--page", name], ["benchmark", "--quick", "--json", name]):

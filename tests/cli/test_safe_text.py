@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from dsa_des.errors import Problem, SceneError, UsageError
-from dsa_des.safe_console import SafeConsole
-from dsa_des.safe_text import printable, shortened
+from dsa_des.terminal.safe_console import SafeConsole
+from dsa_des.text.safe_text import printable, shortened
 
 HOSTILE = "\x1b[31m\x07\x08\r\n\t\x7f\x85\x9b\u200b\u2028\u202e\u2066\ud800\U000e0001"
 ANY_TEXT = st.text(st.characters())
@@ -80,7 +80,7 @@ def test_a_stream_that_knows_few_letters_gets_escapes(capfd: pytest.CaptureFixtu
     import sys
 
     script = (
-        "from dsa_des.terminal import say, console\n"
+        "from dsa_des.terminal.terminal import say, console\n"
         "say('µ é \\u6f22')\nconsole(80).print('µ \\u6f22')"
     )
     done = subprocess.run(

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from components.cost_page import DOCS, main
-from components.error_map_page import error_map_section
-from components.geometry.ladder import EARTH
+from components.evidence.accuracy.cost_page import DOCS, main
+from components.evidence.accuracy.error_map_page import error_map_section
+from components.line_of_sight.ladder import EARTH
 from components.optical.ladder import VISIBLE
 from dsa_des.commands.cost import comparison
 from dsa_des.costs.study import climb

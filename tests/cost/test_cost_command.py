@@ -11,14 +11,14 @@ import pymap3d
 import pytest
 from click.testing import CliRunner
 
-from components.geometry.ladder import EARTH
+from components.line_of_sight.ladder import EARTH
 from components.radar.ladder import DETECTION
+from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
 from dsa_des.commands.cost import ladders_to_climb
 from dsa_des.costs.replay import run_rung
 from dsa_des.costs.study import climb
 from dsa_des.costs.variants import Choice, Variants
-from dsa_des.ladder import Unavailable
 
 SCENE = Path(__file__).parents[2] / "configs" / "first_light.toml"
 SHORT = (str(SCENE), "--duration", "60", "--repeats", "1")

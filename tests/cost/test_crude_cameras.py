@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from components.known_targets import known_targets
+from components.aircraft.known_targets import known_targets
 from components.optical.convex_hull import union_area
 from components.optical.projection import fuselage_length_m
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/first_light.toml"
 AREAS = (12.0, 30.0, 90.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from components.fusion.gate_match import nearest_in_gate
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/first_light.toml"
 SWAP = ["fusion=fusion.gated"]

@@ -3,12 +3,12 @@
 import pytest
 from click.testing import CliRunner
 
+from dsa_des.block.entry_points import registered
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.costs.front import on_front, parse_budgets
-from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError
-from dsa_des.ladder import Ladder, Quantity, Rung
-from dsa_des.registry import find
 
 LADDERS = [
     pytest.param(name, ladder, id=f"{name}-{ladder.name}")

@@ -12,10 +12,10 @@ from components.display.marks import Detected
 from components.display.report import DetectAndSenseReport, sensor_names
 from components.display.scan_times import SensorScans, read_scans
 from components.display.timeline import find_close_up
-from dsa_des.arrow import ParquetSink
-from dsa_des.recording import ObserverSink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.arrow import ParquetSink
+from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 HEAD = """
 title = "Test $cene_"

@@ -14,7 +14,7 @@ from components.display.marks import Detected
 from components.display.scan_times import read_scans, scans_between
 from components.display.summary import FusedSummary, SensorSummary
 from components.display.thinned_stream import ThinnedStream, places_in_groups, strides
-from dsa_des.message import Text
+from dsa_des.block.message import Text
 
 series = st.lists(st.integers(0, 6), max_size=300)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from components.display.summary import FusedSummary, SensorSummary
-from dsa_des.message import Text
+from dsa_des.block.message import Text
 
 NAMES = ("eo", "radar")
 TARGETS = ("a", "b", "c")

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.resolution import Grid, round_to_grid
-from dsa_des.randomness import Stream
+from components.sensor.resolution import Grid, round_to_grid
+from dsa_des.time.randomness import Stream
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 any_step = st.sampled_from([0.0, 0.1, np.radians(0.0358), np.radians(1.0), 76.2, 1.0, 0.25])

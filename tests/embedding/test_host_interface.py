@@ -9,8 +9,8 @@ from click.testing import CliRunner
 from dsa_des.cli import main
 from dsa_des.embed import HostDriven, Simulator
 from dsa_des.errors import BlockFailure, SceneError, UsageError
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 OWN = (0.9, 0.07, 1000.0)
 AHEAD = (0.9 + 2e-4, 0.07, 1000.0)  # some 1300 m to the north
@@ -311,7 +311,7 @@ def test_a_block_that_fails_is_named(scene, monkeypatch):
 
 
 def test_the_engine_finds_the_interface_by_its_registered_name():
-    import dsa_des.embed
+    import dsa_des.embed.host_driven
 
     assert dsa_des.embed.Simulator is Simulator
     assert issubclass(HostDriven, object)

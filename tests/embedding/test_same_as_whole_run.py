@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.messages import Detections
+from components.messages.detections import Detections
 
 
 def _recorded(results, table):

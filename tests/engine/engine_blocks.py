@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from dsa_des.component import ClockedParameters, Component, Parameters
-from dsa_des.message import Message, per_entry, static
-from dsa_des.ports import Input, Output
+from dsa_des.block.component import ClockedParameters, Component, Parameters
+from dsa_des.block.message import Message, per_entry, static
+from dsa_des.block.ports import Input, Output
 
 
 @dataclass(eq=False)

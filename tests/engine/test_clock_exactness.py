@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from dsa_des.clock import MAX_TICK, ClockSpec, ScanClock, parse_rational, resolution
-from dsa_des.randomness import Streams
+from dsa_des.time.clock import MAX_TICK, ClockSpec, ScanClock, parse_rational, resolution
+from dsa_des.time.randomness import Streams
 
 DRAWS = Streams(5).scan_normals("radar", "clock jitter")
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.fusion.pick_best import PickBest, PickBestParameters
-from components.messages import Detections, SensorOffer
-from dsa_des.component import Context, Producer
-from dsa_des.randomness import Streams
-from dsa_des.wake import Arrivals, Wake
+from components.messages.detections import Detections, SensorOffer
+from dsa_des.block.component import Context, Producer
+from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.time.randomness import Streams
 
 BOTH = """
 duration_s = {duration_s}

@@ -9,10 +9,10 @@ import itertools
 import numpy as np
 import pytest
 
-from dsa_des.randomness import Streams
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.randomness import Streams
 
 WIRES = (
     ("traffic", "transform"),

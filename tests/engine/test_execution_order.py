@@ -7,7 +7,7 @@ import engine_blocks as blocks
 import numpy as np
 import pytest
 
-from dsa_des.arrow import ParquetSink
+from dsa_des.record.arrow import ParquetSink
 
 MS = 10**6  # ticks of a millisecond at 10^9 ticks per second
 
@@ -416,8 +416,8 @@ def test_a_window_must_hold_a_scan(lab):
 
 
 def test_progress_ends_at_the_end(lab):
-    from dsa_des.scene import load_scene
-    from dsa_des.simulation import Simulation
+    from dsa_des.run.simulation import Simulation
+    from dsa_des.scene.scene import load_scene
 
     seen = []
     Simulation(load_scene(lab.write(*CHAIN, duration_s=3)), window=4).run(seen.append)

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from dsa_des.interruption import Terminated, deferred, plain_ending
+from dsa_des.terminal.interruption import Terminated, deferred, plain_ending
 
 ENDS = [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from components.messages import combination_text, mask_type
-from dsa_des.message import Text
+from components.messages.detections import combination_text, mask_type
+from dsa_des.block.message import Text
 
 HEAD = """
 duration_s = 2

@@ -4,8 +4,8 @@ import pytest
 
 from components.traffic.source import TrafficSource
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 # Names in an order that is not that of the chain: among blocks of one depth names decide.
 SCENE = """

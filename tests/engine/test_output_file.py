@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des import output_file
 from dsa_des.errors import UsageError
-from dsa_des.output_file import check_file, write_file
+from dsa_des.files import output_file
+from dsa_des.files.output_file import check_file, write_file
 
 
 def left_in(folder):

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des import output_names
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.output_folder import OutputFolder, new_folder
-from dsa_des.output_names import claim_folder, named, new_folder_name
-from dsa_des.run_folder import write_run_json
+from dsa_des.files import output_names
+from dsa_des.files.output_folder import OutputFolder, new_folder
+from dsa_des.files.output_names import claim_folder, named, new_folder_name
+from dsa_des.record.run_folder import write_run_json
 
 
 def left_in(folder):
@@ -124,8 +124,8 @@ def test_a_failed_run_takes_no_number(tmp_path):
 TEN = """
 import sys
 from pathlib import Path
-from dsa_des.output_folder import OutputFolder
-from dsa_des.output_names import claim_folder
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.output_names import claim_folder
 with OutputFolder(Path("runs"), "scene").writing() as folder:
     (folder / "me").write_text(sys.argv[1])
     print("ready", flush=True)

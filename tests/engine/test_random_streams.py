@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dsa_des.randomness import Stream, Streams, key_of, philox4x32, target_keys
+from dsa_des.time.randomness import Stream, Streams, key_of, philox4x32, target_keys
 
 WORD = 0xFFFFFFFF
 

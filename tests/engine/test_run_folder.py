@@ -7,9 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from dsa_des.manifest import RUN_JSON, foreign_in
-from dsa_des.output_folder import OutputFolder
-from dsa_des.run_folder import read_run, write_json, write_run_json
+from dsa_des.files.manifest import RUN_JSON, foreign_in
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.record.run_folder import read_run, write_json, write_run_json
 
 
 def fill(folder, rows=3):

@@ -137,7 +137,7 @@ def _call(argv: list[str]) -> int:
     if argv[0] == "simulate":
         _simulate(argv[1:])
     elif argv[0] == "compare-silhouettes":
-        from components.optical.comparison_command import main as compare
+        from components.evidence.silhouettes.comparison_command import main as compare
 
         return compare(argv[1:])
     else:
@@ -152,18 +152,18 @@ def _simulate(argv: list[str]) -> None:
     import click
 
     from dsa_des.cli import _scene_options
-    from dsa_des.plain_errors import plain_errors
+    from dsa_des.commands.plain_errors import plain_errors
 
     @click.command()
     @_scene_options
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
         from dsa_des.commands.loading import load, say_if_long
-        from dsa_des.plain_json import json_text
-        from dsa_des.recording import MemorySink, ObserverSink, Recorder
-        from dsa_des.reports import load_reports
-        from dsa_des.simulation import Simulation
-        from dsa_des.toml_text import to_toml
+        from dsa_des.files.toml_text import to_toml
+        from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
+        from dsa_des.run.reports import load_reports
+        from dsa_des.run.simulation import Simulation
+        from dsa_des.text.plain_json import json_text
 
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
         recorder = Recorder([MemorySink()])
@@ -187,10 +187,10 @@ def import_everything() -> None:
     for module in ("run", "check", "graph", "explain", "study"):
         importlib.import_module(f"dsa_des.commands.{module}")
     for module in (
-        "dsa_des.arrow", "dsa_des.studies.output", "dsa_des.studies.figures", "rich.console",
+        "dsa_des.record.arrow", "dsa_des.studies.output", "dsa_des.studies.figures", "rich.console",
         "rich.table", "rich.progress", "matplotlib.figure", "matplotlib.backends.backend_agg",
         "scipy.special", "scipy.stats", "components.display.figures", "trimesh",
-        "components.optical.comparison_command", "components.optical.mesh",
+        "components.evidence.silhouettes.comparison_command", "components.optical.mesh",
     ):  # fmt: skip
         with contextlib.suppress(ImportError):
             importlib.import_module(module)

@@ -12,13 +12,13 @@ from typing import Any
 import fuzz_values
 from fuzz_cases import Case
 
-from dsa_des.component import Parameters
-from dsa_des.entry_points import registered
+from dsa_des.block.component import Parameters
+from dsa_des.block.entry_points import registered
+from dsa_des.block.sections import section_models
 from dsa_des.errors import SceneError
-from dsa_des.scene import check_scene
-from dsa_des.scene_file import SceneFile
-from dsa_des.sections import section_models
-from dsa_des.toml_text import to_toml
+from dsa_des.files.toml_text import to_toml
+from dsa_des.scene.scene import check_scene
+from dsa_des.scene.scene_file import SceneFile
 
 BASE = """
 title = "fuzzed"

@@ -21,7 +21,7 @@ TEXTS = (
     "1e400",     "1e99999999", "1e-9999999", "1/0", "0/1", "1/3", "30000/1001", "1_000", "0x10", "9" * 5000,
     "1/" + "9" * 5000, "1 scan", "0 scans", "-1 scans", "1e3 scans", "10000000000000000000 scans",
     "٣ scans", "1000000 scans", "true", "None", "null", "2024-01-01", "radar.swerling", "nothing",
-    "no.such", "os:system", "json:loads", ":", "a:", ":b", "dsa_des.component:Component",
+    "no.such", "os:system", "json:loads", ":", "a:", ":b", "dsa_des.block.component:Component",
 )  # fmt: skip
 
 #: What stands for a value in TOML and is none of its kinds, or one in a great many pieces.
@@ -74,6 +74,6 @@ def value(rng: random.Random, depth: int = 0) -> Any:
 
 def raw(rng: random.Random) -> str:
     """Return TOML for a value: well formed, or not."""
-    from dsa_des.toml_text import inline
+    from dsa_des.files.toml_text import inline
 
     return rng.choice(RAW) if rng.random() < 0.3 else inline(value(rng))

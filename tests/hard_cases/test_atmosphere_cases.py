@@ -13,7 +13,7 @@ from components.atmosphere.rain import rain_specific_attenuation
 from components.atmosphere.slant_path import one_way_attenuation_db
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
-from components.navigation_error import position_with_error
+from components.navigation.error_model import position_with_error
 from components.radar.beam_sweep import illumination_offset_s
 from components.radar.clutter import clutter_detection_probability
 from components.radar.false_alarms import false_alarm_count

@@ -22,7 +22,7 @@ from components.radar.detection import (
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth, with_bandwidth
 from components.radar.rcs import AspectTable, dbsm_to_m2, fluctuating_rcs
 from components.radar.swerling import SwerlingParameters
-from dsa_des.clock import ClockSpec, ScanClock, parse_rational, resolution
+from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEG = math.pi / 180.0

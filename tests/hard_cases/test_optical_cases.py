@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.optical.aspect_table import table_from_nodes
+from components.aircraft.silhouette_table import table_from_nodes
 from components.optical.mesh import TriangleMesh
 from components.optical.signature import (
     confidence,
@@ -13,7 +13,7 @@ from components.optical.signature import (
     total_signature,
 )
 from components.optical.silhouette import visible_area
-from components.resolution import round_to_grid
+from components.sensor.resolution import round_to_grid
 
 PI = np.pi
 DEG = np.pi / 180.0

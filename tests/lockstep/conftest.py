@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import pyarrow.compute as pc
 import pytest
 
-from dsa_des.lockstep import LockStep
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.replicas import Replica, scene_of
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import LockStep
+from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.run.simulation import Simulation
 
 
 def tables_of(kind, scenes, **options):

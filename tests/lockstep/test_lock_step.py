@@ -7,14 +7,14 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 
-from dsa_des.lockstep import LockStep, NotInLockStep
-from dsa_des.randomness import Streams
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.replica_streams import ReplicaStreams
-from dsa_des.replica_time import first_scan
-from dsa_des.replicas import Failed, Recorded, Replica, run_replicas, scene_of
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas, scene_of
+from dsa_des.replicas.streams import ReplicaStreams
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.randomness import Streams
+from dsa_des.time.timeline import first_scan
 
 FIRST_LIGHT = "configs/first_light.toml"
 OFFSETS = (

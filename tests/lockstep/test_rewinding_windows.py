@@ -3,11 +3,11 @@
 import pytest
 
 from dsa_des.errors import BlockFailure
-from dsa_des.graph import build_graph
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.rewind import cut_loops
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.rewind import cut_loops
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.graph import build_graph
+from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/benchmark/manoeuvres.toml"
 

@@ -5,15 +5,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dsa_des.component import ClockedParameters, Component
-from dsa_des.lockstep import LockStep, NotInLockStep
-from dsa_des.message import Message
-from dsa_des.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
-from dsa_des.split_block import SplitBlock, _part
-from dsa_des.wake import Wake
-from dsa_des.watched_parameters import WatchedParameters
+from dsa_des.block.component import ClockedParameters, Component
+from dsa_des.block.message import Message
+from dsa_des.block.wake import Wake
+from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
+from dsa_des.replicas.split_block import SplitBlock, _part
+from dsa_des.replicas.watched_parameters import WatchedParameters
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"
 HEADING = "blocks.traffic.ownship.heading_deg"

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from components.numerics.__main__ import main
-from components.numerics.document import PAGE, SECTIONS, differences, markdown
+from components.evidence.numerics.__main__ import main
+from components.evidence.numerics.document import PAGE, SECTIONS, differences, markdown
 
 CASES = [case for _, cases in SECTIONS for case in cases()]
 
@@ -63,7 +63,7 @@ def test_without_mpmath_it_says_what_to_install(monkeypatch, capsys):
 
 
 def test_the_command_prints_the_page():
-    command = [sys.executable, "-W", "error", "-m", "components.numerics"]
+    command = [sys.executable, "-W", "error", "-m", "components.evidence.numerics"]
     done = subprocess.run(command, capture_output=True, check=True, encoding="utf-8")
     assert done.stdout == markdown()
     assert done.stderr == ""

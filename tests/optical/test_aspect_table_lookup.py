@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.optical.aspect_table import AspectTable, read_aspect_table, table_from_nodes
+from components.aircraft.silhouette_table import AspectTable, read_aspect_table, table_from_nodes
 from components.optical.silhouette import visible_area
 
 AZIMUTHS = np.arange(0.0, 360.0, 30.0)

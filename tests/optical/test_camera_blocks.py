@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster
 from components.optical.background import Background
 from components.optical.contrast import contrast_gain
 from components.optical.eo import ElectroOptical, ElectroOpticalParameters
@@ -14,12 +14,12 @@ from components.optical.infrared_area import infrared_area
 from components.optical.ir import Infrared, InfraredParameters
 from components.optical.plume import Plume
 from components.optical.silhouette import visible_area
-from dsa_des.component import Context
+from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
-from dsa_des.randomness import Streams
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.randomness import Streams
 
 AREA_TABLE = "az_deg,el_deg,area_m2\n" + "".join(
     f"{az},{el},{20.0 + 0.1 * abs(el) + 15.0 * abs(math.sin(math.radians(az)))}\n"

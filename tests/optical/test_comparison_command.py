@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from components.optical.comparison_command import main
+from components.evidence.silhouettes.comparison_command import main
 from components.optical.silhouette import visible_area
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 40.0}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.optical.comparison import (
+from components.evidence.silhouettes.comparison import (
     AXES,
     camera_rotation,
     compare_silhouettes,

@@ -10,9 +10,9 @@ import pytest
 from components.radar.beam_sweep import first_illumination
 from components.traffic.source import TrafficSource
 from dsa_des.errors import BlockFailure
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = """
 duration_s = 30

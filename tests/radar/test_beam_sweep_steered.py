@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.known_flights import KnownFlights
-from components.traffic.state import TrajectoryState
+from components.geometry.state import TrajectoryState
+from components.messages.known_flights import KnownFlights
 from components.traffic.steered_flight import SteeredFlight
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 # A manoeuvre arrives 0.7 s after a scan begins and one scan lasts a second: most turns begin while
 # the beam is under way.

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.arguments.detection import MODELS
 from components.radar.clutter import (
     KINDS,
     clutter_detection_probability,
     clutter_false_alarm_probability,
 )
 from components.radar.detection import detection_probability
-from components.radar.inputs import MODELS
 from components.radar.marcum import marcum_q1
 
 DRAWS = 200_000

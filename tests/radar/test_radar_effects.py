@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dsa_des.errors import SceneError
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 INTRUDERS = """
 [[blocks.traffic.intruders]]
@@ -197,7 +197,7 @@ def test_false_alarms_pass_fusion_in_any_window(scene, gate):
 
 def test_the_summary_counts_false_alarms_apart(scene):
     from components.display.summary import SensorSummary
-    from dsa_des.recording import ObserverSink
+    from dsa_des.record.recording import ObserverSink
 
     observer = SensorSummary(["radar"])
     sink = ObserverSink([observer])
@@ -250,7 +250,7 @@ def test_each_target_is_lit_at_its_own_instant(scene):
 
 def test_targets_that_are_not_offered(scene, monkeypatch):
     """Traffic that offers nothing may bring anything; a wrong offer is refused, not believed."""
-    from components.aircraft import Aircraft, Roster
+    from components.aircraft.aircraft import Aircraft, Roster
     from components.traffic.source import TrafficSource
     from dsa_des.errors import BlockFailure
 

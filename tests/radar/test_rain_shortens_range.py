@@ -3,9 +3,9 @@
 import pytest
 
 from components.atmosphere.attenuated_range import attenuated_range_m
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = """
 duration_s = 90

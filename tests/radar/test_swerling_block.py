@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from components.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster
+from components.messages.targets import RelativeTargets
 from components.radar.detection import detection_probability
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
-from components.sensor import Cells
-from components.target_messages import RelativeTargets
-from dsa_des.component import Context
+from components.sensor.sensor import Cells
+from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
-from dsa_des.randomness import Streams
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.randomness import Streams
 
 RADAR = {
     "scan_rate_hz": 1,

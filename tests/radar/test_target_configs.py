@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 EXTENDED = sorted(CONFIGS.glob("aircraft/*.toml")) + sorted(CONFIGS.glob("obstacles/*.toml"))

@@ -13,13 +13,13 @@ import random_changes
 from dice import Dice
 from random_scene import Case
 
+from dsa_des.block.message import Text
 from dsa_des.errors import SceneError
-from dsa_des.lockstep import LockStep, NotInLockStep
-from dsa_des.message import Text
-from dsa_des.recording import ColumnSink, Recorder
-from dsa_des.replicas import Failed, Recorded, run_replicas, scene_of
-from dsa_des.scene import Scene, load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, scene_of
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
 
 #: Table → column → values as plain arrays.
 Tables = Mapping[str, Mapping[str, Any]]

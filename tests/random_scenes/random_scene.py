@@ -15,9 +15,9 @@ import random_flights
 from dice import Dice
 
 from dsa_des.errors import SceneError
-from dsa_des.scene import Scene, load_scene
-from dsa_des.simulation import Simulation
-from dsa_des.toml_text import to_toml
+from dsa_des.files.toml_text import to_toml
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 # Scan by scan, a scan of one sensor takes some milliseconds; this many keep a run below half a

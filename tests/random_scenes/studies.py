@@ -9,7 +9,7 @@ import random_changes
 from dice import Dice
 from random_scene import Case
 
-from dsa_des.toml_text import to_toml
+from dsa_des.files.toml_text import to_toml
 
 _HERE = Path(__file__).resolve().parent
 _METRICS = ("detection_share", "age_of_information", "track_updates", "first_detection")

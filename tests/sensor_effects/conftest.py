@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = """
 duration_s = {duration}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 
 @pytest.mark.parametrize(

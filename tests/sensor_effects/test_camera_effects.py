@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 CAMERAS = [
     ("", ""),

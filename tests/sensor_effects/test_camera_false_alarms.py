@@ -6,11 +6,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from components.aircraft import Roster
-from components.false_detections import FALSE_TARGET, add_false_detections
-from components.messages import Detections
+from components.aircraft.aircraft import Roster
+from components.messages.detections import Detections
+from components.messages.false_detections import FALSE_TARGET, add_false_detections
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 EVERY_TENTH = "false_alarms_per_frame = 0.1"
 

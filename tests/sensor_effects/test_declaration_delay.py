@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 RULE = "declare_m = 3\ndeclare_n = 5"
 NEVER_MISSES = "threshold = -1\n"

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from components.environment import Navigation
-from components.navigation import NavigationErrors
-from components.navigation_error import position_with_error
+from components.environment.tables import Navigation
+from components.navigation.effects import NavigationErrors
+from components.navigation.error_model import position_with_error
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 NED = ["ned_azimuth_rad", "ned_elevation_rad", "own_lat_deg", "own_lon_deg", "own_alt_m"]
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000.0}
@@ -104,8 +104,8 @@ def test_the_noise_of_a_late_instant_is_its_own():
     """Instants beyond 48 bits of ticks draw other numbers than those they would wrap to."""
     from types import SimpleNamespace
 
-    from dsa_des.component import Context
-    from dsa_des.randomness import Streams
+    from dsa_des.block.component import Context
+    from dsa_des.time.randomness import Streams
 
     context = Context(Streams(1), sections={"navigation": Navigation(position_noise_m=(0, 0, 9))})
     believed = NavigationErrors().build(SimpleNamespace(context=context))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from components.display.fields_of_view import outline_of, reach_text
-from components.mounting import MountedAxes
-from components.reach import Reach
+from components.messages.reach import Reach
+from components.sensor.mounting import MountedAxes
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 
 def rotation(azimuth_deg, elevation_deg, roll_deg):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 from dsa_des.studies.axes import beat_period_s, flatten_axes, parse_axis
 from dsa_des.studies.draws import exact, parse_draw, replica_seed
 from dsa_des.studies.study_file import read_study

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.clock_coincidence import coincidence_share
-from dsa_des.replicas import Replica, run_replicas
-from dsa_des.scene import Scene, load_scene
+from components.metrics.clock_coincidence import coincidence_share
+from dsa_des.replicas.replicas import Replica, run_replicas
+from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.studies.metric import Group, wanted_by
 from dsa_des.studies.study import MetricSpec
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from components.metrics.encounter import NMAC_M, WELL_CLEAR_M
+from components.metrics.separation import Separation, closest, first_inside, separations
 from components.metrics.track_quality import _ramp_quantiles
-from components.separation import Separation, closest, first_inside, separations
-from dsa_des.entry_points import registered
-from dsa_des.message import Text
-from dsa_des.replicas import Recorded, Replica, run_replicas
-from dsa_des.scene import load_scene
+from dsa_des.block.entry_points import registered
+from dsa_des.block.message import Text
+from dsa_des.replicas.replicas import Recorded, Replica, run_replicas
+from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import METRICS, Group, wanted_by
 from dsa_des.studies.study import MetricSpec
 
@@ -182,7 +182,7 @@ def test_distances_do_not_depend_on_the_pieces_they_come_in(
     assert len(whole[0]) > 1000  # the grid and the samples of the source
     assert np.all(np.diff(whole[0]) > 0)
     for pieces in (50, 301):
-        monkeypatch.setattr("components.separation.MOST_AT_ONCE", pieces)
+        monkeypatch.setattr("components.metrics.separation.MOST_AT_ONCE", pieces)
         assert found() == whole
 
 

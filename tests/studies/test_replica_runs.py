@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsa_des.block.message import Text
 from dsa_des.errors import SceneError
-from dsa_des.message import Text
-from dsa_des.recording import ColumnSink, Recorder
-from dsa_des.replicas import Failed, Recorded, Replica, run_replicas, scene_of, why_apart
-from dsa_des.scene import Scene, load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas, scene_of, why_apart
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
 
 
 def recorded(scene: Scene) -> dict[str, dict[str, object]]:

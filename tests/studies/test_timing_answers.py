@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from components.jittered_coincidence import mean_coincidence_share
-from components.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
+from components.metrics.jittered_coincidence import mean_coincidence_share
+from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
 from dsa_des.cli import main
-from dsa_des.clock import ClockSpec
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.identity import description
 from dsa_des.studies.output import Tables
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
+from dsa_des.time.clock import ClockSpec
 
 READY = Path(__file__).parents[2] / "configs" / "studies"
 TICKS = 10**9

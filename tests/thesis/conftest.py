@@ -2,8 +2,8 @@
 
 import pytest
 
-from components.thesis.made import Made
-from components.thesis.registry import ITEMS
+from components.evidence.thesis.made import Made
+from components.evidence.thesis.registry import ITEMS
 
 
 @pytest.fixture(scope="session")

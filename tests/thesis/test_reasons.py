@@ -2,8 +2,8 @@
 
 import pytest
 
-from components.thesis import area_error, eo_ranges, flight_tests, overtaking
-from components.thesis.row import AGREES, Row
+from components.evidence.thesis import area_error, eo_ranges, flight_tests, overtaking
+from components.evidence.thesis.row import AGREES, Row
 
 
 def half_a_digit(row: Row) -> float:

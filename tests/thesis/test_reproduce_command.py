@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.thesis.document import short
-from components.thesis.made import Made
-from components.thesis.registry import ITEMS, Item, chosen
-from components.thesis.row import Row
+from components.evidence.thesis.document import short
+from components.evidence.thesis.made import Made
+from components.evidence.thesis.registry import ITEMS, Item, chosen
+from components.evidence.thesis.row import Row
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
-from dsa_des.scene import load_scene
+from dsa_des.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 FRAGMENTS = ("one_radar", "base", "two_intruders")
@@ -159,7 +159,7 @@ def test_page_holds_every_row_with_its_status(results):
 
 def test_help_does_not_import_the_simulator():
     code = (
-        "import sys; from components.thesis.command import reproduce; "
+        "import sys; from components.evidence.thesis.command import reproduce; "
         "print([m for m in ('numpy', 'scipy', 'matplotlib', 'simpy') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.enu import enu_to_geodetic, geodetic_to_enu
+from components.geometry.enu import enu_to_geodetic, geodetic_to_enu
 
 offset = st.floats(-200e3, 200e3)
 

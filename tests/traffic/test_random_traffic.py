@@ -5,8 +5,8 @@ import pytest
 
 from components.geometry.ellipsoid import line_of_sight
 from dsa_des.errors import SceneError
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/benchmark/hundred.toml"
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from components.geometry.ellipsoid import line_of_sight
-from components.target_messages import TrafficStates
+from components.messages.targets import TrafficStates
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.steered_culling import SHORTEST_EPOCH_S, SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
-from dsa_des.recording import MemorySink, Recorder
-from dsa_des.scene import load_scene
-from dsa_des.simulation import Simulation
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/benchmark/manoeuvres.toml"
 

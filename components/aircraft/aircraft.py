@@ -1,0 +1,181 @@
+"""What an aircraft is to a sensor: radar cross-section, silhouette areas, contrast."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from operator import attrgetter
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from components.aircraft.table_files import RcsTableFile, SilhouetteTableFile
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Parameters
+from dsa_des.time.randomness import target_keys
+
+
+class VisibleAreas(Parameters):
+    """The three bodies of the thesis's aircraft model, as an EO camera sees them (§3.5.2)."""
+
+    front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
+    side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
+    horizontal_m2: float = Field(ge=0, description="Area of the horizontal plane, m².")
+    silhouette_table: SilhouetteTableFile | None = Field(
+        default=None,
+        description="CSV with az_deg, el_deg and area_m2 of the observer's direction from the "
+        "aircraft, for cameras with silhouette 'aspect_table'.",
+    )
+
+
+class InfraredAreas(VisibleAreas):
+    """The same for an IR camera, with a back of its own (§3.5.3, Tables 3.2 and 4.6)."""
+
+    back_m2: float = Field(ge=0, description="Area of the sphere seen from behind, m².")
+
+
+# The thesis's general aviation class, so that a scene may leave the aircraft out.
+_EO = VisibleAreas(front_m2=12.0, side_m2=30.0, horizontal_m2=90.0)
+_IR = InfraredAreas(front_m2=4.6, back_m2=4.6, side_m2=11.15, horizontal_m2=35.52)
+
+
+class Aircraft(Parameters):
+    """What sensors need to know of one aircraft; files in ``configs/aircraft`` hold these keys."""
+
+    rcs_dbsm: float = Field(default=3.01, description="Mean radar cross-section, dBsm (Table 4.1).")
+    rcs_table: RcsTableFile | None = Field(
+        default=None,
+        description="CSV with az_deg, el_deg and dbsm of the radar's direction from the aircraft; "
+        "used in place of rcs_dbsm.",
+    )
+    swerling: Literal[0, 1, 2, 3, 4, 5] = Field(
+        default=1, description="Fluctuation model of the radar cross-section; 0 and 5 are steady."
+    )
+    eo: VisibleAreas = Field(default=_EO, description="Areas seen by EO cameras.")
+    ir: InfraredAreas = Field(default=_IR, description="Areas seen by IR cameras.")
+    contrast: float = Field(default=1.0, ge=0, description="Contrast gain P for EO (eq. 18).")
+    contrast_ir: float = Field(default=1.0, ge=0, description="Contrast gain P for IR (eq. 18).")
+    paint_reflectance: float = Field(
+        default=0.5, ge=0, le=1, description="Diffuse reflectance, for EO with a background."
+    )
+    engine: Literal["propeller", "turbofan", "turbojet"] = Field(
+        default="propeller", description="Propulsion type (Table 4.5)."
+    )
+
+
+def _alike(one: Aircraft, other: Aircraft) -> bool:
+    """Return whether two aircraft are the same to every sensor, wherever they fly."""
+    return one is other or all(
+        getattr(one, name) == getattr(other, name) for name in Aircraft.model_fields
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Roster:
+    """The targets of a run: their names, their draw keys and what sensors need of them.
+
+    Parameters
+    ----------
+    names : tuple of str
+    aircraft : tuple of Aircraft
+    """
+
+    names: tuple[str, ...]
+    aircraft: tuple[Aircraft, ...]
+
+    @classmethod
+    def of(cls, targets: Sequence[tuple[str, Aircraft]]) -> "Roster":
+        """Return the roster of (name, aircraft) pairs."""
+        return cls(tuple(name for name, _ in targets), tuple(craft for _, craft in targets))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, Roster)
+            and self.names == other.names
+            and all(map(_alike, self.aircraft, other.aircraft))
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.names)
+
+    @cached_property
+    def keys(self) -> AnyArray:
+        """64-bit keys of the targets' random draws, shape (targets,)."""
+        return target_keys(self.names)
+
+    def keys_of(self, targets: IntArray) -> AnyArray:
+        """Return the keys of some targets (n,); those that nobody asks for are never made."""
+        if "keys" in self.__dict__:
+            return self.keys[targets]
+        keys, known = self._keys_so_far
+        new = np.unique(targets[~known[targets]])
+        if len(new):
+            keys[new] = target_keys(tuple(self.names[i] for i in new.tolist()))
+            known[new] = True
+        return keys[targets]
+
+    @cached_property
+    def _keys_so_far(self) -> tuple[AnyArray, AnyArray]:
+        return np.zeros(len(self.names), dtype=np.uint64), np.zeros(len(self.names), dtype=bool)
+
+    @cached_property
+    def rcs_m2(self) -> FloatArray:
+        """Mean radar cross-section in m², shape (targets,)."""
+        return np.array([10.0 ** (craft.rcs_dbsm / 10.0) for craft in self.aircraft])
+
+    @cached_property
+    def engines(self) -> AnyArray:
+        """Propulsion type of each target, shape (targets,) of text."""
+        return np.array([craft.engine for craft in self.aircraft], dtype=np.str_)
+
+    @cached_property
+    def swerling(self) -> AnyArray:
+        """Swerling model of each target, 5 written as 0, shape (targets,)."""
+        return np.array([craft.swerling % 5 for craft in self.aircraft], dtype=np.int64)
+
+    @cached_property
+    def swerling_models(self) -> tuple[int, ...]:
+        """Which models there are, ascending, 5 written as 0."""
+        return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
+
+    def column(self, path: str) -> FloatArray:
+        """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
+        columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})
+        if path not in columns:
+            read = attrgetter(path)
+            columns[path] = np.array([read(craft) for craft in self.aircraft], dtype=np.float64)
+        return columns[path]
+
+    def tables(self, path: str) -> tuple[tuple[Any, ...], IntArray]:
+        """Return the tables that targets name, and which one each target has.
+
+        Parameters
+        ----------
+        path : str
+            ``"rcs_table"``, ``"eo.silhouette_table"`` or ``"ir.silhouette_table"``.
+
+        Returns
+        -------
+        tables : tuple
+            Each once, in the order of the targets.
+        place : (targets,) of int
+            Index into `tables`; -1 for a target without one.
+        """
+        cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
+        if path not in cache:
+            tables: list[Any] = []
+            place = np.full(len(self), -1, dtype=np.int64)
+            for target, craft in enumerate(self.aircraft):
+                file = attrgetter(path)(craft)
+                if file is None:
+                    continue
+                same = [i for i, table in enumerate(tables) if table is file.table]
+                place[target] = same[0] if same else len(tables)
+                if not same:
+                    tables.append(file.table)
+            cache[path] = tuple(tables), place
+        found: tuple[tuple[Any, ...], IntArray] = cache[path]
+        return found

@@ -1,0 +1,65 @@
+"""Which targets will a block see? Offered down the chain before effects are planned."""
+
+from collections.abc import Callable
+from typing import Any
+
+from components.aircraft.aircraft import Roster
+from dsa_des.block.component import Context
+
+
+class KnownTraffic:
+    """What a traffic block offers: what its targets are, and where they can be.
+
+    Two offers are equal when their targets are and nobody has asked where these can be.
+
+    Parameters
+    ----------
+    roster : Roster
+    envelope : callable or None
+        Gives, for a reach in m and the time in s that a look lasts, the
+        `components.traffic.envelope.TrafficEnvelope` of the run, once its length is known. None
+        where it depends on what will be sensed.
+    """
+
+    def __init__(self, roster: Roster, envelope: Callable[[float, float], Any] | None) -> None:
+        self.roster = roster
+        self._envelope = envelope
+        self._asked = False
+
+    def envelope(self, reach_m: float, lasts_s: float) -> Any:
+        """Return the run's envelope for a reach, or None."""
+        self._asked = True
+        return None if self._envelope is None else self._envelope(reach_m, lasts_s)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, KnownTraffic)
+            and self.roster == other.roster
+            and not (self._asked or other._asked)
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.roster)
+
+
+def known_targets(context: Context) -> tuple[Roster, ...]:
+    """Return the rosters that a block's producers offer it.
+
+    A traffic block offers its roster, alone or as `KnownTraffic`; the transform and the gate pass
+    on what they were offered.
+
+    Parameters
+    ----------
+    context : Context
+        Of the block.
+
+    Returns
+    -------
+    tuple of Roster
+        Empty where nobody says what the targets are: they may then be anything.
+    """
+    offers = (
+        offer.roster if isinstance(offer, KnownTraffic) else offer
+        for offer in (producer.offer for producer in context.producers)
+    )
+    return tuple(offer for offer in offers if isinstance(offer, Roster))

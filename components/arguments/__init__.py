@@ -1,0 +1,1 @@
+"""Which arguments physics functions accept, and how they become arrays."""

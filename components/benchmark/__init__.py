@@ -1,1 +1,0 @@
-"""How fast is a run, and compared with what?"""

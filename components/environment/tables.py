@@ -1,0 +1,110 @@
+"""Tables of a scene that all blocks can read.
+
+They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dsa_des.block.component import Parameters
+
+
+class Weather(Parameters):
+    """The weather; by default there is none, and sensors look through empty space."""
+
+    gas: bool = Field(
+        default=False, description="Whether oxygen and water vapour attenuate radar (P.676)."
+    )
+    vapour_density_g_m3: float = Field(
+        default=7.5, ge=0, le=50, description="Water vapour density at sea level, g/m³."
+    )
+    rain_rate_mm_h: float = Field(default=0.0, ge=0, le=300, description="Rain rate, mm/h.")
+    rain_top_m: float = Field(
+        default=2668.0, description="Altitude of the rain's upper edge, m (ITU-R P.839-4)."
+    )
+    fog_water_g_m3: float = Field(
+        default=0.0, ge=0, le=10, description="Liquid water of fog or cloud, g/m³."
+    )
+    fog_base_m: float = Field(default=-1000.0, description="Altitude of the fog's lower edge, m.")
+    fog_top_m: float = Field(default=500.0, description="Altitude of the fog's upper edge, m.")
+    fog_temperature_c: float = Field(
+        default=10.0, ge=-40, le=50, description="Temperature of the fog's droplets, deg C."
+    )
+    visibility_km: float | None = Field(
+        default=None,
+        gt=0,
+        description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
+    )
+
+    @model_validator(mode="after")
+    def _fog_has_a_thickness(self) -> Self:
+        if self.fog_top_m < self.fog_base_m:
+            raise ValueError(
+                f"fog_top_m is {self.fog_top_m:g}: it must be at least fog_base_m, "
+                f"{self.fog_base_m:g}"
+            )
+        return self
+
+
+class Accuracy(Parameters):
+    """Errors that a scene allows; effects and rungs proven to stay within them are left out.
+
+    Angles are directions, azimuths and elevations in body axes, as far as a sensor looks at them.
+    The line of sight is judged by ``angle_deg`` and ``range_m``, and by what its error in range
+    does to a Pd where ``detection_probability`` is given. A sensor without a Pd (threshold, range
+    boundary, camera) detects by no more than ``range_m`` nearer or farther.
+    """
+
+    detection_probability: float | None = Field(
+        default=None, gt=0, lt=1, description="Error of any probability of detection."
+    )
+    angle_deg: float | None = Field(default=None, gt=0, description="Error of any angle, deg.")
+    range_m: float | None = Field(default=None, gt=0, description="Error of any range, m.")
+
+
+PositionError = Annotated[float, Field(ge=-10_000, le=10_000)]
+PositionNoise = Annotated[float, Field(ge=0, le=1000)]
+AttitudeError = Annotated[float, Field(ge=-180, le=180)]
+AttitudeNoise = Annotated[float, Field(ge=0, le=30)]
+
+
+class Navigation(Parameters):
+    """Errors of the ownship's navigation (TECVOL, thesis §2.3.1), believed minus true."""
+
+    position_bias_m: tuple[PositionError, PositionError, PositionError] = Field(
+        default=(0.0, 0.0, 0.0), description="Constant error north, east and down, m."
+    )
+    position_noise_m: tuple[PositionNoise, PositionNoise, PositionNoise] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Standard deviation of the white noise north, east and down, m.",
+    )
+    attitude_bias_deg: tuple[AttitudeError, AttitudeError, AttitudeError] = Field(
+        default=(0.0, 0.0, 0.0), description="Constant error of yaw, pitch and roll, deg."
+    )
+    attitude_noise_deg: tuple[AttitudeNoise, AttitudeNoise, AttitudeNoise] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Standard deviation of the white noise of yaw, pitch and roll, deg.",
+    )
+
+
+class Terrain(Parameters):
+    """Flat ground, whose echo a radar may hear; by default there is none."""
+
+    height_m: float | None = Field(
+        default=None,
+        ge=-1000,
+        le=10_000,
+        description="Altitude of the ground, below the ownship's, m; none by default.",
+    )
+    clutter_gamma_db: float = Field(
+        default=-15.0,
+        ge=-100,
+        le=100,
+        description="Reflectivity of the ground, gamma of sigma0 = gamma sin(grazing angle), dB: "
+        "about -20 desert or sea, -15 farmland, -10 woodland, -5 a town (assumption).",
+    )
+    clutter_mean: Literal["constant", "fluctuating"] = Field(
+        default="fluctuating",
+        description="Whether the clutter's mean fluctuates from look to look (thesis §5.3.2).",
+    )

@@ -1,0 +1,1 @@
+"""What makes the pages of the docs; it may import everything, nothing imports it."""

@@ -1,0 +1,1 @@
+"""Hard cases of the numerics: the naive way, ours and a reference."""

@@ -1,0 +1,1 @@
+"""Silhouette models compared over rotation with a reference."""

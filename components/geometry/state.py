@@ -1,0 +1,54 @@
+"""The state of aircraft at some times, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.normals import FloatArray
+
+
+@dataclass(frozen=True)
+class TrajectoryState:
+    """Position and attitude of one or many aircraft at some times, as arrays of one shape.
+
+    Parameters
+    ----------
+    lat_deg, lon_deg : ndarray
+        Geodetic, WGS-84; longitude in [-180, 180).
+    alt_m : ndarray
+        Height above the ellipsoid, metres.
+    yaw_rad : ndarray
+        Clockwise from true north, [0, 2 pi).
+    pitch_rad, roll_rad : ndarray
+        Nose up and right wing down are positive.
+    present : ndarray of bool
+        False where the aircraft is not there. All other fields then hold its nearest known
+        state: finite, so that arithmetic on them is safe, but not to be used.
+    """
+
+    lat_deg: FloatArray
+    lon_deg: FloatArray
+    alt_m: FloatArray
+    yaw_rad: FloatArray
+    pitch_rad: FloatArray
+    roll_rad: FloatArray
+    present: npt.NDArray[np.bool_]
+
+    def reshaped(self, shape: tuple[int, ...]) -> TrajectoryState:
+        """Return the same state with its arrays in another shape."""
+        return TrajectoryState(*(array.reshape(shape) for array in self.arrays()))
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """Return the seven arrays in the order of the fields."""
+        return (
+            self.lat_deg,
+            self.lon_deg,
+            self.alt_m,
+            self.yaw_rad,
+            self.pitch_rad,
+            self.roll_rad,
+            self.present,
+        )

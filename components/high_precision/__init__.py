@@ -1,0 +1,1 @@
+"""What blocks compute, computed again at 40 digits."""

@@ -1,0 +1,1 @@
+"""The geometry blocks: from where aircraft are to where they are seen."""

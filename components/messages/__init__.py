@@ -1,0 +1,42 @@
+"""What blocks tell each other: targets, detections, manoeuvres, reach."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from components.messages.detections import Detections, FusedDetections, SensorOffer, Tracks
+    from components.messages.reach import Reach
+    from components.messages.steering import Manoeuvres
+    from components.messages.targets import GatedTargets, RelativeTargets, TrafficStates
+
+__all__ = [
+    "Detections",
+    "FusedDetections",
+    "GatedTargets",
+    "Manoeuvres",
+    "Reach",
+    "RelativeTargets",
+    "SensorOffer",
+    "Tracks",
+    "TrafficStates",
+]
+
+# Looked up on first use: whoever imports one file of the package does not pay for the others.
+_HOMES = {
+    "Detections": "components.messages.detections",
+    "FusedDetections": "components.messages.detections",
+    "GatedTargets": "components.messages.targets",
+    "Manoeuvres": "components.messages.steering",
+    "Reach": "components.messages.reach",
+    "RelativeTargets": "components.messages.targets",
+    "SensorOffer": "components.messages.detections",
+    "Tracks": "components.messages.detections",
+    "TrafficStates": "components.messages.targets",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

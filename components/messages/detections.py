@@ -1,0 +1,303 @@
+"""What the sensors report, and what becomes of it: detections, fused lines of sight, tracks.
+
+All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
+is clockwise and elevation upward.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from components.aircraft.aircraft import Roster
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.message import Message, Text, per_entry, static
+
+_BITS_OF_INT64 = 63
+_COUNTED_BITS = 12
+
+
+@dataclass(frozen=True)
+class SensorOffer:
+    """What a sensor says of its detections to whoever receives them.
+
+    Parameters
+    ----------
+    measures_range : bool
+    resolution_rad : float
+        Coarser of the two angular grid steps, for choosing between sensors.
+    """
+
+    measures_range: bool
+    resolution_rad: float
+
+
+@dataclass(eq=False)
+class Detections(Message):
+    """What one sensor reports, scan by scan.
+
+    Parameters
+    ----------
+    scan : (rows,)
+        Scan number of the sensor's clock.
+    evaluated : (rows,)
+        Targets whose physics was evaluated.
+    skipped : dict of (rows,)
+        Targets that were not, by reason.
+    offsets : (rows + 1,)
+        Entries ``offsets[i]:offsets[i + 1]`` belong to row i.
+    target : (entries,) of int
+        Index into the roster.
+    azimuth_rad, elevation_rad : (entries,)
+        Measured, in the ownship's body axes, on the sensor's grid.
+    range_m : (entries,)
+        Measured slant range; NaN for a sensor that has none.
+    confidence : (entries,)
+        Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
+    true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
+    extras : dict of (entries,)
+        What the decision rested on, where a sensor has such a thing: ``snr_db``,
+        ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
+        detections to be declared (recorded as true where no rule is in force). A sweeping radar
+        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
+        ownship's navigation errs, there are the line of sight in NED by what it believes of its
+        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``, and where it believes to be,
+        ``own_lat_deg``, ``own_lon_deg`` and ``own_alt_m``.
+    roster : Roster
+    """
+
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "scans": {
+            "scan": "int64",
+            "evaluated": "int64",
+            "detected": "int64",
+            "skipped_absent": "int64",
+            "skipped_off": "int64",
+            "skipped_field_of_view": "int64",
+            "skipped_range": "int64",
+            "skipped_culled": "int64",
+        },
+        "detections": {
+            "scan": "int64",
+            "target": "text",
+            "azimuth_rad": "float64",
+            "elevation_rad": "float64",
+            "range_m": "float64",
+            "confidence": "float64",
+            "true_azimuth_rad": "float64",
+            "true_elevation_rad": "float64",
+            "true_range_m": "float64",
+            "snr_db": "float64",
+            "detection_probability": "float64",
+            "pixels": "float64",
+            "declared": "bool",
+            "illuminated_s": "float64",
+            "ned_azimuth_rad": "float64",
+            "ned_elevation_rad": "float64",
+            "own_lat_deg": "float64",
+            "own_lon_deg": "float64",
+            "own_alt_m": "float64",
+        },
+    }
+
+    scan: IntArray
+    evaluated: IntArray
+    skipped: dict[str, IntArray]
+    offsets: IntArray
+    target: IntArray = per_entry()
+    azimuth_rad: FloatArray = per_entry()
+    elevation_rad: FloatArray = per_entry()
+    range_m: FloatArray = per_entry()
+    confidence: FloatArray = per_entry()
+    true_azimuth_rad: FloatArray = per_entry()
+    true_elevation_rad: FloatArray = per_entry()
+    true_range_m: FloatArray = per_entry()
+    extras: dict[str, AnyArray] = per_entry()
+    roster: Roster = static()
+
+    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+        """Return the rows of ``scans`` and ``detections``."""
+        counts = np.diff(self.offsets)
+        skipped = {f"skipped_{reason}": count for reason, count in self.skipped.items()}
+        scans: dict[str, AnyArray | Text] = {
+            "tick": self.tick,
+            "scan": self.scan,
+            "evaluated": self.evaluated,
+            "detected": counts,
+            **skipped,
+        }
+        detections: dict[str, AnyArray | Text] = {
+            "tick": np.repeat(self.tick, counts),
+            "scan": np.repeat(self.scan, counts),
+            "target": Text(self.target, self.roster.names),
+            "azimuth_rad": self.azimuth_rad,
+            "elevation_rad": self.elevation_rad,
+            "range_m": self.range_m,
+            "confidence": self.confidence,
+            "true_azimuth_rad": self.true_azimuth_rad,
+            "true_elevation_rad": self.true_elevation_rad,
+            "true_range_m": self.true_range_m,
+            # A sensor without a rule declares what it detects; nobody is behind a false alarm.
+            "declared": self.target >= 0,
+            **self.extras,
+        }
+        return {"scans": scans, "detections": detections}
+
+
+@dataclass(eq=False)
+class FusedDetections(Message):
+    """One line of sight per target and instant, put together from the sensors.
+
+    Parameters
+    ----------
+    offsets : (rows + 1,)
+    target : (entries,) of int
+    azimuth_rad, elevation_rad : (entries,)
+        In the ownship's body axes.
+    range_m : (entries,)
+        NaN when no contributing sensor measures range.
+    contributors : (entries,) of int
+        Bit i is set when ``sensors[i]`` contributed; of the type `mask_type` gives.
+    angle_source, range_source : (entries,) of int
+        Index into `sensors`; -1 for none.
+    true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
+    roster : Roster
+    sensors : tuple of str
+        Those with range first, each group by name.
+    """
+
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "fused": {
+            "target": "text",
+            "sensors": "text",
+            "azimuth_rad": "float64",
+            "elevation_rad": "float64",
+            "range_m": "float64",
+            "angle_source": "text",
+            "range_source": "text",
+            "true_azimuth_rad": "float64",
+            "true_elevation_rad": "float64",
+            "true_range_m": "float64",
+        }
+    }
+
+    offsets: IntArray
+    target: IntArray = per_entry()
+    azimuth_rad: FloatArray = per_entry()
+    elevation_rad: FloatArray = per_entry()
+    range_m: FloatArray = per_entry()
+    contributors: IntArray = per_entry()
+    angle_source: IntArray = per_entry()
+    range_source: IntArray = per_entry()
+    true_azimuth_rad: FloatArray = per_entry()
+    true_elevation_rad: FloatArray = per_entry()
+    true_range_m: FloatArray = per_entry()
+    roster: Roster = static()
+    sensors: tuple[str, ...] = static()
+
+    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+        """Return the rows of ``fused``."""
+        columns: dict[str, AnyArray | Text] = {
+            "tick": np.repeat(self.tick, np.diff(self.offsets)),
+            "target": Text(self.target, self.roster.names),
+            "sensors": combination_text(self.contributors, self.sensors),
+            "azimuth_rad": self.azimuth_rad,
+            "elevation_rad": self.elevation_rad,
+            "range_m": self.range_m,
+            "angle_source": Text(self.angle_source, self.sensors),
+            "range_source": Text(self.range_source, self.sensors),
+            "true_azimuth_rad": self.true_azimuth_rad,
+            "true_elevation_rad": self.true_elevation_rad,
+            "true_range_m": self.true_range_m,
+        }
+        return {"fused": columns}
+
+
+@dataclass(eq=False)
+class Tracks(Message):
+    """What a tracker holds of each target, at each instant it was updated.
+
+    Parameters
+    ----------
+    offsets : (rows + 1,)
+    target : (entries,) of int
+    azimuth_rad, elevation_rad, range_m : (entries,)
+        Held measurement, ownship's body axes; range NaN when it had none.
+    age_s : (entries,)
+        Time since the target's last update.
+    contributors : (entries,) of int
+        Sensors of the last update, as in `FusedDetections`.
+    roster : Roster
+    sensors : tuple of str
+    """
+
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "tracks": {
+            "target": "text",
+            "azimuth_rad": "float64",
+            "elevation_rad": "float64",
+            "range_m": "float64",
+            "age_s": "float64",
+            "updated_by": "text",
+        }
+    }
+
+    offsets: IntArray
+    target: IntArray = per_entry()
+    azimuth_rad: FloatArray = per_entry()
+    elevation_rad: FloatArray = per_entry()
+    range_m: FloatArray = per_entry()
+    age_s: FloatArray = per_entry()
+    contributors: IntArray = per_entry()
+    roster: Roster = static()
+    sensors: tuple[str, ...] = static()
+
+    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+        """Return the rows of ``tracks``."""
+        columns: dict[str, AnyArray | Text] = {
+            "tick": np.repeat(self.tick, np.diff(self.offsets)),
+            "target": Text(self.target, self.roster.names),
+            "azimuth_rad": self.azimuth_rad,
+            "elevation_rad": self.elevation_rad,
+            "range_m": self.range_m,
+            "age_s": self.age_s,
+            "updated_by": combination_text(self.contributors, self.sensors),
+        }
+        return {"tracks": columns}
+
+    @classmethod
+    def initial(cls, values: Mapping[str, object]) -> Self:
+        """Return a message without tracks; the scene's table must be empty."""
+        if values:
+            raise ValueError("tracks before the first message can only be an empty table, {}")
+        none, zero = np.empty(0), np.empty(0, dtype=np.int64)
+        offsets = np.zeros(2, dtype=np.int64)
+        return cls(
+            np.zeros(1, dtype=np.int64), offsets, zero, none, none, none, none, zero,
+            Roster.of([]), (),
+        )  # fmt: skip
+
+
+def mask_type(sensors: int) -> type:
+    """Return the NumPy type of masks with a bit for each sensor.
+
+    Beyond 63 sensors masks are Python's integers, which hold any number of bits.
+    """
+    return np.int64 if sensors <= _BITS_OF_INT64 else object
+
+
+def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
+    """Return the names behind bit masks, joined by ``+``."""
+    if len(sensors) <= _COUNTED_BITS:  # counting was measured to be the fastest
+        used = np.bincount(contributors, minlength=1)
+        masks = np.flatnonzero(used)
+        codes = (np.cumsum(used > 0) - 1).take(contributors)
+    else:
+        masks, codes = np.unique(contributors, return_inverse=True)
+    names = tuple("+".join(_names_in(int(mask), sensors)) for mask in masks)
+    return Text(codes, names)
+
+
+def _names_in(mask: int, sensors: tuple[str, ...]) -> list[str]:
+    return [name for i, name in enumerate(sensors) if mask >> i & 1]

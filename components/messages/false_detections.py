@@ -1,0 +1,74 @@
+"""Detections of what is not there: how false alarms join a sensor's report."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.messages.detections import Detections
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+
+#: Index into the roster of a detection without a target; it is recorded as null.
+FALSE_TARGET = -1
+
+
+def add_false_detections(
+    detections: Detections,
+    row: IntArray,
+    *,
+    azimuth_rad: FloatArray,
+    elevation_rad: FloatArray,
+    range_m: ArrayLike = np.nan,
+    confidence: ArrayLike = np.nan,
+    extras: Mapping[str, ArrayLike] | None = None,
+) -> Detections:
+    """Return a sensor's report with false detections after the true ones of each scan.
+
+    Parameters
+    ----------
+    detections : Detections
+    row : (alarms,) of int
+        Row of `detections` that each false one belongs to, ascending.
+    azimuth_rad, elevation_rad : (alarms,)
+        As reported: ownship's body axes, on the sensor's grid.
+    range_m, confidence : (alarms,) or one number
+        NaN where the sensor has none.
+    extras : mapping of (alarms,) or one number
+        Columns of `Detections.extras`; those not given are NaN, or False where they hold truth
+        values.
+
+    Returns
+    -------
+    Detections
+        `detections` itself when there is no alarm. False ones have target `FALSE_TARGET` and NaN
+        for everything true.
+    """
+    if len(row) == 0:
+        return detections
+    counts = np.diff(detections.offsets)
+    rows = np.concatenate([np.repeat(np.arange(len(counts)), counts), row])
+    # Stable: true detections were put first, so they stay first within each row.
+    order = np.argsort(rows, kind="stable")
+    given = extras or {}
+
+    def joined(true: AnyArray, false: ArrayLike) -> AnyArray:
+        added = np.broadcast_to(np.asarray(false, dtype=true.dtype), row.shape)
+        return np.concatenate([true, added])[order]
+
+    return replace(
+        detections,
+        offsets=np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(counts))))),
+        target=joined(detections.target, FALSE_TARGET),
+        azimuth_rad=joined(detections.azimuth_rad, azimuth_rad),
+        elevation_rad=joined(detections.elevation_rad, elevation_rad),
+        range_m=joined(detections.range_m, range_m),
+        confidence=joined(detections.confidence, confidence),
+        true_azimuth_rad=joined(detections.true_azimuth_rad, np.nan),
+        true_elevation_rad=joined(detections.true_elevation_rad, np.nan),
+        true_range_m=joined(detections.true_range_m, np.nan),
+        extras={
+            name: joined(values, given.get(name, False if values.dtype == bool else np.nan))
+            for name, values in detections.extras.items()
+        },
+    )

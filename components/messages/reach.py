@@ -1,0 +1,167 @@
+"""A sensor's reach, and the decision whether a target needs its physics (thesis §3.4)."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from components.geometry.field_of_view import FieldOfView
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+ReasonArray = npt.NDArray[np.uint8]
+
+#: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
+EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
+SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+#: Targets up to so many reaches away count when models of the line of sight are judged: one that
+#: is off may take them to be in reach.
+REACH_MARGIN = 1.05
+_field_of_view = lru_cache(maxsize=256)(FieldOfView)
+_EVALUATE, _ABSENT, _OFF, _FIELD_OF_VIEW = map(np.uint8, (EVALUATE, ABSENT, OFF, FIELD_OF_VIEW))
+#: Targets that were not even moved, because no sensor could have looked at them.
+CULLED = "culled"
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where a sensor can see, in the ownship's body axes; bounds are inclusive.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad : (low, high)
+        Azimuth runs clockwise from low to high and may cross ±pi.
+    range_max_m : float
+        Infinite where the sensor has no limit of its own.
+    enabled : bool
+    range_slack : float
+        Largest relative error of the range that leaves what the sensor says within ``[accuracy]``.
+    exact_because : str
+        Why only an exact line of sight will do; empty where another one may.
+    """
+
+    azimuth_rad: tuple[float, float]
+    elevation_rad: tuple[float, float]
+    range_max_m: float = math.inf
+    enabled: bool = True
+    range_slack: float = math.inf
+    exact_because: str = ""
+
+    @property
+    def steepest_rad(self) -> float:
+        """Largest size of an elevation in body axes that is looked at."""
+        return max(abs(angle) for angle in self.elevation_rad)
+
+    @cached_property
+    def _field(self) -> FieldOfView:
+        return _field_of_view(self.azimuth_rad, self.elevation_rad)
+
+    def decide(
+        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
+    ) -> ReasonArray:
+        """Return the reason why each target is skipped, or EVALUATE.
+
+        Parameters
+        ----------
+        p_rad, q_rad, range_m, present : arrays of one shape
+            Body azimuth in (-pi, pi] and elevation, slant range, and whether the target is there;
+            finite.
+        """
+        if not self.enabled:
+            return np.where(present, _OFF, _ABSENT)
+        seen = self._field.holds(p_rad, q_rad)
+        reason = np.where(seen, _EVALUATE, _FIELD_OF_VIEW)
+        if self.range_max_m < math.inf:
+            seen &= range_m > self.range_max_m
+            reason[seen] = RANGE
+        if np.count_nonzero(present) < present.size:
+            reason[~present] = ABSENT
+        return reason
+
+
+@dataclass(frozen=True)
+class FarthestLook:
+    """What a block asks of the traffic: targets up to this range; farther ones matter to nobody.
+
+    Parameters
+    ----------
+    range_m : float
+        Infinite where somebody has no limit.
+    views : tuple of (range, elevation)
+        For each sensor its range in m and the largest size of an elevation in body axes at which
+        it looks.
+    range_slack, exact_because
+        How exactly the line of sight is needed, see `Reach`.
+    lasts_s : float
+        How long a look lasts: a sweeping beam meets targets where they are later in the scan.
+    """
+
+    range_m: float
+    views: tuple[tuple[float, float], ...] = ((math.inf, 0.5 * math.pi),)
+    range_slack: float = math.inf
+    exact_because: str = ""
+    lasts_s: float = 0.0
+
+
+def farthest_look(requests: Iterable[object]) -> FarthestLook:
+    """Return the farthest of what consumers ask for; who does not say asks for everything."""
+    looks = [FarthestLook(0.0, ())]
+    for request in requests:
+        if isinstance(request, FarthestLook):
+            looks.append(request)
+        elif not isinstance(request, Reach):
+            looks.append(FarthestLook(math.inf))
+        elif request.enabled:
+            looks.append(
+                FarthestLook(
+                    request.range_max_m,
+                    ((request.range_max_m, request.steepest_rad),),
+                    request.range_slack,
+                    request.exact_because,
+                )
+            )
+    return FarthestLook(
+        max(look.range_m for look in looks),
+        tuple(sorted({view for look in looks for view in look.views})),
+        min(look.range_slack for look in looks),
+        next((look.exact_because for look in looks if look.exact_because), ""),
+        max(look.lasts_s for look in looks),
+    )
+
+
+@dataclass(eq=False)
+class Decision:
+    """The decision for one sensor over the rows of a message.
+
+    Parameters
+    ----------
+    place : (rows,) of int
+        Row of `reason` that belongs to each message row; -1 where the sensor does not scan.
+    reason : (scans, targets) of uint8
+    """
+
+    place: IntArray
+    reason: ReasonArray
+
+    def take_rows(self, rows: slice | IntArray) -> "Decision":
+        """Return the decision for some of the rows."""
+        return Decision(self.place[rows], self.reason)
+
+    def widened(self, place: IntArray, width: int) -> "Decision":
+        """Return the decision over `width` targets, ours at `place`, the others absent."""
+        reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
+        reason[:, place] = self.reason
+        return Decision(self.place, reason)
+
+    @classmethod
+    def join_rows(cls, parts: list[Self]) -> "Decision":
+        """Return the decision over the rows of all parts."""
+        starts = np.cumsum([0] + [len(part.reason) for part in parts[:-1]])
+        places = [
+            np.where(part.place < 0, -1, part.place + start)
+            for part, start in zip(parts, starts, strict=True)
+        ]
+        return Decision(np.concatenate(places), np.concatenate([part.reason for part in parts]))

@@ -1,0 +1,179 @@
+"""How far apart the aircraft of an encounter truly are: slant, horizontal and vertical distance.
+
+Nothing here depends on what sensors see; it is read off the traffic block of a scene.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isnan
+from typing import Any
+
+import numpy as np
+
+from components.geometry.ellipsoid import line_of_sight
+from components.traffic.sample_times import (
+    SampleTimes,
+    SharedTimes,
+    regular_count,
+    regular_times_s,
+)
+from components.traffic.source import TrafficSource
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Context
+from dsa_des.scene.scene import Block, Scene
+from dsa_des.time.randomness import Streams
+
+#: Times looked at together: it bounds the memory, however long the run.
+MOST_AT_ONCE = 65_536
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Distances of one target from the ownship over time.
+
+    Parameters
+    ----------
+    name : str
+    time_s : (times,)
+    range_m : (times,)
+        Slant range; infinite where either is absent.
+    horizontal_m : (times,)
+        In the ownship's local level plane.
+    vertical_m : (times,)
+        Difference of the altitudes above the ellipsoid, not negative.
+    """
+
+    name: str
+    time_s: FloatArray
+    range_m: FloatArray
+    horizontal_m: FloatArray
+    vertical_m: FloatArray
+
+
+def traffic_block(scene: Scene) -> Block:
+    """Return the block that moves the aircraft.
+
+    Raises
+    ------
+    ValueError
+        If the scene has none, or one that cannot say where aircraft are.
+    """
+    found = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
+    if len(found) != 1:
+        raise ValueError(
+            f"needs one block of traffic that knows its flights; this scene has {len(found)}"
+        )
+    return found[0]
+
+
+def separations(scene: Scene, step_s: float) -> "list[Flight]":
+    """Return the distances of every target of a scene, on a regular grid and at the samples.
+
+    Parameters
+    ----------
+    scene : Scene
+    step_s : float
+        Spacing of the grid; the times at which the source itself has samples are added.
+    """
+    block = traffic_block(scene)
+    context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
+    source: Any = block.cls(block.name, block.parameters, context)
+    duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
+    context.duration_s = duration
+    count = regular_count(step_s, float(duration))
+    return [Flight(source, number, step_s, count) for number in range(len(source.targets))]
+
+
+class Flight:
+    """The distances of one target from the ownship, in pieces of time one after the other.
+
+    Parameters
+    ----------
+    source : TrafficSource
+    number : int
+        Which of its targets.
+    step_s : float
+        Spacing of the grid.
+    count : int
+        Number of its times.
+    """
+
+    def __init__(self, source: Any, number: int, step_s: float, count: int) -> None:
+        self._source, self._number = source, number
+        self._target = source.targets[number]
+        self.name: str = self._target.name
+        self._step_s, self._count = step_s, count
+
+    def pieces(self) -> Iterator[Separation]:
+        """Give the distances, about `MOST_AT_ONCE` at a time."""
+        samples = self._samples()
+        after_s = 0.0
+        for start in range(0, self._count, MOST_AT_ONCE):
+            number = np.arange(start, min(start + MOST_AT_ONCE, self._count))
+            time_s = regular_times_s(self._step_s, number)
+            last_s = float(time_s[-1])
+            for times in samples:
+                time_s = np.union1d(time_s, _between(times, self._number, after_s, last_s))
+            yield _separation(self._source, self._target, time_s)
+            after_s = float(np.nextafter(last_s, np.inf))
+
+    def _samples(self) -> list[SampleTimes]:
+        every: list[SampleTimes] = self._source.sample_times()
+        if every:
+            return every
+        times = SharedTimes(self._source.sample_times_s(self._target))
+        return [times]
+
+
+def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> FloatArray:
+    """Return the times of a target in [first_s, last_s]."""
+    one = np.array([target])
+    first, last = times.between(one, np.array([first_s]), np.array([last_s]))
+    number = np.arange(first[0], last[0] + 1)
+    return times.at(np.full(len(number), target), number)
+
+
+def _separation(source: Any, target: Any, time_s: FloatArray) -> Separation:
+    own, other = source.own.at(time_s), target.at(time_s)
+    _, elevation_rad, range_m = line_of_sight(
+        own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
+        validate=False,
+    )  # fmt: skip
+    there = np.asarray(own.present & other.present)
+    return Separation(
+        target.name,
+        time_s,
+        np.where(there, range_m, np.inf),
+        np.where(there, range_m * np.cos(elevation_rad), np.inf),
+        np.where(there, np.abs(np.asarray(other.alt_m) - np.asarray(own.alt_m)), np.inf),
+    )
+
+
+def closest(flight: Flight) -> tuple[float, float]:
+    """Return the smallest range (m) and its time (s), the first of several."""
+    best = (float("inf"), float("nan"))
+    for piece in flight.pieces():
+        place = int(np.argmin(piece.range_m))
+        if piece.range_m[place] < best[0]:
+            best = float(piece.range_m[place]), float(piece.time_s[place])
+    return best
+
+
+def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
+    """Return when a target first is within each pair of distances (exclusive), s; NaN if never.
+
+    Parameters
+    ----------
+    flight : Flight
+    *limits_m : (horizontal, vertical)
+    """
+    found = [float("nan")] * len(limits_m)
+    for piece in flight.pieces():
+        for number, (horizontal_m, vertical_m) in enumerate(limits_m):
+            inside = (piece.horizontal_m < horizontal_m) & (piece.vertical_m < vertical_m)
+            if isnan(found[number]) and inside.any():
+                found[number] = float(piece.time_s[np.argmax(inside)])
+        if not any(map(isnan, found)):
+            break
+    return found

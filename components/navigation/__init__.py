@@ -1,0 +1,1 @@
+"""What the ownship believes of its own position and attitude."""

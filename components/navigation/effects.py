@@ -1,0 +1,144 @@
+"""What the ownship's own navigation does to what its sensors report.
+
+Sensors measure in body axes, and physics knows no navigation error: body angles, detections and
+whatever follows from them stay as they are. What an error touches is the conversion to the
+horizon: which way is north, which way is down, and where are we. So the coordinate transform
+tells, beside the true geometry, what the ownship believes of itself, and each sensor adds to its
+detections the line of sight in north-east-down that follows from that belief.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from components.geometry.angles import wrap_two_pi
+from components.geometry.attitude import body_angles, body_to_ned, unit_vector
+from components.messages.detections import Detections
+from components.messages.targets import RelativeTargets, TrafficStates
+from components.navigation.error_model import attitude_with_error, position_with_error
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+
+Belief = dict[str, FloatArray]
+Three = tuple[float, float, float]
+
+_SCAN_BITS = 48
+
+
+class _Navigation(Effect):
+    name = "navigation"
+    # Without it there is nothing to tell: the columns are null.
+    neutral = False
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[navigation]``."""
+        navigation = block.context.sections.get("navigation")
+        found = [
+            f"{key} is {[float(value) for value in values]}"
+            for key, values in (() if navigation is None else navigation)
+            if any(values)
+        ]
+        if found:
+            return Verdict(True, f"[navigation] {' and '.join(found)}")
+        return Verdict(False, "[navigation] has no bias and no noise")
+
+
+class NavigationErrors(_Navigation):
+    """What the ownship believes of its position and attitude: biases and white noise."""
+
+    acts_on = "ownship"
+
+    def build(self, block: Any) -> Callable[[TrafficStates], Belief]:
+        """Return what gives the belief at each instant.
+
+        All transforms of a scene share the ownship's one navigation system: its noise is keyed by
+        the instant, not by the block.
+        """
+        navigation = block.context.sections["navigation"]
+        stream = block.context.streams.stream("[navigation]", "errors")
+        attitude_bias = _radians(navigation.attitude_bias_deg)
+        attitude_noise = _radians(navigation.attitude_noise_deg)
+
+        def believed(states: TrafficStates) -> Belief:
+            # An instant may take more bits than a scan number has: the rest goes to the target.
+            high = (states.tick >> _SCAN_BITS).astype(np.uint64)
+            low = states.tick & ((1 << _SCAN_BITS) - 1)
+            draws = [stream.normal(high, low, draw) for draw in range(6)]
+            lat, lon, alt = position_with_error(
+                states.own_lat_deg,
+                states.own_lon_deg,
+                states.own_alt_m,
+                bias_north_east_down_m=navigation.position_bias_m,
+                sigma_north_east_down_m=navigation.position_noise_m,
+                normals=(draws[0], draws[1], draws[2]),
+            )
+            yaw, pitch, roll = attitude_with_error(
+                states.own_yaw_rad,
+                states.own_pitch_rad,
+                states.own_roll_rad,
+                bias_rad=attitude_bias,
+                sigma_rad=attitude_noise,
+                normals=(draws[3], draws[4], draws[5]),
+            )
+            return {
+                "lat_deg": lat, "lon_deg": lon, "alt_m": alt,
+                "yaw_rad": yaw, "pitch_rad": pitch, "roll_rad": roll,
+            }  # fmt: skip
+
+        return believed
+
+
+class NavigationReport(_Navigation):
+    """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
+
+    acts_on = "report"
+
+    def build(self, block: Any) -> Callable[[Detections, RelativeTargets, IntArray], Detections]:
+        """Return what adds the columns to a report."""
+        return in_the_horizons_axes
+
+
+def in_the_horizons_axes(
+    detections: Detections, targets: RelativeTargets, rows: IntArray
+) -> Detections:
+    """Add each detection's line of sight in NED and the believed position of the ownship.
+
+    Parameters
+    ----------
+    detections : Detections
+    targets : RelativeTargets
+        What was looked at, with the ownship's belief; without one nothing is added.
+    rows : (scans,) of int
+        Row of `targets` at each scan.
+
+    Returns
+    -------
+    Detections
+        Its extras hold ``ned_azimuth_rad`` in [0, 2 pi), ``ned_elevation_rad``, ``own_lat_deg``,
+        ``own_lon_deg`` and ``own_alt_m``. The rotation is the exact one, also where the transform
+        took the thesis's small angles.
+    """
+    if targets.believed is None:
+        return detections
+    row = np.repeat(rows, np.diff(detections.offsets))
+    own = {name: values[row] for name, values in targets.believed.items()}
+    direction = unit_vector(detections.azimuth_rad, detections.elevation_rad)
+    azimuth, elevation = body_angles(
+        *body_to_ned(*direction, own["yaw_rad"], own["pitch_rad"], own["roll_rad"])
+    )
+    added = {
+        "ned_azimuth_rad": wrap_two_pi(azimuth),
+        "ned_elevation_rad": elevation,
+        "own_lat_deg": own["lat_deg"],
+        "own_lon_deg": own["lon_deg"],
+        "own_alt_m": own["alt_m"],
+    }
+    return replace(detections, extras={**detections.extras, **added})
+
+
+def _radians(angles_deg: Three) -> Three:
+    first, second, third = (math.radians(angle) for angle in angles_deg)
+    return first, second, third

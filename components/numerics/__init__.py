@@ -1,1 +1,0 @@
-"""Hard cases: what a naive formula gives, what ours gives, and what is true."""

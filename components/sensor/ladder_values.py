@@ -1,0 +1,87 @@
+"""How blocks' ladders read a quantity: values per target-scan, over all targets of the run."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.geometry.angles import wrap_pi
+from components.messages.reach import RANGE
+from components.messages.targets import RelativeTargets
+from components.sensor.sensor import Cells, Sensor
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.wake import Wake
+
+
+def direction(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArray:
+    """Return unit vectors, components along the last axis."""
+    level = np.cos(elevation_rad)
+    parts = (level * np.cos(azimuth_rad), level * np.sin(azimuth_rad), np.sin(elevation_rad))
+    return np.stack(parts, axis=-1)
+
+
+def angle_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
+    """Return the angle between unit vectors, mrad; accurate however small it is."""
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return 1e3 * np.arctan2(across, (one * other).sum(axis=-1))
+
+
+def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
+    """Return how far angles in radians are apart, the short way round, mrad; NaN stays NaN."""
+    apart = one - other
+    known = ~np.isnan(apart)
+    result: FloatArray = np.full(apart.shape, np.nan)
+    result[known] = 1e3 * np.abs(wrap_pi(apart[known]))
+    return result
+
+
+def over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
+    """Return (rows, targets, ...) values over all targets of the run, NaN where absent."""
+    shape = (len(values), len(targets.roster), *values.shape[2:])
+    wide: FloatArray = np.full(shape, np.nan)
+    wide[:, targets.columns] = values
+    absent = np.ones(shape[:2], dtype=bool)
+    absent[:, targets.columns] = ~targets.present
+    wide[absent] = np.nan
+    return wide
+
+
+def over_cells(
+    sensor: Sensor,
+    wake: Wake,
+    values: Callable[[Cells], dict[str, FloatArray]],
+    *,
+    out_of_range: float = np.nan,
+) -> dict[str, FloatArray]:
+    """Return what a function of cells gives at every (scan, target).
+
+    Parameters
+    ----------
+    sensor : Sensor
+    wake : Wake
+    values : callable
+        From cells to arrays by name.
+    out_of_range : float
+        Value where the target was not looked at because it is too far away.
+
+    Returns
+    -------
+    dict of (scans, targets) arrays
+        NaN where the target was not looked at for any other reason.
+    """
+    held = wake.held("targets")
+    if held is None:
+        return {}
+    targets, rows = sensor.seen(*held)
+    cells, reason = sensor.cells(targets, rows, wake)
+    everybody = len(targets.roster)
+    found: dict[str, Any] = {}
+    for name, of_cell in values(cells).items():
+        # Targets that were not even moved were too far away for every sensor.
+        wide = np.full((len(wake), everybody), out_of_range)
+        part = np.full(reason.shape, np.nan)
+        part[reason == RANGE] = out_of_range
+        wide[:, targets.columns] = part
+        wide[cells.row, cells.target] = of_cell
+        found[name] = wide
+    return found

@@ -1,0 +1,91 @@
+"""Parameters of every sensor: clock, field of view, grid, mounting and rule of declaration."""
+
+import math
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from components.messages.reach import Reach
+from dsa_des.block.component import ClockedParameters
+
+
+def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
+    if not all(-360 <= angle <= 360 for angle in value):
+        raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
+    if value[0] == value[1] or not -360 < value[1] - value[0] <= 360:
+        raise ValueError("must hold a field above 0 and up to 360 deg wide; all round is -180, 180")
+    return value
+
+
+def _elevations(value: tuple[float, float]) -> tuple[float, float]:
+    if not -90 <= value[0] < value[1] <= 90:
+        raise ValueError("must hold two angles in [-90, 90], the lower one first")
+    return value
+
+
+MisalignmentAngle = Annotated[float, Field(ge=-45, le=45)]
+
+
+class SensorParameters(ClockedParameters):
+    """Parameters of every sensor; angles in degrees in the sensor's axes.
+
+    Those are the ownship's body axes unless the sensor is mounted otherwise.
+    """
+
+    enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(_azimuths)] = Field(
+        default=(-180.0, 180.0),
+        description="Field of view in azimuth, clockwise from the first to the second, deg.",
+    )
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(_elevations)] = Field(
+        default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
+    )
+    range_km: float | None = Field(
+        default=None, gt=0, description="Farthest range that is looked at, km; none by default."
+    )
+    azimuth_resolution_deg: float = Field(
+        default=0.0, ge=0, description="Grid step of measured azimuth, deg; 0 measures exactly."
+    )
+    elevation_resolution_deg: float = Field(
+        default=0.0, ge=0, description="Grid step of measured elevation, deg; 0 measures exactly."
+    )
+
+    mount_azimuth_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Boresight, clockwise from the nose, deg."
+    )
+    mount_elevation_deg: float = Field(
+        default=0.0, ge=-90, le=90, description="Boresight above the plane of the wings, deg."
+    )
+    mount_roll_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Roll about the boresight, deg."
+    )
+    misalignment_deg: tuple[MisalignmentAngle, MisalignmentAngle, MisalignmentAngle] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Mounting as believed minus as it is (azimuth, elevation, roll), deg: reports "
+        "are off by it.",
+    )
+    declare_m: int | None = Field(
+        default=None, ge=1, description="Detections that declare a target; by default one does."
+    )
+    declare_n: int | None = Field(
+        default=None, ge=1, le=1000, description="Last looks at a target that they are counted in."
+    )
+
+    @model_validator(mode="after")
+    def _declaration_rule(self) -> Self:
+        if (self.declare_m is None) != (self.declare_n is None):
+            raise ValueError("declare_m and declare_n belong together: give both or neither")
+        if (self.declare_m or 0) > (self.declare_n or 0):
+            raise ValueError(
+                f"declare_m is {self.declare_m}: it must be at most declare_n, {self.declare_n}"
+            )
+        return self
+
+    def reach(self) -> Reach:
+        """Return the sensor's reach."""
+        return Reach(
+            (math.radians(self.azimuth_deg[0]), math.radians(self.azimuth_deg[1])),
+            (math.radians(self.elevation_deg[0]), math.radians(self.elevation_deg[1])),
+            math.inf if self.range_km is None else self.range_km * 1000.0,
+            self.enabled,
+        )

@@ -1,0 +1,381 @@
+"""What every sensor has in common: a scan clock, a reach, a grid, and a look at the cells.
+
+A sensor subclass writes one pure function, `Sensor.look`, over *cells*: flat arrays with one
+element per (scan, target) that needs its physics. How many scans those come from is the
+engine's business.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from components.geometry.angles import wrap_pi
+from components.messages.detections import Detections, SensorOffer
+from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
+from components.messages.targets import GatedTargets, RelativeTargets
+from components.navigation.effects import NavigationReport
+from components.sensor.declaration_rule import Declaration
+from components.sensor.mounting import BodyAxes, Mounting
+from components.sensor.parameters import SensorParameters
+from components.sensor.resolution import Grid
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.effect import Effect
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+# Up to so many targets, counting row by row is mostly the overhead of rows.
+_FEW_COLUMNS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a sensor's physics says of each cell.
+
+    Parameters
+    ----------
+    detected : (cells,) of bool
+    confidence : (cells,)
+    extras : dict of (cells,)
+        Recorded beside the detection: ``snr_db``, ``detection_probability``, ``pixels``.
+    """
+
+    detected: BoolArray
+    confidence: FloatArray
+    extras: dict[str, AnyArray] = field(default_factory=dict)
+
+
+class Cells:
+    """The (scan, target) pairs that need a sensor's physics, as flat contiguous arrays.
+
+    Any field of `RelativeTargets` can be read as an attribute, for example ``cells.range_m``.
+
+    Parameters
+    ----------
+    targets : RelativeTargets
+    rows : (scans,)
+        Message row of each scan; kept as ``message_rows``.
+    wanted : (scans, targets) of bool
+    scans : (scans,)
+        Scan numbers.
+    scan_ticks : (scans,), optional
+        When each scan is; needed by what compares one scan with the next.
+    """
+
+    def __init__(
+        self,
+        targets: RelativeTargets,
+        rows: IntArray,
+        wanted: BoolArray,
+        scans: IntArray,
+        scan_ticks: IntArray | None = None,
+    ) -> None:
+        self._targets = targets
+        self.message_rows = rows
+        self.roster = targets.roster
+        place = wanted.ravel().nonzero()[0]
+        width = max(1, wanted.shape[1])
+        #: Index of each cell's scan within this look, and of its target in the roster.
+        if len(rows) == 1:
+            self.row, self.target = np.zeros(len(place), dtype=np.int64), place
+        elif width == 1:
+            self.row, self.target = place, np.zeros(len(place), dtype=np.int64)
+        else:
+            self.row, self.target = np.divmod(place, width)
+        self.scan = scans[self.row]
+        self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
+        self._width = width
+        # Rows that only rise and are as many as there are, are all of them.
+        self._everything = len(place) == targets.range_m.size and (
+            len(rows) == 1 or bool((rows[1:] > rows[:-1]).all())
+        )
+        self._flat = place if self._everything else rows[self.row] * width + self.target
+        self.target = targets.columns[self.target]
+
+    def __len__(self) -> int:
+        return len(self.target)
+
+    def __getattr__(self, name: str) -> Any:
+        if name[0] == "_":
+            raise AttributeError(name)
+        flat = getattr(self._targets, name).reshape(-1)
+        gathered = flat if self._everything else flat.take(self._flat)
+        self.__dict__[name] = gathered  # the next time it is a plain attribute
+        return gathered
+
+    def of_row(self, name: str) -> AnyArray:
+        """Return a field of the message that has one value per row, for each cell."""
+        return getattr(self._targets, name).take(self._flat // self._width)
+
+    def of_target(self, column: FloatArray) -> AnyArray:
+        """Return a per-target column (shape (targets,)) for each cell."""
+        return column[self.target]
+
+    def draws(self, stream: Any, draw: int = 0) -> FloatArray:
+        """Return uniform draws keyed by each cell's target and scan."""
+        return stream.uniform(self.roster.keys_of(self.target), self.scan, draw)
+
+
+#: Effects that every sensor has, after its own.
+SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
+
+_BODY_AXES = BodyAxes()
+
+# Grids are the same in every run of a scene: they are made once.
+_grid = lru_cache(maxsize=256)(Grid)
+
+
+class Sensor(Component):
+    """A block that looks at the targets at its own scan instants and reports detections.
+
+    Effects that act on the ``report`` are called with the detections, the targets and the
+    message's row of each scan, and return the detections that are sent.
+    """
+
+    inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
+    outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
+    Parameters: ClassVar[Any] = SensorParameters
+    windowed = True
+    lockstep = True
+    rewindable = True
+    #: Whether detections carry a range.
+    measures_range = False
+    effects = SENSOR_EFFECTS
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        own = tuple(effect for effect in cls.effects if effect not in SENSOR_EFFECTS)
+        cls.effects = own + SENSOR_EFFECTS
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        #: As the scene states it, and as it is used: work that can give nothing may be left out.
+        self.stated_reach: Reach = parameters.reach()
+        self.reach = self.stated_reach
+        self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
+        self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
+        self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
+        #: What a look at nothing gave; while there is still nothing, it is not repeated.
+        self._idle: Look | None = None
+
+    def request(self, port: str) -> Any:
+        """Ask whoever feeds us for the targets in our reach."""
+        slack, because = self.range_slack(), self.exact_because()
+        return replace(self._reach_from_body, range_slack=slack, exact_because=because)
+
+    def range_slack(self) -> float:
+        """Return the largest relative error of range that leaves results within ``[accuracy]``.
+
+        Infinite where nothing that ``[accuracy]`` bounds depends on the range.
+        """
+        return math.inf
+
+    def exact_because(self) -> str:
+        """Say why only an exact line of sight will do, or nothing."""
+        return ""
+
+    def offer(self, port: str) -> Any:
+        """Say whether we measure range, and how finely we measure angles."""
+        return SensorOffer(self.measures_range, max(self.azimuth_step_rad, self.elevation_step_rad))
+
+    @cached_property
+    def axes(self) -> BodyAxes:
+        """The sensor's axes; known once the scene's effects are."""
+        mounted = self.built("axes")
+        return mounted[0] if mounted else _BODY_AXES
+
+    @cached_property
+    def _reach_from_body(self) -> Reach:
+        return self.axes.reach(self.reach)
+
+    @cached_property
+    def _judgements(self) -> list[Any]:
+        return self.built("declaration")
+
+    @cached_property
+    def _reporting(self) -> list[Any]:
+        return self.built("report")
+
+    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets as this sensor sees them, and the row of each scan."""
+        return targets, rows
+
+    def look(self, cells: Cells) -> Look:
+        """Decide for each cell whether it is detected; the physics of the sensor.
+
+        A second look in a row that has no cells is not asked for.
+        """
+        raise TypeError(f"{type(self).__name__} has no look(cells)")
+
+    def run(self, wake: Wake) -> Detections | None:
+        """Look at every target in reach at every scan of the wake."""
+        held = wake.held("targets")
+        if held is None:
+            return None
+        targets, rows = self.seen(*held)
+        cells, reason = self.cells(targets, rows, wake)
+        rows = cells.message_rows
+        look = self._idle
+        if look is None or len(cells):
+            look = self.look(cells)
+            for judge in self._judgements:
+                look = judge(cells, look)
+            self._idle = None if len(cells) else look
+        found = look.detected.nonzero()[0]
+        culled = None if targets.culled is None else targets.culled[rows]
+        evaluated, skipped = _counted(reason, len(targets.roster), culled)
+        if len(wake) == 1:
+            offsets = np.array([0, len(found)], dtype=np.int64)
+        else:
+            offsets = offsets_of(cells.row[found], len(wake))
+        p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
+                   cells.range_m[found])  # fmt: skip
+        if len(found):
+            azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
+            azimuth, elevation = self.axes.to_body(azimuth, elevation)
+        else:
+            azimuth, elevation, range_m = p, q, r
+        detections = Detections(
+            tick=wake.ticks,
+            scan=wake.scans,
+            evaluated=evaluated,
+            skipped=skipped,
+            offsets=offsets,
+            target=cells.target[found],
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            range_m=range_m,
+            confidence=look.confidence[found],
+            true_azimuth_rad=p,
+            true_elevation_rad=q,
+            true_range_m=r,
+            extras={name: values[found] for name, values in look.extras.items()},
+            roster=targets.roster,
+        )
+        for report in self._reporting:
+            detections = report(detections, targets, rows)
+        return detections
+
+    def cells(
+        self, targets: RelativeTargets, rows: IntArray, wake: Wake
+    ) -> tuple[Cells, ReasonArray]:
+        """Return the cells that need our physics, and the reason for every (scan, target).
+
+        Parameters
+        ----------
+        targets : RelativeTargets
+        rows : (scans,)
+            Message row of each scan.
+        wake : Wake
+        """
+        rows, reason = self._decide(targets, rows)
+        return Cells(targets, rows, reason == EVALUATE, wake.scans, wake.ticks), reason
+
+    def report(self) -> dict[str, Any]:
+        """Return when each target was first declared, if the sensor has a rule for it."""
+        declarations = self.context.effects.get("declaration")
+        if declarations is None or self.p.declare_m is None:
+            return {}
+        return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
+
+    def _decide(self, targets: RelativeTargets, rows: IntArray) -> tuple[IntArray, ReasonArray]:
+        """Return message rows and reasons for each scan, from the gate's decision if it has one."""
+        if isinstance(targets, GatedTargets) and self.name in targets.decisions:
+            decision = targets.decisions[self.name]
+            place = decision.place[rows]
+            if len(place) == 1 == len(decision.reason) and place[0] == 0:
+                return rows, decision.reason
+            if place.min(initial=0) >= 0:
+                if len(place) == len(decision.reason) and place[0] == 0:
+                    return rows, decision.reason
+                return rows, decision.reason[place]
+        part = targets.take(rows)
+        reason = self._reach_from_body.decide(
+            part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
+        )
+        return rows, reason
+
+    def measure(
+        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
+
+        Returns
+        -------
+        azimuth_rad, elevation_rad, range_m : arrays
+            Range is NaN when the sensor measures none.
+        """
+        azimuth = self._round_azimuth(p_rad)
+        elevation = self._elevation_grid.round(q_rad)
+        if not self.measures_range:
+            return azimuth, elevation, np.full(len(range_m), np.nan)
+        return azimuth, elevation, self._range_grid.round(range_m)
+
+    @cached_property
+    def _elevation_grid(self) -> Grid:
+        low, high = self.reach.elevation_rad
+        return _grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+
+    @cached_property
+    def _range_grid(self) -> Grid:
+        return _grid(self.range_step_m, limit_low=0.0)
+
+    @cached_property
+    def _azimuth_sector(self) -> tuple[float, float]:
+        """The field of view with its upper edge at or above its lower one."""
+        low, high = self.reach.azimuth_rad
+        return low, high + 2.0 * math.pi if high < low else high
+
+    @cached_property
+    def _azimuth_grid(self) -> Grid:
+        low, high = self._azimuth_sector
+        if high - low >= 2.0 * math.pi:
+            return _grid(self.azimuth_step_rad)
+        return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
+
+    def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
+        low, high = self._azimuth_sector
+        if high - low >= 2.0 * math.pi:
+            return wrap_pi(self._azimuth_grid.round(p_rad))
+        if low >= -math.pi and high <= math.pi:
+            return self._azimuth_grid.round(p_rad)
+        # The field runs across ±pi: unwrap into it, so that its edges are its limits.
+        unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
+        return wrap_pi(self._azimuth_grid.round(unwrapped))
+
+
+def _per_row(mask: BoolArray) -> IntArray:
+    """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
+    if mask.shape[1] > _FEW_COLUMNS:
+        return mask.sum(axis=1)
+    total = np.zeros(len(mask), dtype=np.int64)
+    for column in mask.T:
+        total += column
+    return total
+
+
+def _counted(
+    reason: ReasonArray, everybody: int, culled: IntArray | None
+) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return how many targets were evaluated at each scan, and skipped by reason.
+
+    Which of the culled ones the arrays hold, as absent, depends on the window that they came in:
+    what is counted does not.
+    """
+    if len(reason) == 1:  # one pass instead of one for each reason
+        count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
+        of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
+    else:
+        of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
+    skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
+    left_out = everybody - reason.shape[1]
+    if culled is None:
+        culled = np.zeros(len(reason), dtype=np.int64) + left_out
+    else:
+        skipped["absent"] = skipped["absent"] + (left_out - culled)
+    skipped[CULLED] = culled
+    return of[EVALUATE], skipped

@@ -1,0 +1,1 @@
+"""Kinds of arrays, and sets of integers kept as arrays in order."""

@@ -1,0 +1,1 @@
+"""What a block is: its ports, parameters, messages, effects and ladders."""

@@ -1,0 +1,314 @@
+"""What a block is: declared ports, declared parameters, and what it does when it wakes.
+
+A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
+scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a
+`dsa_des.block.wake.Wake`; rows of its messages are scans, so the same array code serves both.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
+
+from dsa_des.block.effect import Effect
+from dsa_des.block.ladder import Ladder
+from dsa_des.block.limits import refuse_extremes
+from dsa_des.block.message import Message
+from dsa_des.block.ports import Input, Output
+from dsa_des.files.input_files import resolve_home
+from dsa_des.time.clock import ClockSpec, parse_rational
+from dsa_des.time.randomness import Stream, Streams
+
+if TYPE_CHECKING:
+    from dsa_des.block.wake import Wake
+
+
+def as_written(value: Fraction) -> int | float | str:
+    """Return an exact number the way a scene would hold it."""
+    if value.denominator == 1:
+        return int(value)
+    return float(value) if Fraction(repr(float(value))) == value else str(value)
+
+
+#: An exact rate or time: a number or text such as "30000/1001".
+Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(as_written)]
+PositiveRational = Annotated[Rational, Field(gt=0)]
+NonNegativeRational = Annotated[Rational, Field(ge=0)]
+
+
+class SourcedText(str):
+    """Text that remembers the folder of the file it was written in."""
+
+    __slots__ = ("folder",)
+    folder: Path
+
+    @classmethod
+    def of(cls, text: str, folder: Path) -> "SourcedText":
+        """Return `text` as written in a file of `folder`."""
+        result = cls(text)
+        result.folder = folder
+        return result
+
+
+def _resolve_path(value: object) -> Path:
+    if not isinstance(value, str | Path) or not str(value):
+        raise ValueError("must be a path, as text")
+    path = resolve_home(str(value))
+    if isinstance(value, SourcedText) and not path.is_absolute():
+        path = value.folder / path
+    return path
+
+
+#: A path; a relative one is taken from the folder of the file that holds the key.
+ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(str)]
+
+
+class Parameters(BaseModel):
+    """Parameters of a block: every field has its unit in its name, bounds and a description."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _computable(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse numbers that no physics can compute with (`dsa_des.block.limits`)."""
+        refuse_extremes(info.field_name or "", value)
+        return value
+
+
+class ClockedParameters(Parameters):
+    """Parameters of a block with a scan clock of its own."""
+
+    scan_rate_hz: PositiveRational = Field(description="Scans per second; number or '30000/1001'.")
+    offset_s: NonNegativeRational = Field(
+        default=Fraction(0), description="Time of the first scan, s."
+    )
+    rate_error_ppm: Rational = Field(
+        default=Fraction(0), le=1_000_000, description="Error of the scan rate, parts per million."
+    )
+    jitter_s: float = Field(
+        default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."
+    )
+
+    def clock_spec(self) -> ClockSpec:
+        """Return the clock these parameters describe."""
+        return ClockSpec(self.scan_rate_hz, self.offset_s, self.rate_error_ppm, self.jitter_s)
+
+
+@dataclass(frozen=True)
+class Consumer:
+    """A block fed by one of our outputs, and what it asks of us.
+
+    Parameters
+    ----------
+    block : str
+        Its name in the scene.
+    port : str
+        Its input.
+    request : object
+        What its `Component.request` returned for that input.
+    """
+
+    block: str
+    port: str
+    request: Any
+
+
+@dataclass(frozen=True)
+class Producer:
+    """A block that feeds one of our inputs, and what it says of itself.
+
+    Parameters
+    ----------
+    block : str
+        Its name in the scene.
+    port : str
+        Our input.
+    offer : object
+        What its `Component.offer` returned for the output it feeds us from.
+    """
+
+    block: str
+    port: str
+    offer: Any
+
+
+@dataclass
+class Context:
+    """What the engine tells a block about the run it is part of.
+
+    Parameters
+    ----------
+    streams : Streams
+        The run's keyed random numbers.
+    ticks_per_s : int
+    duration_s : Fraction
+        Length of the run; infinite sources may cut their work at it.
+    consumers : list of Consumer
+        Blocks that our outputs feed, sorted by name; known when `Component.setup` is called.
+    producers : list of Producer
+        Blocks that feed our inputs, sorted by name; known when effects are planned.
+    sections : mapping
+        The scene's tables that belong to no block, by name (`dsa_des.sections`).
+    effects : dict
+        What was built of this block's effects, by name, in the order of their declaration; known
+        when `Component.setup` is called.
+    simulate_everything : bool
+        Whether a block must not leave out work that cannot change a result.
+    tolerance : mapping
+        What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
+    """
+
+    streams: Streams
+    ticks_per_s: int = 10**9
+    duration_s: Fraction = Fraction(0)
+    consumers: list[Consumer] = field(default_factory=list)
+    producers: list[Producer] = field(default_factory=list)
+    sections: Mapping[str, Any] = field(default_factory=dict)
+    effects: dict[str, Any] = field(default_factory=dict)
+    simulate_everything: bool = False
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+
+
+class Component:
+    """A block. Subclass it, declare ports and parameters, and write `run`.
+
+    Invariants kept by the engine: at one instant a block runs at most once, after every block
+    upstream over undelayed wires; `run` sees each message once; instants never go backwards.
+    """
+
+    #: Inputs and outputs by name.
+    inputs: ClassVar[Mapping[str, Input]] = {}
+    outputs: ClassVar[Mapping[str, Output]] = {}
+    #: Model of the block's parameters.
+    Parameters: ClassVar[Any] = Parameters
+    #: Whether `run` accepts many rows at once. Say False when a row depends on feedback.
+    windowed: ClassVar[bool] = False
+    #: Whether the engine may take the block back to an earlier state. Its attributes, and those of
+    #: its effects, must then hold all of that state; arrays, lists, dicts and sets among them may
+    #: be changed in place, anything within them must be replaced instead.
+    rewindable: ClassVar[bool] = False
+    #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
+    #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
+    lockstep: ClassVar[bool] = False
+    #: "own": runs on the clock of its parameters (or only when triggered);
+    #: "demand": runs at the scan instants of the clocked blocks downstream.
+    clocked: ClassVar[Literal["own", "demand"]] = "own"
+    #: Physics that is built only when the scene calls for it (`dsa_des.block.effect`).
+    effects: ClassVar[tuple[Effect, ...]] = ()
+    #: Models that can fill this block, from crude to exact (`dsa_des.block.ladder`).
+    ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
+    needs_host: ClassVar[str] = ""
+
+    def __init__(self, name: str, parameters: Any, context: Context) -> None:
+        self.name = name
+        self.p = parameters
+        self.context = context
+
+    @classmethod
+    def clock_of(cls, parameters: Any) -> ClockSpec | None:
+        """Return the clock that parameters describe, or None: on demand, or when triggered."""
+        if isinstance(parameters, ClockedParameters):
+            return parameters.clock_spec()
+        return None
+
+    @classmethod
+    def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
+        """Return the ladders on which a block with these parameters stands."""
+        return cls.ladders
+
+    def request(self, port: str) -> Any:
+        """Return what this block asks of whoever feeds `port`, or None."""
+        return None
+
+    def offer(self, port: str) -> Any:
+        """Return what this block says of the output `port` to whoever it feeds, or None."""
+        return None
+
+    def setup(self) -> None:
+        """Prepare for the run; called once, after every block downstream was set up."""
+
+    def natural_duration_s(self) -> Fraction | None:
+        """Return how long this block's data lasts, for scenes that give no ``duration_s``."""
+        return None
+
+    @property
+    def width(self) -> int:
+        """Number of targets per row this block emits, for sizing windows."""
+        return 1
+
+    def run(self, wake: "Wake") -> Message | Mapping[str, Message] | None:
+        """Handle the instants of `wake` and return the messages to send.
+
+        Parameters
+        ----------
+        wake : Wake
+            The instants (one, or a window of many) and the messages that have arrived.
+
+        Returns
+        -------
+        Message, mapping from output name to Message, or None
+            A lone message goes to the only output.
+        """
+        raise TypeError(f"{type(self).__name__} declares neither run nor process")
+
+    #: A block that wants its own SimPy generator overrides this with a method ``(self, env)``.
+    process: Any = None
+
+    def report(self) -> dict[str, Any]:
+        """Return sections of the run's summary that only this block knows."""
+        return {}
+
+    def left_out(self) -> list[str]:
+        """Say, after `setup`, what work this block spares itself and why results allow it."""
+        return []
+
+    def built(self, acts_on: str) -> list[Any]:
+        """Return what was built of the effects that act on a quantity, in declared order."""
+        return [
+            self.context.effects[effect.name]
+            for effect in type(self).effects
+            if effect.acts_on == acts_on and effect.name in self.context.effects
+        ]
+
+    def serves_replicas(self) -> bool:
+        """Return whether this block, with the effects built, may serve replicas in lock step."""
+        return type(self).lockstep and all(
+            effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
+        )
+
+    def stream(self, purpose: str) -> Stream:
+        """Return this block's keyed random numbers for one purpose."""
+        return self.context.streams.stream(self.name, purpose)
+
+    @classmethod
+    def path(cls) -> str:
+        """Return ``module:Class``."""
+        return f"{cls.__module__}:{cls.__qualname__}"
+
+
+__all__ = [
+    "ClockedParameters",
+    "Component",
+    "Consumer",
+    "Context",
+    "NonNegativeRational",
+    "Parameters",
+    "PositiveRational",
+    "Producer",
+    "Rational",
+    "ScenePath",
+    "SourcedText",
+]

@@ -1,0 +1,262 @@
+"""What flows on a wire: one row per scan, arrays over whatever the scan saw.
+
+A `Message` holds a *batch* of rows in time order: a single row when blocks run scan by scan, many
+when they run in a look-ahead window. Physics written over rows serves both.
+"""
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, IntArray
+
+# How a field of a message depends on its rows.
+PER_ROW = "row"  # first axis is the rows
+PER_ENTRY = "entry"  # first axis is the entries; `offsets[i]:offsets[i + 1]` belong to row i
+STATIC = "static"  # the same for all rows
+
+#: Row and entry fields of every message type seen so far.
+_LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+#: Fields that hold instants beside `Message.tick`.
+_TICK_FIELDS: dict[type, tuple[str, ...]] = {}
+
+
+def per_row(**kwargs: Any) -> Any:
+    """Declare a field whose first axis is the rows (also the default for plain fields)."""
+    return field(metadata={"per": PER_ROW}, **kwargs)
+
+
+def per_row_tick(**kwargs: Any) -> Any:
+    """Declare a field with an instant per row, in ticks, beside `Message.tick`."""
+    return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
+
+
+def per_entry(**kwargs: Any) -> Any:
+    """Declare a field with a varying number of entries per row; the class must have `offsets`."""
+    return field(metadata={"per": PER_ENTRY}, **kwargs)
+
+
+def static(**kwargs: Any) -> Any:
+    """Declare a field that is the same for all rows."""
+    return field(metadata={"per": STATIC}, **kwargs)
+
+
+def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if message_type in _LAYOUTS:
+        return _LAYOUTS[message_type]
+    rows, entries = [], []
+    for item in fields(message_type):
+        kind = item.metadata.get("per", PER_ROW)
+        if item.name == "offsets":
+            continue
+        if kind == PER_ROW:
+            rows.append(item.name)
+        elif kind == PER_ENTRY:
+            entries.append(item.name)
+    _LAYOUTS[message_type] = tuple(rows), tuple(entries)
+    return _LAYOUTS[message_type]
+
+
+def _tick_fields(message_type: type) -> tuple[str, ...]:
+    if message_type not in _TICK_FIELDS:
+        names = (item.name for item in fields(message_type) if item.metadata.get("is_tick"))
+        _TICK_FIELDS[message_type] = tuple(names)
+    return _TICK_FIELDS[message_type]
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text column kept as codes into a tuple of names (code -1 is null).
+
+    Parameters
+    ----------
+    codes : ndarray of int
+    names : tuple of str
+    """
+
+    codes: AnyArray
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+
+#: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
+#: In float64, NaN means null.
+Columns = dict[str, AnyArray | Text]
+Schema = dict[str, str]
+
+
+def rows_of(columns: Columns, rows: slice) -> Columns:
+    """Return some rows of recorded columns."""
+    return {
+        name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
+        for name, values in columns.items()
+    }
+
+
+@dataclass(eq=False)
+class Message:
+    """A batch of rows; subclasses add fields.
+
+    Parameters
+    ----------
+    tick : ndarray of int64, shape (rows,)
+        The instant at which its block made each row, in order: one of those at which the block
+        ran. It may arrive later, and speak of what was there earlier.
+    """
+
+    tick: IntArray
+
+    #: What a recorder writes: table → column → "int64", "float64", "bool" or "text".
+    #: Columns block, tick and time_s are added by the engine.
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+
+    #: Static fields that may differ between messages: `concatenate` brings them together.
+    joins_static: ClassVar[frozenset[str]] = frozenset()
+
+    def __len__(self) -> int:
+        return len(self.tick)
+
+    def take(self, rows: slice | IntArray) -> Self:
+        """Return the message of the given rows (slices give views, index arrays give copies)."""
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(len(self))
+            if step != 1:
+                return self.take(np.arange(start, stop, step))
+            if start == 0 and stop == len(self):
+                return self
+        row_names, entry_names = _layout(type(self))
+        result = copy(self)
+        for name in row_names:
+            setattr(result, name, _pick(getattr(self, name), rows))
+        if entry_names or hasattr(self, "offsets"):
+            offsets, index = _entries(self.offsets, rows)  # type: ignore[attr-defined]
+            result.offsets = offsets  # type: ignore[attr-defined]
+            for name in entry_names:
+                setattr(result, name, _pick(getattr(self, name), index))
+        return result
+
+    def shifted(self, ticks: int, scans: int) -> Self:
+        """Return the message with its ticks, and its scan numbers if it has any, moved."""
+        result = copy(self)
+        result.tick = self.tick + ticks
+        for name in _tick_fields(type(self)):
+            if (values := getattr(self, name)) is not None:
+                setattr(result, name, values + ticks)
+        if hasattr(self, "scan"):
+            result.scan = self.scan + scans  # type: ignore[attr-defined]
+        return result
+
+    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+        """Return the rows to record: table → column → values, as declared in `recorded`.
+
+        Every table has a column ``tick``, in order; by default nothing is recorded.
+        """
+        return {}
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """Return one message with the rows of all parts, in the order given."""
+        if len(parts) == 1:
+            return parts[0]
+        row_names, entry_names = _layout(type(parts[0]))
+        # Static fields come from the last part: what a wire held before its first message may
+        # know less than a real one.
+        result = copy(parts[-1])
+        for name in row_names:
+            setattr(result, name, _join([getattr(part, name) for part in parts]))
+        if entry_names or hasattr(result, "offsets"):
+            offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
+            starts = np.cumsum([0] + [int(o[-1] - o[0]) for o in offsets])
+            joined = [o[:-1] - o[0] + s for o, s in zip(offsets, starts, strict=False)]
+            result.offsets = np.concatenate([*joined, starts[-1:]])  # type: ignore[attr-defined]
+            for name in entry_names:
+                setattr(result, name, _join([getattr(part, name) for part in parts]))
+        return result
+
+    @classmethod
+    def initial(cls, values: Mapping[str, Any]) -> Self:
+        """Return the message that a delayed wire holds before the first real one.
+
+        Parameters
+        ----------
+        values : mapping
+            The inline table written in the scene.
+
+        Raises
+        ------
+        ValueError
+            If this message type cannot be written in a scene (the default).
+        """
+        raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
+
+
+def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
+    """Return what a block returned as messages by output name; a lone one goes to the only output.
+
+    Raises
+    ------
+    TypeError
+        If a lone message could go to several outputs.
+    """
+    if result is None:
+        return {}
+    if not isinstance(result, Message):
+        return result
+    if len(outputs) != 1:
+        raise TypeError(
+            f"returned one message but has {len(outputs)} outputs; return a dict of "
+            f"{', '.join(sorted(outputs)) or 'nothing'}"
+        )
+    return {outputs[0]: result}
+
+
+def _pick(value: Any, rows: slice | IntArray) -> Any:
+    if value is None:
+        return None
+    if isinstance(value, dict):
+        return {key: _pick(item, rows) for key, item in value.items()}
+    if hasattr(value, "take_rows"):
+        return value.take_rows(rows)
+    return value[rows]
+
+
+def _join(values: list[Any]) -> Any:
+    first = values[0]
+    if first is None:
+        return None
+    if isinstance(first, dict):
+        return {key: _join([value[key] for value in values]) for key in first}
+    if hasattr(first, "join_rows"):
+        return type(first).join_rows(values)
+    return np.concatenate(values)
+
+
+def offsets_of(row: IntArray, rows: int) -> IntArray:
+    """Return the offsets of entries that belong to rows, given each entry's row, ascending.
+
+    Parameters
+    ----------
+    row : (entries,) of int64
+    rows : int
+        How many rows there are.
+    """
+    offsets = np.zeros(rows + 1, dtype=np.int64)
+    np.bincount(row, minlength=rows).cumsum(out=offsets[1:])
+    return offsets
+
+
+def _entries(offsets: IntArray, rows: slice | IntArray) -> tuple[IntArray, slice | IntArray]:
+    if isinstance(rows, slice):
+        start, stop, _ = rows.indices(len(offsets) - 1)
+        stop = max(start, stop)
+        first, last = int(offsets[start]), int(offsets[stop])
+        return offsets[start : stop + 1] - first, slice(first, last)
+    counts = offsets[rows + 1] - offsets[rows]
+    new = np.concatenate(([0], np.cumsum(counts)))
+    index = np.repeat(offsets[rows] - new[:-1], counts) + np.arange(new[-1])
+    return new, index

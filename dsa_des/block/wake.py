@@ -1,0 +1,112 @@
+"""What a block sees when it runs: its instants and its inputs."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """The rows that came over one wire since the block's last run.
+
+    Parameters
+    ----------
+    source : str
+        Name of the sending block.
+    tick : ndarray of int64
+        When each row arrived.
+    message : Message
+        The rows; ``message.tick`` says what instants they speak of.
+    """
+
+    source: str
+    tick: IntArray
+    message: Any
+
+
+class Wake:
+    """One run of a block: an instant, or a window of instants in order.
+
+    Parameters
+    ----------
+    ticks : ndarray of int64, shape (rows,)
+    scans : ndarray of int64, shape (rows,)
+        Scan numbers of the block's own clock; -1 at instants that are not its own scans.
+    ticks_per_s : int
+    held : mapping
+        For sampled and trigger inputs: ``(message, rows)`` as `Channel.sample` gives them.
+    arrived : mapping
+        For queued inputs, and for inputs with many writers: the new rows of each wire.
+    demand : callable, or None
+        Gives the attribute of this name when it is first asked for: a mapping from each clocked
+        block downstream to the rows of this wake at which it scans.
+    span_ticks : int
+        When replicas run in lock step: ticks from the start of one to the start of the next
+        (`dsa_des.time.timeline`); 0 otherwise.
+    """
+
+    def __init__(
+        self,
+        ticks: IntArray,
+        scans: IntArray,
+        ticks_per_s: int,
+        held: Mapping[str, tuple[Any, IntArray]],
+        arrived: Mapping[str, list[Arrivals]],
+        demand: Callable[[], Mapping[str, IntArray]] | None = None,
+        span_ticks: int = 0,
+    ) -> None:
+        self.ticks = ticks
+        self.scans = scans
+        self.ticks_per_s = ticks_per_s
+        self._held = held
+        self._arrived = arrived
+        self._demand = demand
+        self.span_ticks = span_ticks
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    @cached_property
+    def demand(self) -> Mapping[str, IntArray]:
+        """The rows at which each clocked block downstream scans."""
+        return {} if self._demand is None else self._demand()
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Time of each row since the start of the run, s."""
+        ticks = self.ticks % self.span_ticks if self.span_ticks else self.ticks
+        return ticks / self.ticks_per_s
+
+    @property
+    def replica(self) -> IntArray:
+        """Replica of each row, in order; 0 when only one runs."""
+        return self.ticks // self.span_ticks if self.span_ticks else np.zeros_like(self.ticks)
+
+    def held(self, port: str) -> tuple[Any, IntArray] | None:
+        """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""
+        return self._held.get(port)
+
+    def __getitem__(self, port: str) -> Any:
+        """Return the message held at each instant, row by row, or None when nothing came yet."""
+        held = self._held.get(port)
+        if held is None:
+            return None
+        message, rows = held
+        count = len(rows)
+        whole = len(message) == count and rows[0] == 0 and rows[-1] == count - 1
+        if whole and (count == 1 or bool(np.all(rows[1:] > rows[:-1]))):
+            return message
+        if rows[0] < 0:
+            if rows[-1] < 0:
+                return None
+            raise LookupError(f"nothing has arrived at {port!r} at the first instants; use held()")
+        return message.take(rows)
+
+    def arrivals(self, port: str) -> list[Arrivals]:
+        """Return the new rows of each wire into `port`, sorted by source name."""
+        return self._arrived.get(port, [])

@@ -1,0 +1,362 @@
+"""A scene whose time belongs to a host program: it calls, and the blocks run within the call.
+
+There is no event queue here. A call names an instant and hands in the message of the scene's
+source; every sensor whose scan is due looks at it, and what depends on them follows in the order
+of depth. `Simulator`, the interface for a host, is registered by a package under the entry-point
+group ``dsa_des.embed``.
+"""
+
+import math
+from collections.abc import Container, Iterable, Set
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+from networkx import ancestors
+
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import installed
+from dsa_des.block.message import Message
+from dsa_des.block.strangers import is_ours_to_obey, told
+from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.graph import in_cycles
+from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import MAX_TICK, parse_rational
+from dsa_des.time.scan_cursor import ScanCursor
+
+EMBED = "dsa_des.embed"
+
+_FIRST_ROW = np.zeros(1, dtype=np.int64)
+_NO_ROW = np.empty(0, dtype=np.int64)
+_NO_SCAN = np.full(1, -1, dtype=np.int64)
+for _constant in (_FIRST_ROW, _NO_ROW, _NO_SCAN):
+    _constant.flags.writeable = False
+
+
+def __getattr__(name: str) -> Any:
+    if name in registered(EMBED):
+        return installed(registered(EMBED)[name])
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+@dataclass
+class Step:
+    """One call: what was due, and what the blocks sent.
+
+    Parameters
+    ----------
+    tick : int
+    scans : dict of int
+        Number of the scan that each due block made.
+    missed : dict of int
+        How many earlier scans of it fell between the calls and were not made; zeros are left out.
+    sent : dict of Message
+        By block, or by block and output where it has several: (block, output) pairs.
+    """
+
+    tick: int
+    scans: dict[str, int]
+    missed: dict[str, int]
+    sent: dict[tuple[str, str], Message] = field(default_factory=dict)
+
+    def of(self, block: str) -> Any:
+        """Return the message of a block with one output, or None if it sent nothing."""
+        for (name, _), message in self.sent.items():
+            if name == block:
+                return message
+        return None
+
+
+@dataclass
+class _Port:
+    """One wire into a block: what it holds, or what waits on it."""
+
+    name: str
+    sender: tuple[str, str]
+    kept: bool
+    trigger: bool
+    required: bool
+    held: Message | None = None
+    waiting: list[tuple[int, Message]] = field(default_factory=list)
+
+
+class _Runner:
+    """One block with its wires."""
+
+    def __init__(self, component: Component, cursor: ScanCursor | None, demands: list[str]) -> None:
+        self.name = component.name
+        self.component = component
+        self.cursor = cursor
+        self.demands = demands
+        self.ports: list[_Port] = []
+        self.only_output = next(iter(component.outputs)) if len(component.outputs) == 1 else None
+
+
+class HostDriven:
+    """An open-loop scene that runs when it is called.
+
+    Parameters
+    ----------
+    scene : Scene
+    source : str
+        The block in whose place the host speaks: it runs on demand, and its `Component.run` is
+        never called.
+    wanted : iterable of str, optional
+        Blocks whose messages the host wants: those that they do not depend on never run. By
+        default all.
+
+    Raises
+    ------
+    SceneError
+        If the scene has what only an event queue can serve: feedback, wires with delay, jitter or
+        loss, latencies, shared processors, blocks with a process of their own, other sources.
+    """
+
+    def __init__(self, scene: Scene, source: str, wanted: Iterable[str] | None = None) -> None:
+        problems = list(_refusals(scene, source))
+        if problems:
+            raise SceneError(problems)
+        self.scene = scene
+        self.source = source
+        self.simulation = Simulation(scene)
+        self.ticks_per_s = scene.ticks_per_s
+        self.components = self.simulation.components
+        #: Tick of the last call, -1 before the first.
+        self.last_tick = -1
+        names = set(scene.blocks) if wanted is None else set(wanted)
+        self._runners = self._make_runners(names.union(*(ancestors(scene.graph, n) for n in names)))
+        self._cursors = {r.name: r.cursor for r in self._runners if r.cursor is not None}
+        self._source_key = (source, next(iter(self.components[source].outputs)))
+
+    def _make_runners(self, needed: Set[str]) -> list[_Runner]:
+        nodes = self.simulation.nodes
+        runners = []
+        for name in sorted(nodes, key=lambda name: nodes[name].priority()):
+            node = nodes[name]
+            if name == self.source or name not in needed:
+                continue
+            cursor = None if node.clock is None else ScanCursor(node.clock)
+            demands = [] if cursor else [demand.block for demand in node.demands]
+            runner = _Runner(node.component, cursor, demands)
+            for wire in self.scene.wires:
+                if wire.target == name:
+                    declared = node.component.inputs[wire.input]
+                    kept = declared.mode != "queued" and not declared.many
+                    runner.ports.append(
+                        _Port(
+                            wire.input,
+                            (wire.source, wire.output),
+                            kept,
+                            declared.mode == "trigger",
+                            kept and declared.required,
+                        )
+                    )
+            runners.append(runner)
+        return runners
+
+    # -- time ----------------------------------------------------------------------------------
+
+    def tick_of(self, time_s: object) -> int:
+        """Return the tick nearest to a time.
+
+        Parameters
+        ----------
+        time_s : float, int, Fraction or text such as "1/3"
+
+        Raises
+        ------
+        ValueError
+            If it is not a finite number from 0 on, or too large for 64-bit ticks.
+        """
+        if isinstance(time_s, float):  # numpy.float64 as well: the usual case, without a Fraction
+            ticks = float(time_s) * self.ticks_per_s
+            if not math.isfinite(time_s):
+                raise ValueError(f"time_s is {time_s}: it must be a finite number of seconds")
+            # A float of seconds is meant as the decimal it was written as; above 2^53 ticks the
+            # product is no longer whole ticks and Python's integers decide.
+            tick = (
+                round(ticks) if abs(ticks) < 2**53 else round(Fraction(time_s) * self.ticks_per_s)
+            )
+        else:
+            if isinstance(time_s, np.generic):
+                time_s = time_s.item()
+            try:
+                tick = round(parse_rational(time_s) * self.ticks_per_s)
+            except ValueError as error:
+                raise ValueError(f"time_s is {time_s!r}: it {error}") from None
+        if not 0 <= tick < MAX_TICK:
+            raise ValueError(
+                f"time_s is {time_s}: it must lie from 0 to {MAX_TICK / self.ticks_per_s:g}"
+            )
+        return tick
+
+    def next_scan_s(self, after_s: object = None) -> float:
+        """Return the time of the first scan of any block after a time, s.
+
+        Parameters
+        ----------
+        after_s : time, optional
+            By default the last call's; before the first call, the very first scan.
+        """
+        return self.scan_after(self.last_tick if after_s is None else self.tick_of(after_s))
+
+    def scan_after(self, after: int) -> float:
+        """Return the same for a tick."""
+        return min(cursor.after(after) for cursor in self._cursors.values()) / self.ticks_per_s
+
+    def due(self, tick: int) -> Step:
+        """Return which scans are made by a call at `tick`.
+
+        Of the scans since the last call each block makes its latest one, now: a call takes as long
+        as one scan of each, however long ago the last one was. The first call makes the scans of
+        its own instant only.
+
+        Raises
+        ------
+        ValueError
+            If `tick` lies before the last call's.
+        """
+        if tick < self.last_tick:
+            raise ValueError(
+                f"time_s is {tick / self.ticks_per_s:g}: it must not go back, the last call was at "
+                f"{self.last_tick / self.ticks_per_s:g}"
+            )
+        if self.last_tick < 0 < tick:
+            for cursor in self._cursors.values():
+                cursor.seek(tick)
+        self.last_tick = tick
+        scans: dict[str, int] = {}
+        missed: dict[str, int] = {}
+        for name, cursor in self._cursors.items():
+            found = cursor.due(tick)
+            if found is not None:
+                scans[name], late = found
+                if late:
+                    missed[name] = late
+        return Step(tick, scans, missed)
+
+    # -- running -------------------------------------------------------------------------------
+
+    def run(self, step: Step, message: Message) -> Step:
+        """Run every block that is due, and what they trigger, on the source's message.
+
+        Parameters
+        ----------
+        step : Step
+            From `due`; what blocks send is put into it.
+        message : Message
+            One row, of the source's output, at ``step.tick``.
+
+        Raises
+        ------
+        BlockFailure
+            If a block raised an exception.
+        """
+        sent, scans, tick = step.sent, step.scans, step.tick
+        sent[self._source_key] = message
+        ticks = np.array([tick], dtype=np.int64)
+        for runner in self._runners:
+            triggered = False
+            complete = True
+            waiting = False
+            held: dict[str, tuple[Any, IntArray]] = {}
+            for port in runner.ports:
+                new = sent.get(port.sender)
+                if new is not None:
+                    triggered = triggered or port.trigger
+                    if port.kept:
+                        port.held = new
+                    else:
+                        port.waiting.append((tick, new))
+                waiting = waiting or bool(port.waiting)
+                if port.held is not None:
+                    held[port.name] = (port.held, _last_row(port.held))
+                elif port.required:
+                    complete = False
+            scan = scans.get(runner.name)
+            if not complete or not (triggered or scan is not None):
+                continue
+            wake = Wake(
+                ticks,
+                _NO_SCAN if scan is None else np.array([scan], dtype=np.int64),
+                self.ticks_per_s,
+                held,
+                _collected(runner.ports) if waiting else {},
+                partial(_rows_of, runner.demands, scans) if runner.demands else None,
+            )
+            try:
+                result = runner.component.run(wake)
+            except BaseException as error:
+                if is_ours_to_obey(error):
+                    raise
+                raise self._failure(runner, step, error) from error
+            if result is None:
+                continue
+            if isinstance(result, Message):
+                assert runner.only_output is not None
+                result = {runner.only_output: result}
+            for output, given in result.items():
+                if len(given.tick):
+                    sent[runner.name, output] = given
+        return step
+
+    def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
+        reason = told(error)
+        path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
+        return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
+
+
+def _last_row(message: Message) -> IntArray:
+    count = len(message.tick)
+    return _FIRST_ROW if count == 1 else np.array([count - 1])
+
+
+def _rows_of(blocks: Iterable[str], scanning: Container[str]) -> dict[str, IntArray]:
+    """Return for each block the one row of a step where it scans, and none where it does not."""
+    return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}
+
+
+def _collected(ports: list[_Port]) -> dict[str, list[Arrivals]]:
+    """Take what waits on queued wires, sender by sender."""
+    arrived: dict[str, list[Arrivals]] = {}
+    for port in ports:
+        if not port.waiting:
+            continue
+        messages = [message for _, message in port.waiting]
+        ticks = [np.array([tick] * len(message)) for tick, message in port.waiting]
+        if len(messages) == 1:
+            arrivals = Arrivals(port.sender[0], ticks[0], messages[0])
+        else:
+            joined = type(messages[0]).concatenate(messages)
+            arrivals = Arrivals(port.sender[0], np.concatenate(ticks), joined)
+        arrived.setdefault(port.name, []).append(arrivals)
+        port.waiting.clear()
+    return arrived
+
+
+def _refusals(scene: Scene, source: str) -> list[Problem]:
+    """Say what of a scene needs an event queue."""
+    found: list[tuple[str, str]] = []
+    looped = in_cycles(scene.graph)
+    if looped:
+        found.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
+    for wire in scene.wires:
+        if wire.delayed or wire.jitter_s or wire.drop_probability:
+            found.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
+    for name, block in scene.blocks.items():
+        if block.options.processor is not None:
+            message = f"its messages queue for processor {block.options.processor!r}"
+            found.append((f"blocks.{name}", message))
+        if block.cls.process is not None:
+            found.append((f"blocks.{name}", "it has a process of its own"))
+        fed = any(port.required for port in block.cls.inputs.values())
+        if not fed and name != source:
+            found.append((f"blocks.{name}", f"it is a second source beside {source!r}"))
+    why = "; a host drives an open-loop scene only: every message at the instant of the call"
+    return [Problem(str(scene.path), key, message + why) for key, message in found]

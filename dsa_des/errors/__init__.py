@@ -1,0 +1,29 @@
+"""What can go wrong, and how it is said."""
+
+from dsa_des.errors.problems import (
+    MOST_PROBLEMS,
+    BlockFailure,
+    Lines,
+    OutputError,
+    Problem,
+    SceneError,
+    SetupFailure,
+    UsageError,
+    did_you_mean,
+    nearest,
+    shown_value,
+)
+
+__all__ = [
+    "MOST_PROBLEMS",
+    "BlockFailure",
+    "Lines",
+    "OutputError",
+    "Problem",
+    "SceneError",
+    "SetupFailure",
+    "UsageError",
+    "did_you_mean",
+    "nearest",
+    "shown_value",
+]

@@ -1,0 +1,182 @@
+"""What can go wrong, said once and completely.
+
+Every error of a scene is a `Problem`; a scene with any raises one `SceneError` that lists them
+all. An exception inside a block becomes a `BlockFailure` that says which block, when.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from dsa_des.text.safe_text import MOST_OF_A_VALUE, printable, shortened
+
+#: Problems that are listed in one error; the others are only counted.
+MOST_PROBLEMS = 20
+# What one problem shows of a value, a key and a message.
+_KEY_LENGTH = 200
+_LINE_LENGTH = 1000
+_MOST_LINES = 2 * MOST_PROBLEMS
+# Names longer or more than these are not compared: that takes longer than a user waits.
+_LONGEST_NAME = 100
+_MOST_NAMES = 2000
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str | None:
+    """Return the allowed name closest to a misspelt one, or None when nothing is close."""
+    if len(name) > _LONGEST_NAME:
+        return None
+    names = [candidate for candidate in allowed if len(candidate) <= _LONGEST_NAME]
+    if len(names) > _MOST_NAMES:
+        return None
+    lower = {candidate.lower(): candidate for candidate in names}
+    found = get_close_matches(name.lower(), list(lower), n=1, cutoff=0.6)
+    return lower[found[0]] if found else None
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` or, when nothing is close, the list of what is allowed."""
+    names = sorted(allowed)
+    close = nearest(name, names)
+    if close is not None:
+        return f"; did you mean {close!r}?"
+    if not names:
+        return ""
+    shown = ", ".join(shortened(name, MOST_OF_A_VALUE) for name in names[:12])
+    shown += ", ..." if len(names) > 12 else ""
+    return f"; allowed: {shown}"
+
+
+class Lines(str):
+    """A message of several lines, each of which is printable already."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, lines: Iterable[object]) -> "Lines":
+        """Return lines, made printable, as one message."""
+        return cls("\n".join(printable(line) for line in lines))
+
+
+def shown_value(value: Any) -> str:
+    """Return how a value is shown in a message: as Python writes it, cut off where it is long."""
+    if isinstance(value, str):
+        # Cut before it is quoted: a long text is not copied.
+        return shortened(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        left, right = "{}" if isinstance(value, dict) else "[]" if isinstance(value, list) else "()"
+        text = left
+        for item in value:
+            text += ", " if len(text) > 1 else ""
+            text += shown_value(item)
+            if isinstance(value, dict):
+                text += f": {shown_value(value[item])}"
+            if len(text) > MOST_OF_A_VALUE:
+                return shortened(text, MOST_OF_A_VALUE)
+        text += "," if isinstance(value, tuple) and len(value) == 1 else ""
+        return shortened(text + right, MOST_OF_A_VALUE)
+    return shortened(repr(value), MOST_OF_A_VALUE)
+
+
+_UNSET: Any = object()
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a scene.
+
+    Parameters
+    ----------
+    source : str
+        The file, or ``command line``, in which the offending key was written.
+    key : str
+        Its dotted key, for example ``blocks.radar.scan_rate_hz``; empty for a whole file.
+    message : str
+        What is wrong and what is allowed.
+    value : object, optional
+        The offending value, shown as it was written.
+    """
+
+    source: str
+    key: str
+    message: str
+    value: Any = _UNSET
+
+    def __str__(self) -> str:
+        where = shortened(self.source, _LINE_LENGTH)
+        where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
+        if self.value is not _UNSET:
+            where += f" = {shown_value(self.value)}"
+        # On one line whatever stands in a name: nobody can write a message of ours.
+        lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
+        return f"{where}: " + "\n".join(
+            shortened(line, _LINE_LENGTH) for line in lines[:_MOST_LINES]
+        )
+
+
+class SceneError(Exception):
+    """A scene cannot be run; `problems` lists everything that is wrong with it.
+
+    As text, the first `MOST_PROBLEMS` of them and the number of all.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = list(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        if len(self.problems) == 1:
+            return str(self.problems[0])
+        lines = [f"{len(self.problems)} problems:"]
+        lines += [f"  {problem}" for problem in self.problems[:MOST_PROBLEMS]]
+        if len(self.problems) > MOST_PROBLEMS:
+            lines.append(f"  and {len(self.problems) - MOST_PROBLEMS} more")
+        return "\n".join(lines)
+
+
+class UsageError(Exception):
+    """A command was called with something it cannot use (exit code 2).
+
+    Each argument is one line of the message.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(printable(line) for line in self.args)
+
+
+class BlockFailure(Exception):
+    """A block raised an exception while the simulation ran.
+
+    The original exception is its ``__cause__``.
+    """
+
+    def __init__(self, block: str, path: str, time_s: float, scan: int | None, reason: str) -> None:
+        self.block, self.path, self.time_s, self.scan, self.reason = (
+            block,
+            path,
+            time_s,
+            scan,
+            reason,
+        )
+        super().__init__(block, path, time_s, scan, reason)
+
+    #: Exit code of a command that it ends.
+    exit_code = 1
+
+    def __str__(self) -> str:
+        scan = "" if self.scan is None else f", scan {self.scan}"
+        return printable(
+            f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        )
+
+
+class SetupFailure(BlockFailure):
+    """A block raised an exception before anything ran: the scene cannot be used."""
+
+    exit_code = 2
+
+
+class OutputError(Exception):
+    """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

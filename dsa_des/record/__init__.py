@@ -1,0 +1,1 @@
+"""What a run leaves behind: recorded columns, Parquet files, a folder."""

@@ -1,0 +1,325 @@
+"""Recording: a passive tap on every output, in an order that no scheduling choice can change.
+
+A recorder never schedules an event and never draws a number. Rows are sorted by (tick, block)
+before they reach a sink, so a run in look-ahead windows and one that goes scan by scan hand over
+the same rows in the same order.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, IntArray
+from dsa_des.block.message import Columns, Message, Schema, Text, rows_of
+from dsa_des.record.attempts import attempt
+from dsa_des.time.timeline import own_scans
+
+_LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
+
+
+class Sink(Protocol):
+    """Something that takes recorded rows: a file, memory, or a running summary."""
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Take rows of one table, in their final order."""
+
+    def close(self) -> None:
+        """Take note that no more rows come."""
+
+
+class Recorder:
+    """Gathers what blocks send and hands it on in canonical order.
+
+    Parameters
+    ----------
+    sinks : iterable of Sink
+    wanted : mapping, optional
+        Table name → columns to record; everything by default. What is not wanted costs nothing.
+    """
+
+    def __init__(
+        self, sinks: Iterable[Sink], *, wanted: Mapping[str, Collection[str]] | None = None
+    ) -> None:
+        self.sinks = list(sinks)
+        self._wanted = wanted
+        self._ticks_per_s = 1
+        self._schemas: dict[str, Schema] = {}
+        self._pending: dict[str, list[tuple[str, Columns]]] = {}
+        self._texts: dict[tuple[str, str], _TextCodes] = {}
+        self.rows: dict[str, int] = {}
+
+    def open(
+        self, messages: Iterable[type[Message]], ticks_per_s: int, span_ticks: int = 0
+    ) -> None:
+        """Learn what the run's messages record; called once, before the run.
+
+        With replicas in lock step, `span_ticks` apart, every table begins with their number.
+        """
+        self._ticks_per_s = ticks_per_s
+        self._span_ticks = span_ticks
+        leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
+        for message in messages:
+            for table, schema in message.recorded.items():
+                self._schemas.setdefault(table, dict(leading)).update(schema)
+        if self._wanted is not None:
+            self._schemas = {
+                table: {
+                    name: kind
+                    for name, kind in schema.items()
+                    if name == "replica" or name in self._wanted[table]
+                }
+                for table, schema in self._schemas.items()
+                if table in self._wanted
+            }
+        self._schemas = dict(sorted(self._schemas.items()))
+        self._pending = {table: [] for table in self._schemas}
+        self.rows = dict.fromkeys(self._schemas, 0)
+        for sink in self.sinks:
+            sink.open(self._schemas)
+
+    def record(self, block: str, message: Message) -> None:
+        """Note a message that `block` has sent."""
+        if self._wanted is not None and self._pending.keys().isdisjoint(message.recorded):
+            return
+        for table, columns in message.tables().items():
+            if table in self._pending and len(columns["tick"]):
+                self._pending[table].append((block, columns))
+
+    def mark(self) -> dict[str, int]:
+        """Return how much was noted since the last `advance`, for `rewind`."""
+        return {table: len(pieces) for table, pieces in self._pending.items()}
+
+    def rewind(self, mark: dict[str, int]) -> None:
+        """Forget what was noted since `mark`."""
+        for table, count in mark.items():
+            del self._pending[table][count:]
+
+    def advance(self, tick: int) -> None:
+        """Hand on every row before `tick`; no more of them will come."""
+        for table, pieces in self._pending.items():
+            ready: list[tuple[str, Columns]] = []
+            later: list[tuple[str, Columns]] = []
+            for block, columns in pieces:
+                ticks: Any = columns["tick"]
+                count = int(np.searchsorted(ticks, tick))
+                if count == len(ticks):
+                    ready.append((block, columns))
+                    continue
+                if count:
+                    ready.append((block, rows_of(columns, slice(0, count))))
+                later.append((block, rows_of(columns, slice(count, len(ticks)))))
+            self._pending[table] = later
+            if ready:
+                self._hand_on(table, ready)
+
+    def close(self) -> None:
+        """Hand on everything that is left and close the sinks."""
+        self.advance(np.iinfo(np.int64).max)
+        for sink in self.sinks:
+            sink.close()
+
+    def _hand_on(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
+        pieces.sort(key=lambda piece: piece[0])
+        ticks: IntArray = np.concatenate([columns["tick"] for _, columns in pieces])
+        order = None
+        if bool(np.any(ticks[1:] < ticks[:-1])):
+            order = np.argsort(ticks, kind="stable")
+        ordered: Columns = {}
+        for name, kind in self._schemas[table].items():
+            ordered[name] = self._column(table, name, kind, pieces, order, ticks)
+        self.rows[table] += len(ticks)
+        for sink in self.sinks:
+            sink.write(table, ordered)
+
+    def _column(
+        self,
+        table: str,
+        name: str,
+        kind: str,
+        pieces: list[tuple[str, Columns]],
+        order: IntArray | None,
+        ticks: IntArray,
+    ) -> AnyArray | Text:
+        if name in ("time_s", "tick", "replica"):
+            values = self._time_column(name, ticks)
+            return values if order is None else values[order]
+        if kind == "text":
+            text = self._texts.setdefault((table, name), _TextCodes(name))
+            codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
+            return Text(codes if order is None else codes[order], text.names)
+        parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
+        values = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        if name == "scan" and self._span_ticks:
+            values = own_scans(values)
+        return values if order is None else values[order]
+
+    def _time_column(self, name: str, ticks: IntArray) -> AnyArray:
+        if name == "replica":
+            return ticks // self._span_ticks
+        if self._span_ticks:
+            ticks = ticks % self._span_ticks
+        return ticks if name == "tick" else ticks / self._ticks_per_s
+
+
+class _TextCodes:
+    """The names that a text column has held so far, and what its pieces' own codes become."""
+
+    def __init__(self, column: str) -> None:
+        self._column = column
+        self._place: dict[str, int] = {}
+        #: By identity of a tuple of names, which is kept so that the identity stays its own.
+        self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
+        self.names: tuple[str, ...] = ()
+
+    def codes(self, block: str, columns: Columns) -> AnyArray:
+        """Return one piece's codes into our names; -1 is null."""
+        count = len(columns["tick"])
+        if self._column == "block":
+            return np.full(count, self._lookup((block,))[0], dtype=np.int32)
+        text = columns.get(self._column)
+        if text is None:
+            return np.full(count, -1, dtype=np.int32)
+        if not isinstance(text, Text):
+            raise TypeError(f"column {self._column!r} must be Text")
+        return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
+
+    def _lookup(self, names: tuple[str, ...]) -> AnyArray:
+        known = self._lookups.get(id(names))
+        if known is not None and known[0] is names:
+            return known[1]
+        places = [self._place.setdefault(name, len(self._place)) for name in names]
+        lookup = np.array([*places, -1], dtype=np.int32)
+        if len(self._lookups) > 1000:  # tuples made anew for every message
+            self._lookups.clear()
+        self._lookups[id(names)] = names, lookup
+        if len(self._place) > len(self.names):
+            self.names = tuple(self._place)
+        return lookup
+
+
+def _values(values: Any, kind: str, count: int) -> AnyArray:
+    if values is None:
+        return np.full(count, np.nan if kind == "float64" else 0, dtype=np.dtype(kind))
+    return np.asarray(values, dtype=np.dtype(kind))
+
+
+class _Keeping:
+    """Keeps all rows in memory, as they come."""
+
+    def __init__(self) -> None:
+        self._schemas: Mapping[str, Schema] = {}
+        self._parts: dict[str, list[Columns]] = {}
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Learn the tables and columns of the run."""
+        self._schemas = schemas
+        self._parts = {table: [] for table in schemas}
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Keep rows of one table."""
+        self._parts[table].append(columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class ColumnSink(_Keeping):
+    """Keeps all rows in memory; `tables` gives them as columns."""
+
+    def tables(self) -> dict[str, Columns]:
+        """Return table name → column name → values."""
+        return {table: self._joined(table, parts) for table, parts in self._parts.items()}
+
+    def _joined(self, table: str, parts: list[Columns]) -> Columns:
+        if len(parts) == 1:
+            return parts[0]
+        joined: Columns = {}
+        for name, kind in self._schemas[table].items():
+            pieces: list[Any] = [part[name] for part in parts]
+            if kind == "text":  # later pieces know at least the names of earlier ones
+                codes = [piece.codes for piece in pieces]
+                names = pieces[-1].names if pieces else ()
+                empty = np.empty(0, dtype=np.int32)
+                joined[name] = Text(np.concatenate(codes) if codes else empty, names)
+            else:
+                empty = np.empty(0, dtype=np.dtype(kind))
+                joined[name] = np.concatenate(pieces) if pieces else empty
+        return joined
+
+
+class MemorySink(_Keeping):
+    """Keeps all rows in memory; `tables` gives them as Arrow tables."""
+
+    def tables(self) -> dict[str, Any]:
+        """Return table name → ``pyarrow.Table``."""
+        import pyarrow as pa
+
+        from dsa_des.record.arrow import arrow_schema, to_arrow
+
+        return {
+            table: pa.Table.from_batches(
+                [to_arrow(columns, schema) for columns in self._parts[table]],
+                schema=arrow_schema(schema),
+            ).combine_chunks()
+            for table, schema in self._schemas.items()
+        }
+
+
+class Observer(Protocol):
+    """A running summary over recorded rows, for reports and metrics."""
+
+    tables: ClassVar[frozenset[str]]
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of one of its `tables`."""
+
+    def result(self) -> dict[str, Any]:
+        """Return sections of the run's summary."""
+
+
+class ObserverSink:
+    """Passes rows on to observers.
+
+    Parameters
+    ----------
+    observers : iterable of Observer
+    notes : list of str, optional
+        An observer that raises is left out from then on, and a note of it added here, so that the
+        run goes on. Without a list the run ends.
+    """
+
+    def __init__(self, observers: Iterable[Observer], notes: list[str] | None = None) -> None:
+        self.observers = list(observers)
+        self._notes = notes
+
+    def open(self, schemas: Mapping[str, Schema]) -> None:
+        """Nothing to do."""
+
+    def write(self, table: str, columns: Columns) -> None:
+        """Pass rows to every observer of this table."""
+        for observer in list(self.observers):
+            if table in observer.tables:
+                self._ask(observer, observer.update, table, columns)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+    def result(self) -> dict[str, Any]:
+        """Return the sections of all observers."""
+        sections: dict[str, Any] = {}
+        for observer in list(self.observers):
+            sections.update(self._ask(observer, observer.result) or {})
+        return sections
+
+    def _ask(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
+        if self._notes is None:
+            return call(*arguments)
+        count = len(self._notes)
+        answer = attempt(f"the summary {type(observer).__name__}", self._notes, call, *arguments)
+        if len(self._notes) > count:
+            self.observers.remove(observer)
+        return answer

@@ -1,0 +1,273 @@
+"""Replicas of one scene in lock step: one run whose rows are those of every replica.
+
+Blocks that treat every row by itself serve all replicas at once; a block that remembers, or whose
+parameters differ between replicas, is split into one instance each
+(`dsa_des.replicas.split_block`). What is recorded equals the separate runs' recordings, with the
+replica as an additional column.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from dsa_des.block.component import ClockedParameters, Component, Context
+from dsa_des.block.effect import plan, unspent
+from dsa_des.errors import BlockFailure
+from dsa_des.record.recording import Recorder
+from dsa_des.replicas.clock import ReplicaClock
+from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
+from dsa_des.replicas.streams import ReplicaStreams
+from dsa_des.replicas.watched_parameters import WatchedParameters
+from dsa_des.run.node import Node
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import ScanClock
+from dsa_des.time.randomness import Streams
+from dsa_des.time.timeline import ReplicaTime
+
+__all__ = ["LockStep", "NotInLockStep"]
+
+_OF_THE_CLOCK = frozenset(ClockedParameters.model_fields)
+
+
+class LockStep(Simulation):
+    """Replicas of a scene made ready to run together, once.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        One for each replica: the same graph and block types, other seeds or parameters.
+    recorder : Recorder, optional
+        Every table it writes begins with the column ``replica``.
+    report : callable, optional
+        Called with a replica's number and what its blocks report (`Component.report`), for blocks
+        that are split; shared blocks report for nobody.
+    window : int, optional
+        Most scans in a look-ahead window, as for `Simulation`.
+
+    Raises
+    ------
+    NotInLockStep
+        If these replicas cannot run together, when made or while running.
+    SceneError
+        If a block cannot be set up.
+    """
+
+    pinpoints = False
+
+    def __init__(
+        self,
+        scenes: Sequence[Scene],
+        *,
+        recorder: Recorder | None = None,
+        report: Callable[[int, dict[str, Any]], None] | None = None,
+        window: int | None = None,
+    ) -> None:
+        self._scenes = list(scenes)
+        self._report = report
+        #: Blocks that are split, by name; the engine still asks `components` for all but `run`.
+        self.split: dict[str, SplitBlock] = {}
+        #: By block, which of its parameters are not the same in all replicas.
+        self._differing: dict[str, set[str]] = {}
+        self._watched: dict[str, WatchedParameters] = {}
+        _check_alike(self._scenes)
+        try:
+            super().__init__(self._scenes[0], recorder=recorder, window=window)
+        except BlockFailure as failure:
+            raise _unwrapped(failure) from None
+
+    # -- building ------------------------------------------------------------------------------
+
+    def _make_streams(self) -> Streams:
+        return ReplicaStreams([scene.seed for scene in self._scenes])
+
+    def _set_up_components(self) -> None:
+        super()._set_up_components()
+        self.replicas = ReplicaTime(len(self._scenes), self._run_ticks())
+        if not self.replicas.fits:
+            raise NotInLockStep(
+                f"{len(self._scenes)} runs of {float(self.duration_s):g} s do not fit on one line "
+                f"of 64-bit ticks at {self.ticks_per_s} per second"
+            )
+        for name, component in self.components.items():
+            if not self._shared(name, component):
+                if component.process is not None:
+                    raise NotInLockStep(f"block {name} has a process of its own")
+                make = self._maker(name, component)
+                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finished)
+            elif name in self._watched:
+                reason = f"block {name} reads parameters of its clock, which differ"
+                self._watched[name].refuse(NotInLockStep(reason))
+
+    def _shared(self, name: str, component: Component) -> bool:
+        """Whether one instance serves all replicas."""
+        if not component.serves_replicas():
+            return False
+        if name in self._watched:
+            return not self._watched[name].read
+        return not self._differing[name]
+
+    def _find_differing(self, name: str) -> set[str]:
+        first = self._scenes[0].blocks[name].parameters
+        found: set[str] = set()
+        for scene in self._scenes[1:]:
+            other = scene.blocks[name].parameters
+            if other is not first and other != first:
+                fields = type(first).model_fields
+                found.update(n for n in fields if getattr(other, n) != getattr(first, n))
+        return found
+
+    def _parameters(self, name: str) -> Any:
+        """Return what a block is made with: the first replica's, watched where clocks differ."""
+        parameters = self.scene.blocks[name].parameters
+        differing = self._differing[name] = self._find_differing(name)
+        of_the_clock = isinstance(parameters, ClockedParameters) and differing <= _OF_THE_CLOCK
+        if not differing or not of_the_clock:
+            return parameters
+        self._watched[name] = WatchedParameters(parameters, differing)
+        return self._watched[name].parameters
+
+    def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
+        nodes = super()._build_nodes(window, shuffle_ties)
+        for name, instances in self.split.items():
+            nodes[name].runner = instances
+        return nodes
+
+    def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
+        block = self.scene.blocks[name]
+
+        def make(number: int) -> Component:
+            scene = self._scenes[number]
+            context = Context(
+                Streams(scene.seed), self.ticks_per_s, duration_s=self.duration_s,
+                consumers=face.context.consumers, producers=face.context.producers,
+                sections=scene.sections,
+            )  # fmt: skip
+            component = block.cls(name, scene.blocks[name].parameters, context)
+            self._check_same_length(face, component)
+            planned = plan(component, scene.tolerance)
+            context.tolerance = unspent(planned, scene.tolerance)
+            context.effects = {i.effect.name: i.effect.build(component) for i in planned if i.built}
+            component.setup()
+            self._check_same_word(face, component)
+            return component
+
+        return make
+
+    def _check_same_word(self, face: Component, component: Component) -> None:
+        """Refuse an instance that asks or offers its neighbours something else than the first."""
+        for port in face.inputs:
+            if component.request(port) != face.request(port):
+                raise NotInLockStep(f"block {face.name} asks for something else in some replica")
+        for port in face.outputs:
+            if component.offer(port) != face.offer(port):
+                raise NotInLockStep(
+                    f"what block {face.name} tells its neighbours, of its targets for example, "
+                    "differs between replicas"
+                )
+
+    def _check_same_length(self, face: Component, component: Component) -> None:
+        """Refuse an instance by whose data its replica would last longer or shorter."""
+        if self.scene.duration_s is not None:
+            return
+        if component.natural_duration_s() != face.natural_duration_s():
+            raise NotInLockStep(f"block {face.name} gives some replica another duration")
+
+    def rehearse(self) -> None:
+        """Make what each replica has for itself, and let it go.
+
+        Raises
+        ------
+        NotInLockStep
+            If that shows that the replicas cannot run together.
+        """
+        for block in self.split.values():
+            for number in range(len(self._scenes)):
+                block.make(number)
+
+    def _finished(self, number: int, component: Component) -> None:
+        if self._report is not None:
+            self._report(number, component.report())
+
+    def _clock(self, name: str, component: Component) -> ScanClock | None:
+        found = [component.clock_of(scene.blocks[name].parameters) for scene in self._scenes]
+        specs = [spec for spec in found if spec is not None]
+        if not specs:
+            return None
+        if len(specs) < len(found):
+            raise NotInLockStep(f"block {name} has a clock of its own in some replicas only")
+        if len({(spec.rate_hz, spec.rate_error_ppm) for spec in specs}) > 1:
+            for wire in self.scene.wires:
+                if wire.delay_scans and name in (wire.source, wire.target):
+                    raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
+        clocks = []
+        for scene, spec in zip(self._scenes, specs, strict=True):
+            draw = Streams(scene.seed).scan_normals(name, "clock jitter")
+            clocks.append(ScanClock(spec, self.ticks_per_s, draw))
+        assert self.replicas is not None
+        return ReplicaClock(clocks, self.replicas)
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _run_ticks(self) -> int:
+        return super().end_tick
+
+    @property
+    def end_tick(self) -> int:
+        """First tick that is no longer simulated."""
+        if self.replicas is None:
+            return self._run_ticks()
+        return (self.replicas.replicas - 1) * self.span_ticks + self.replicas.end_tick
+
+    def _windows(self, end: int) -> Iterator[tuple[int, int]]:
+        """Give windows that hold many whole replicas, or parts of one."""
+        assert self.replicas is not None
+        span, length = self.span_ticks, self.replicas.end_tick
+        together = self.window_ticks // length
+        if together > 1:
+            for first in range(0, self.replicas.replicas, together):
+                last = min(first + together, self.replicas.replicas) - 1
+                yield first * span, last * span + length
+            return
+        for number in range(self.replicas.replicas):
+            for start, stop in super()._windows(length):
+                yield number * span + start, number * span + stop
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Any:
+        """Run all replicas; see `Simulation.run`."""
+        try:
+            outcome = super().run(progress)
+        except BlockFailure as failure:
+            raise _unwrapped(failure) from None
+        for block in self.split.values():
+            block.close()
+        # Nobody speaks for all replicas: a shared block has seen the rows of every one.
+        return replace(outcome, components={})
+
+
+def _unwrapped(failure: BlockFailure) -> Exception:
+    cause = failure.__cause__
+    return cause if isinstance(cause, NotInLockStep) else failure
+
+
+def _check_alike(scenes: Sequence[Scene]) -> None:
+    """Refuse scenes that differ in more than seeds and parameters of blocks."""
+    first = scenes[0]
+    if first.look_ahead_blocks() != set(first.blocks):
+        late = sorted(set(first.blocks) - first.look_ahead_blocks())
+        raise NotInLockStep(f"blocks that run scan by scan: {', '.join(late)}")
+    if first.processors:
+        raise NotInLockStep("shared processors order messages of one run")
+    for wire in first.wires:
+        if wire.jitter_s or wire.drop_probability or isinstance(wire.holds, dict):
+            raise NotInLockStep(f"wire {wire} loses, jitters or holds messages")
+    for scene in scenes[1:]:
+        same = (
+            scene.wires == first.wires
+            and scene.duration_s == first.duration_s
+            and scene.ticks_per_s == first.ticks_per_s
+            and scene.classes == first.classes
+            and all(scene.sections[name] == model for name, model in first.sections.items())
+        )
+        if not same:
+            raise NotInLockStep("the replicas differ in wires, types, duration, ticks or sections")

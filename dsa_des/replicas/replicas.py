@@ -1,0 +1,254 @@
+"""Many runs of one scene that differ by their seed and by a few values.
+
+The scene is validated once; a replica validates again only what it changes.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from dsa_des.block.message import Columns, rows_of
+from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
+from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.checks import check_times
+from dsa_des.scene.options import BlockOptions, with_latencies
+from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.scene import Block, Scene
+from dsa_des.scene.scene_file import SceneFile
+from dsa_des.time.clock import parse_rational
+
+#: Which columns of which tables are recorded; None records everything.
+Wanted = Mapping[str, Collection[str]] | None
+
+
+@dataclass(frozen=True)
+class Replica:
+    """One run: a seed, and what it changes in the scene.
+
+    Parameters
+    ----------
+    seed : int
+    changes : mapping
+        Dotted keys and their values, for example ``{"blocks.radar.offset_s": Fraction(1, 20)}``;
+        blocks, wires and types stay as they are.
+    """
+
+    seed: int
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a run recorded.
+
+    Parameters
+    ----------
+    tables : dict
+        Table name → column name → values, as blocks sent them and in recorded order.
+    ticks_per_s : int
+    duration_s : float
+    report : callable
+        Returns the sections that blocks add to the summary of the run.
+    """
+
+    tables: dict[str, Columns]
+    ticks_per_s: int
+    duration_s: float
+    report: Callable[[], dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Why a run gave no result."""
+
+    error: str
+
+
+def run_replicas(
+    scene: Scene, replicas: Sequence[Replica], *, wanted: Wanted = None
+) -> list[Recorded | Failed]:
+    """Run replicas of a scene, in lock step where they can; a failing one stops no other.
+
+    Parameters
+    ----------
+    scene : Scene
+    replicas : sequence of Replica
+    wanted : mapping, optional
+        Table name → columns to record; everything by default.
+
+    Returns
+    -------
+    list of Recorded or Failed
+        In the order of `replicas`; each is identical to a run of its own.
+    """
+    found: list[Recorded | Failed | None] = []
+    scenes: list[Scene] = []
+    for replica in replicas:
+        try:
+            scenes.append(scene_of(scene, replica))
+            found.append(None)
+        except SceneError as error:
+            found.append(Failed(str(error)))
+    together: Sequence[Recorded | Failed] | None = _together(scenes, wanted)
+    ran = iter(together or [_run(one, wanted) for one in scenes])
+    return [next(ran) if one is None else one for one in found]
+
+
+def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
+    """Return why replicas cannot run in lock step, as far as it shows before they run."""
+    try:
+        LockStep([scene_of(scene, replica) for replica in replicas]).rehearse()
+    except NotInLockStep as reason:
+        return str(reason)
+    except (SceneError, BlockFailure):  # a failing replica says so itself
+        return None
+    return None
+
+
+def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
+    """Run scenes in lock step; None where they cannot, or where one of them fails."""
+    if len(scenes) < 2:
+        return None
+    sink = ColumnSink()
+    try:
+        simulation = LockStep(scenes, recorder=Recorder([sink], wanted=wanted))
+        outcome = simulation.run()
+    except (NotInLockStep, SceneError, BlockFailure):
+        return None
+    parts = _by_replica(sink.tables(), len(scenes))
+    return [
+        Recorded(tables, simulation.ticks_per_s, outcome.duration_s, partial(_report, one))
+        for tables, one in zip(parts, scenes, strict=True)
+    ]
+
+
+def _by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Columns]]:
+    """Part the rows of a common recording, which are in order of the replica."""
+    parts: list[dict[str, Columns]] = [{} for _ in range(count)]
+    for table, columns in tables.items():
+        starts = np.searchsorted(columns["replica"], np.arange(count + 1)).tolist()  # type: ignore[arg-type]
+        own = {name: values for name, values in columns.items() if name != "replica"}
+        for number, part in enumerate(parts):
+            part[table] = rows_of(own, slice(starts[number], starts[number + 1]))
+    return parts
+
+
+def _report(scene: Scene) -> dict[str, Any]:
+    return Simulation(scene).run().report
+
+
+def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
+    try:
+        sink = ColumnSink()
+        simulation = Simulation(scene, recorder=Recorder([sink], wanted=wanted))
+        outcome = simulation.run()
+    except (SceneError, BlockFailure) as error:
+        return Failed(str(error))
+    return Recorded(
+        sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report
+    )
+
+
+def scene_of(scene: Scene, replica: Replica) -> Scene:
+    """Return the scene of one replica.
+
+    Raises
+    ------
+    SceneError
+        If a change names nothing in the scene or its value is not allowed.
+    """
+    if not replica.changes:
+        return replace(scene, seed=replica.seed)
+    problems: list[Problem] = []
+    blocks, sections = dict(scene.blocks), dict(scene.sections)
+    duration = scene.duration_s
+    for key, value in replica.changes.items():
+        path = key_path(key)
+        try:
+            if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
+                name = str(path[1])
+                blocks[name] = _changed_block(blocks[name], path[2:], value)
+            elif path[0] in sections and len(path) > 1:
+                sections[str(path[0])] = _changed(sections[str(path[0])], path[1:], value)
+            elif path == ("duration_s",):
+                duration = parse_rational(value)
+            else:
+                known = [f"blocks.{name}" for name in blocks] + [*sections, "duration_s"]
+                hint = did_you_mean(".".join(map(str, path[:2])), known)
+                problems.append(_problem(scene, key, f"is no key of this scene{hint}", value))
+        except ValidationError as error:
+            file = SceneFile(scene.path, {})
+            for found in explain(file, (), key, BlockOptions, error):
+                problems.append(_problem(scene, key, found.message, value))
+        except (ValueError, LookupError, TypeError) as error:
+            problems.append(_problem(scene, key, str(error), value))
+    wires = scene.wires
+    if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
+        wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
+    ticks_per_s = scene.ticks_per_s
+    if not problems:
+        ticks_per_s = check_times(SceneFile(scene.path, {}), blocks, wires, duration, problems)
+    if problems:
+        raise SceneError(problems)
+    return replace(
+        scene,
+        seed=replica.seed,
+        blocks=blocks,
+        sections=sections,
+        wires=wires,
+        duration_s=duration,
+        ticks_per_s=ticks_per_s,
+    )
+
+
+def key_path(key: str) -> tuple[str | int, ...]:
+    """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
+    parts = key.replace("[", ".").replace("]", "").split(".")
+    return tuple(
+        int(part) if part.isascii() and part.isdecimal() and len(part) < 10 else part
+        for part in parts
+    )
+
+
+def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
+    return Problem(
+        str(scene.path), key, message, float(value) if isinstance(value, Fraction) else value
+    )
+
+
+def _changed_block(block: Block, path: tuple[str | int, ...], value: Any) -> Block:
+    name = path[0]
+    if name in BlockOptions.model_fields and name not in block.cls.Parameters.model_fields:
+        return replace(block, options=_changed(block.options, path, value))
+    return replace(block, parameters=_changed(block.parameters, path, value))
+
+
+def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
+    """Return `old` with the value at `path` replaced; every model on the way is validated again."""
+    if not path:
+        return value
+    first, rest = path[0], path[1:]
+    if isinstance(old, BaseModel):
+        model = type(old)
+        if first not in model.model_fields:
+            hint = did_you_mean(str(first), model.model_fields)
+            raise ValueError(f"there is no parameter {first!r}{hint}")
+        given = {name: getattr(old, name) for name in old.model_fields_set}
+        given[str(first)] = _changed(getattr(old, str(first)), rest, value)
+        return model.model_validate(given)
+    if isinstance(old, list | tuple):
+        if not isinstance(first, int) or first >= len(old):
+            raise ValueError(f"there is no item {first!r}: the list has {len(old)} (from 0)")
+        items = list(old)
+        items[first] = _changed(items[first], rest, value)
+        return items
+    if isinstance(old, dict):
+        return {**old, first: _changed(old.get(first), rest, value)}
+    raise ValueError(f"{first!r}: there is no table around it")

@@ -1,0 +1,134 @@
+"""A block that cannot be shared by replicas: one instance each, run as if they were one block.
+
+The engine asks the block itself, as the first replica has it, for everything but `run`: its clock,
+ports, requests, offers, width and grain. What stands in for it here has nothing else that could
+differ from it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.message import STATIC, Message, by_output
+from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.time.timeline import first_scan
+
+
+class NotInLockStep(Exception):
+    """These replicas cannot run in lock step; the message says why. They can run one by one."""
+
+
+class SplitBlock:
+    """One instance per replica, made when its replica begins and let go when it has ended.
+
+    Each instance sees only its own replica's rows, with its own ticks and scan numbers, as in a
+    run of its own. It is no block and has no face of its own: only `run` is called on it.
+
+    Parameters
+    ----------
+    outputs : sequence of str
+        Names of the block's outputs.
+    make : callable
+        Makes the instance of a replica.
+    finished : callable
+        Called with a replica's number and its instance when its last window is over.
+    """
+
+    def __init__(
+        self,
+        outputs: Sequence[str],
+        make: Callable[[int], Component],
+        finished: Callable[[int, Component], None],
+    ) -> None:
+        self._outputs = tuple(outputs)
+        self.make, self._finished = make, finished
+        self._instances: dict[int, Component] = {}
+
+    def run(self, wake: Wake) -> dict[str, Message] | None:
+        """Let every replica's instance handle its rows."""
+        replica = wake.replica
+        cuts = np.flatnonzero(replica[1:] != replica[:-1]) + 1
+        sent: dict[str, list[Message]] = {}
+        for first, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(wake)], strict=True):
+            number = int(replica[first])
+            if number not in self._instances:
+                self._let_go(number)
+                self._instances[number] = self.make(number)
+            result = self._instances[number].run(_part(wake, slice(first, end), number))
+            for port, message in by_output(result, self._outputs).items():
+                shift = number * wake.span_ticks
+                sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
+        return {port: _joined(parts) for port, parts in sent.items()} or None
+
+    def close(self) -> None:
+        """Let the last instances go."""
+        self._let_go(None)
+
+    def _let_go(self, before: int | None) -> None:
+        for number in sorted(self._instances):
+            if before is None or number < before:
+                self._finished(number, self._instances.pop(number))
+
+
+def _part(wake: Wake, rows: slice, number: int) -> Wake:
+    """Return the rows of one replica as its own run would see them."""
+    begin, scan = number * wake.span_ticks, first_scan(number)
+    ticks, scans = wake.ticks[rows] - begin, wake.scans[rows]
+    held = {}
+    for port, (message, place) in wake._held.items():
+        mine = place[rows]
+        there = mine[mine >= 0]
+        if len(there) == 0:
+            continue  # nothing has arrived in this replica yet
+        low = int(there.min())
+        part = message.take(slice(low, int(there.max()) + 1)).shifted(-begin, -scan)
+        held[port] = part, np.where(mine < 0, -1, mine - low)
+    arrived = {
+        port: [part for new in arrivals if (part := _arrivals(new, begin, scan, wake.span_ticks))]
+        for port, arrivals in wake._arrived.items()
+    }
+
+    def demand() -> dict[str, IntArray]:
+        return {block: _within(asked, rows) for block, asked in wake.demand.items()}
+
+    own = np.where(scans >= 0, scans - scan, -1)
+    return Wake(ticks, own, wake.ticks_per_s, held, arrived, demand)
+
+
+def _arrivals(new: Arrivals, begin: int, scan: int, span: int) -> Arrivals | None:
+    first, end = np.searchsorted(new.tick, [begin, begin + span]).tolist()
+    if first == end:
+        return None
+    message = new.message.take(slice(first, end)).shifted(-begin, -scan)
+    return Arrivals(new.source, new.tick[first:end] - begin, message)
+
+
+def _within(asked: IntArray, rows: slice) -> IntArray:
+    first, end = np.searchsorted(asked, [rows.start, rows.stop]).tolist()
+    return asked[first:end] - rows.start
+
+
+def _joined(parts: list[Message]) -> Message:
+    """Join messages of one port; what is the same for all rows must be the same for all parts."""
+    first = parts[0]
+    for item in fields(first):
+        if item.metadata.get("per") != STATIC or item.name in first.joins_static:
+            continue
+        value = getattr(first, item.name)
+        for part in parts[1:]:
+            other = getattr(part, item.name)
+            if other is not value and not _same(other, value):
+                raise NotInLockStep(f"{type(first).__name__}.{item.name} differs between replicas")
+    return type(first).concatenate(parts)
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other)
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    return bool(one == other)

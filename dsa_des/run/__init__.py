@@ -1,0 +1,1 @@
+"""One run of a scene: blocks as processes, wires as channels, time in windows."""

@@ -1,0 +1,168 @@
+"""The buffer at the receiving end of one wire.
+
+Rows are kept in order of arrival. A look-ahead sender may deposit rows long before they arrive; a
+reader only ever sees those that have arrived by the instant it asks about.
+"""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.message import Message
+from dsa_des.run.wire_faults import WireFaults
+from dsa_des.time.timeline import ReplicaTime
+
+
+class Channel:
+    """Rows on their way to one input.
+
+    Parameters
+    ----------
+    source : str
+        Name of the sending block.
+    delay_ticks : int
+        Time on the wire.
+    faults : WireFaults, optional
+        Loss and lateness of single rows; late rows may be overtaken.
+    replicas : ReplicaTime, optional
+        For replicas in lock step: no row arrives in another replica than its own.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        delay_ticks: int = 0,
+        faults: WireFaults | None = None,
+        replicas: ReplicaTime | None = None,
+    ) -> None:
+        self.source = source
+        self.delay_ticks = delay_ticks
+        self._faults = faults
+        self._replicas = replicas
+        self._waiting: deque[tuple[IntArray, Message]] = deque()
+        self._last: tuple[IntArray, Message] | None = None
+        #: First arrival of every message pushed since `state` or `set_state`.
+        self._pushed: list[int] | None = None
+
+    def hold(self, message: Message, tick: int) -> None:
+        """Make `message` the last arrived one, as if it had come at `tick`."""
+        self._last = (np.array([tick], dtype=np.int64), message)
+
+    def state(self) -> tuple[Any, Any]:
+        """Return what waits and what is held, for `set_state`; note pushes from now on."""
+        self._pushed = []
+        return tuple(self._waiting), self._last
+
+    def set_state(self, state: tuple[Any, Any]) -> None:
+        """Go back to a state that `state` gave."""
+        self._waiting, self._last = deque(state[0]), state[1]
+        self._pushed = []
+
+    def earliest_pushed(self) -> int | None:
+        """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
+        return min(self._pushed) if self._pushed else None
+
+    def push(self, message: Message, sent: int | None = None) -> IntArray:
+        """Deposit a message and return the ticks at which its rows arrive, in order.
+
+        Parameters
+        ----------
+        message : Message
+        sent : int, optional
+            The tick at which it was sent, when that is later than the rows' own.
+        """
+        ticks = message.tick if sent is None else np.full(len(message), sent, dtype=np.int64)
+        arrivals = ticks + self.delay_ticks if self.delay_ticks else ticks
+        if self._faults is not None:
+            kept = np.flatnonzero(self._faults.kept(message.tick))
+            arrivals = arrivals[kept] + self._faults.lateness(message.tick[kept])
+            order = np.argsort(arrivals, kind="stable")
+            arrivals, message = arrivals[order], message.take(kept[order])
+            if len(kept) == 0:
+                return arrivals
+        if self._replicas is not None and self.delay_ticks:
+            in_time = arrivals % self._replicas.span_ticks < self._replicas.end_tick
+            arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
+            if len(arrivals) == 0:
+                return arrivals
+        self._waiting.append((arrivals, message))
+        if self._pushed is not None:
+            self._pushed.append(int(arrivals[0]))
+        return arrivals
+
+    def forget(self, tick: int) -> None:
+        """Drop what a reader who only asks what is held, at `tick` or later, can never see.
+
+        A slow sensor behind a fast one would otherwise let a message wait for each window between
+        two of its scans.
+        """
+        if self._faults is None:
+            while len(self._waiting) > 1 and self._waiting[1][0][0] <= tick:
+                self._waiting.popleft()
+
+    def next_arrivals(self, end: int) -> IntArray:
+        """Return the ticks at which rows arrive before `end` that were not collected yet."""
+        ticks = [arrivals[: np.searchsorted(arrivals, end)] for arrivals, _ in self._waiting]
+        if self._faults is not None and ticks:
+            return sorted_union(ticks)  # late rows overtake and may coincide
+        return np.concatenate(ticks) if ticks else np.empty(0, dtype=np.int64)
+
+    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+        """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
+        taken: list[tuple[IntArray, Message]] = []
+        left: deque[tuple[IntArray, Message]] = deque()
+        while self._waiting:
+            arrivals, message = self._waiting.popleft()
+            count = len(arrivals) if arrivals[-1] < end else int(np.searchsorted(arrivals, end))
+            if count == len(arrivals):
+                taken.append((arrivals, message))
+                continue
+            if count:
+                taken.append((arrivals[:count], message.take(slice(0, count))))
+            left.append((arrivals[count:], message.take(slice(count, len(message)))))
+            if self._faults is None:
+                break  # rows behind these arrive later still
+        left.extend(self._waiting)
+        self._waiting = left
+        joined = _joined(taken)
+        if self._faults is not None and joined is not None and len(taken) > 1:
+            order = np.argsort(joined[0], kind="stable")
+            joined = joined[0][order], joined[1].take(order)
+        return joined
+
+    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return what the input holds at each of `ticks` (in order, all before `end`).
+
+        Returns
+        -------
+        (message, rows) or None
+            ``rows[i]`` is the row of `message` held at ``ticks[i]``; -1 when none has arrived.
+        """
+        new = self.collect(end)
+        last = self._last
+        if new is not None:
+            self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
+            if new[0][0] <= ticks[0]:
+                last = None  # superseded before the first instant asked about: spare the copy
+        held = _joined([part for part in (last, new) if part is not None])
+        if held is None:
+            return None
+        arrivals, message = held
+        rows = last_at_or_before(arrivals, ticks)
+        if self._replicas is not None:
+            span = self._replicas.span_ticks
+            rows[arrivals[rows] // span != ticks // span] = -1
+        return message, rows
+
+
+def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+    if not parts:
+        return None
+    if len(parts) == 1:
+        return parts[0]
+    arrivals = np.concatenate([part[0] for part in parts])
+    message = type(parts[0][1]).concatenate([part[1] for part in parts])
+    return arrivals, message

@@ -1,0 +1,126 @@
+"""From the wires of a scene to channels between its running blocks."""
+
+from collections.abc import Mapping
+
+from dsa_des.errors import Problem, SceneError
+from dsa_des.run.channel import Channel
+from dsa_des.run.node import Demand, Node
+from dsa_des.run.wire_faults import WireFaults
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
+from dsa_des.time.clock import MAX_TICK
+from dsa_des.time.randomness import Streams
+from dsa_des.time.timeline import ReplicaTime
+
+
+def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | None = None) -> None:
+    """Lay every wire, and tell each block whose scans its rows are for.
+
+    Parameters
+    ----------
+    scene : Scene
+    nodes : mapping
+        Running blocks by name.
+    replicas : ReplicaTime, optional
+        For replicas in lock step.
+
+    Raises
+    ------
+    SceneError
+        If a wire's delay or initial message makes no sense, or a block that runs on demand has
+        nobody to demand anything.
+    """
+    for wire in scene.wires:
+        delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
+        channel = Channel(wire.source, delay, _faults(scene, wire), replicas)
+        if isinstance(wire.holds, dict):
+            declared = nodes[wire.target].component.inputs[wire.input].message
+            try:
+                channel.hold(declared.initial(wire.holds), 0)
+            except (TypeError, ValueError) as error:
+                raise SceneError([_problem(scene, "wires", f"{wire}: holds: {error}")]) from error
+        target = nodes[wire.target]
+        target.channels.setdefault(wire.input, []).append(channel)
+        nodes[wire.source].subscribers.setdefault(wire.output, []).append(
+            (channel, target, wire.input)
+        )
+    for name, node in nodes.items():
+        node.demands = find_demands(nodes, name, replicas)
+        if node.on_demand and not node.demands:
+            message = "runs when blocks downstream scan, and none of them has a scan clock"
+            raise SceneError([_problem(scene, f"blocks.{name}", message)])
+
+
+def find_demands(
+    nodes: Mapping[str, Node], name: str, replicas: ReplicaTime | None = None
+) -> list[Demand]:
+    """Return the first clocked blocks on every way downstream, and the delay on the way."""
+    found: dict[tuple[str, int], Demand] = {}
+    seen = {(name, 0)}
+    todo = [(name, 0)]
+    while todo:
+        block, lead = todo.pop()
+        for channel, node, _ in (
+            item for items in nodes[block].subscribers.values() for item in items
+        ):
+            reached = (node.name, lead + channel.delay_ticks)
+            if node.clock is not None:
+                end_tick = node.simulation.end_tick
+                found[reached] = Demand(node.name, node.clock, reached[1], replicas, end_tick)
+            elif reached not in seen and len(seen) < 1000:
+                seen.add(reached)
+                todo.append(reached)
+    return [found[key] for key in sorted(found)]
+
+
+def check_reach(scene: Scene, nodes: Mapping[str, Node], end_tick: int) -> None:
+    """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
+    delays = sum(
+        channel.delay_ticks
+        for node in nodes.values()
+        for channels in node.channels.values()
+        for channel in channels
+    )
+    jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
+    if end_tick + delays + jitter >= MAX_TICK:
+        longest_s = MAX_TICK / scene.ticks_per_s
+        message = (
+            f"the run lasts {end_tick / scene.ticks_per_s:.4g} s and the wires take up to "
+            f"{(delays + jitter) / scene.ticks_per_s:.4g} s: this scene's ticks reach "
+            f"{longest_s:.4g} s"
+        )
+        raise SceneError([_problem(scene, "duration_s", message)])
+
+
+def _problem(scene: Scene, key: str, message: str) -> Problem:
+    return Problem(str(scene.path), key, message)
+
+
+def _faults(scene: Scene, wire: Wire) -> WireFaults | None:
+    if not wire.jitter_s and not wire.drop_probability:
+        return None
+    streams = Streams(scene.seed)
+    return WireFaults(
+        float(wire.jitter_s * scene.ticks_per_s),
+        wire.drop_probability,
+        streams.stream(str(wire), "wire jitter"),
+        streams.stream(str(wire), "wire loss"),
+    )
+
+
+def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
+    if not wire.delay_scans:
+        return 0
+    clock = nodes[wire.target].clock or nodes[wire.source].clock
+    if clock is None:
+        message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
+        raise SceneError([_problem(scene, "wires", message)])
+    # Rounded down: a message must not arrive a tick after the scan it was sent for.
+    delay = wire.delay_scans * int(clock.period)
+    if delay >= MAX_TICK:
+        message = (
+            f"{wire}: {wire.delay_scans} scans take longer than this scene's ticks reach, "
+            f"{MAX_TICK / scene.ticks_per_s:.4g} s"
+        )
+        raise SceneError([_problem(scene, "wires", message)])
+    return delay

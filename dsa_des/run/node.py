@@ -1,0 +1,341 @@
+"""Blocks as SimPy processes: when each wakes, what it reads, and where its messages go.
+
+Within an instant SimPy orders events by priority. Blocks in look-ahead windows come first, then
+the others by depth; ties within a depth go by name, or at random under ``shuffle_ties``.
+"""
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import simpy
+
+from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.message import Message, by_output
+from dsa_des.block.strangers import is_ours_to_obey
+from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.run.block_environment import BlockEnvironment
+from dsa_des.run.channel import Channel
+from dsa_des.run.events import Bell, WakeUp
+from dsa_des.run.processors import Processor
+from dsa_des.time.clock import MAX_TICK, ScanClock
+from dsa_des.time.timeline import ReplicaTime
+
+if TYPE_CHECKING:
+    from dsa_des.run.simulation import Simulation
+
+# SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
+WINDOW_PRIORITY = 1.0
+DEPTH_PRIORITY = 1000.0
+
+
+class Abort(Exception):
+    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
+
+    SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
+    original never travels through it.
+    """
+
+
+@dataclass
+class Demand:
+    """A clocked block downstream, and how long before its scan it needs our row."""
+
+    block: str
+    clock: ScanClock
+    lead_ticks: int = 0
+    replicas: ReplicaTime | None = None
+    end_tick: int = MAX_TICK
+
+    def between(self, start: int, end: int) -> IntArray:
+        """Return the ticks in [start, end) at which this block needs a row."""
+        if not self.lead_ticks:
+            return self.clock.between(start, end)[1]
+        # A row that would arrive after the end of the run is not needed.
+        last = min(end + self.lead_ticks, self.end_tick)
+        _, ticks = self.clock.between(start + self.lead_ticks, last)
+        if self.replicas is not None:  # rows from before a replica's start do not exist
+            ticks = ticks[ticks % self.replicas.span_ticks >= self.lead_ticks]
+        return ticks - self.lead_ticks
+
+
+@dataclass
+class Node:
+    """The runtime of one block.
+
+    Invariants: `run_at` is called with increasing ticks; at each of them every undelayed sender
+    has run; a channel's rows are collected by nobody else.
+    """
+
+    simulation: "Simulation"
+    component: Component
+    windowed: bool
+    priority: Callable[[], float]
+    clock: ScanClock | None = None
+    demands: list[Demand] = field(default_factory=list)
+    on_demand: bool = False
+    processor: Processor | None = None
+    channels: dict[str, list[Channel]] = field(default_factory=dict)
+    subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
+    cpu_s: float = 0.0
+    #: What handles the wakes: the block itself, or its instances, one per replica.
+    runner: Any = None
+
+    def __post_init__(self) -> None:
+        self.name = self.component.name
+        self.runner = self.component
+        self._scheduled: set[int] = set()
+        self._scan_at: dict[int, int] = {}
+        self._missed = False
+        self._bell = Bell(self.simulation.env)
+        inputs = self.component.inputs
+        self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
+        self._held_ports = [
+            port for port in inputs if inputs[port].mode != "queued" and not inputs[port].many
+        ]
+        self._queue_ports = [port for port in inputs if port not in self._held_ports]
+
+    # -- the life of the process ---------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the block's SimPy process."""
+        env = self.simulation.env
+        own = self.component.process
+        env.process(self._loop() if own is None else self._own_process(own))
+
+    def _loop(self) -> Generator[simpy.Event, None, None]:
+        while True:
+            yield self._bell
+            self._bell = Bell(self.simulation.env)
+            if self.windowed:
+                self._run_window(*self.simulation.window)
+            else:
+                self._run_at(int(self.simulation.env.now))
+
+    def _own_process(self, own: Any) -> Generator[simpy.Event, None, None]:
+        try:
+            env = BlockEnvironment(self)
+            yield env.timeout(0)  # start at its own place in the first instant
+            yield from own(env)
+        except Abort:
+            raise
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
+            self.simulation.fail(self, ticks, error)
+
+    def wake_at(self, tick: int) -> None:
+        """Let the block run at `tick` (once, however often it is asked)."""
+        if tick in self._scheduled:
+            return
+        self._scheduled.add(tick)
+        env = self.simulation.env
+        event = WakeUp(env, tick - int(env.now), self.priority())
+        event.callbacks.append(self._on_wake_up)
+
+    def _on_wake_up(self, event: simpy.Event) -> None:
+        self._scheduled.discard(int(self.simulation.env.now))
+        if self._bell.callbacks:
+            self._bell.ring()
+        else:
+            self._missed = True
+
+    def wait(self) -> Bell | WakeUp:
+        """Return the event of the next trigger arrival, for a block with its own process.
+
+        What arrived while the process was busy, and was not received yet, counts as arriving now.
+        """
+        if self._missed:
+            self._missed = False
+            return WakeUp(self.simulation.env, 0, self.priority())
+        if self._bell.callbacks is None:
+            self._bell = Bell(self.simulation.env)
+        return self._bell
+
+    # -- when ----------------------------------------------------------------------------------
+
+    def open_window(self, start: int, end: int) -> None:
+        """Schedule everything this block's clock asks for in [start, end)."""
+        if self.windowed:
+            self.wake_at(start)
+            return
+        if self.clock is not None:
+            scans, ticks = self.clock.between(start, end)
+            self._scan_at = dict(zip(ticks.tolist(), scans.tolist(), strict=True))
+            for tick in self._scan_at:
+                self.wake_at(tick)
+        elif self.on_demand:
+            for tick in self._demanded(start, end).tolist():
+                self.wake_at(tick)
+
+    def _demanded(self, start: int, end: int) -> IntArray:
+        ticks = [demand.between(start, end) for demand in self.demands]
+        if len(ticks) == 1:
+            return ticks[0]
+        return sorted_union(ticks) if ticks else np.empty(0, dtype=np.int64)
+
+    # -- what ----------------------------------------------------------------------------------
+
+    def _run_at(self, tick: int) -> None:
+        if self.processor is not None and self.processor.refuses(self.name):
+            return
+        scan = self._scan_at.get(tick, -1)
+        ticks = np.array([tick], dtype=np.int64)
+        self._run(ticks, np.array([scan], dtype=np.int64), tick, tick + 1)
+
+    def _run_window(self, start: int, end: int) -> None:
+        if self.clock is not None:
+            scans, ticks = self.clock.between(start, end)
+        else:
+            ticks = self._demanded(start, end) if self.on_demand else np.empty(0, np.int64)
+            scans = np.full(len(ticks), -1, dtype=np.int64)
+        arrivals = [
+            channel.next_arrivals(end)
+            for port in self._trigger_ports
+            for channel in self.channels.get(port, [])
+        ]
+        arrivals = [new for new in arrivals if len(new)]
+        if arrivals:
+            own = ticks
+            if len(own) == 0 and len(arrivals) == 1:
+                ticks = arrivals[0]
+            else:
+                ticks = sorted_union([own, *arrivals])
+            if len(own):
+                place = np.searchsorted(ticks, own)
+                numbered = np.full(len(ticks), -1, dtype=np.int64)
+                numbered[place] = scans
+                scans = numbered
+            else:
+                scans = np.full(len(ticks), -1, dtype=np.int64)
+        if len(ticks):
+            self._run(ticks, scans, start, end)
+
+    def _run(self, ticks: IntArray, scans: IntArray, start: int, end: int) -> None:
+        held: dict[str, tuple[Message, IntArray]] = {}
+        missing = np.zeros(len(ticks), dtype=bool)
+        for port in self._held_ports:
+            for channel in self.channels.get(port, []):
+                sample = channel.sample(ticks, end)
+                if sample is not None:
+                    held[port] = sample
+                if self.component.inputs[port].required:
+                    missing |= True if sample is None else sample[1] < 0
+        if missing.any():  # before the first messages
+            there = np.flatnonzero(~missing)
+            if len(there) == 0:
+                return
+            ticks, scans = ticks[there], scans[there]
+            held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
+        arrived = {port: self._collect(port, end) for port in self._queue_ports}
+        wake = Wake(
+            ticks,
+            scans,
+            self.simulation.ticks_per_s,
+            held,
+            arrived,
+            partial(self._rows_asked_for, ticks),
+            self.simulation.span_ticks,
+        )
+        if self.simulation.trace is not None:
+            self.simulation.trace += [(int(tick), self.name) for tick in ticks]
+        try:
+            self.send(self.runner.run(wake), ticks)
+        except Abort:
+            raise
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            self.simulation.fail(self, ticks, error, int(scans[0]))
+
+    def _collect(self, port: str, end: int) -> list[Arrivals]:
+        found = []
+        for channel in self.channels.get(port, []):
+            new = channel.collect(end)
+            if new is not None:
+                found.append(Arrivals(channel.source, *new))
+        return found
+
+    def _rows_asked_for(self, ticks: IntArray) -> Mapping[str, IntArray]:
+        if not self.demands or self.clock is not None:
+            return {}
+        start, end = int(ticks[0]), int(ticks[-1]) + 1
+        rows = {}
+        for demand in self.demands:
+            asked = demand.between(start, end)
+            place = last_at_or_before(ticks, asked)
+            here = ticks[np.maximum(place, 0)] == asked
+            rows[demand.block] = place if bool(here.all()) else place[here]
+        return rows
+
+    def receive(self) -> Wake:
+        """Return the inputs as they are now, for a block with its own process."""
+        self._missed = False
+        tick = int(self.simulation.env.now)
+        ticks = np.array([tick], dtype=np.int64)
+        held = {}
+        for port in self._held_ports:
+            for channel in self.channels.get(port, []):
+                sample = channel.sample(ticks, tick + 1)
+                if sample is not None:
+                    held[port] = sample
+        arrived = {port: self._collect(port, tick + 1) for port in self._queue_ports}
+        scans = np.array([-1], dtype=np.int64)
+        return Wake(ticks, scans, self.simulation.ticks_per_s, held, arrived)
+
+    # -- sending -------------------------------------------------------------------------------
+
+    def send(self, result: Any, ticks: IntArray) -> None:
+        """Send what a block returned when it ran at `ticks`: a message, or messages by output."""
+        outputs = self.component.outputs
+        for port, message in by_output(result, tuple(outputs)).items():
+            declared = outputs.get(port)
+            if declared is None:
+                raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
+            if not isinstance(message, declared.message):
+                raise TypeError(
+                    f"output {port!r} is declared to send {declared.message.__name__}, "
+                    f"not {type(message).__name__}"
+                )
+            if len(message) == 0:
+                continue
+            _check_ticks(port, message.tick, ticks)
+            if self.simulation.recorder is not None:
+                self.simulation.recorder.record(self.name, message)
+            if self.processor is None:
+                self._deliver(port, message)
+            else:
+                self.processor.submit(self.name, partial(self._deliver, port, message))
+
+    def _deliver(self, port: str, message: Message, sent: int | None = None) -> None:
+        for channel, node, target_port in self.subscribers.get(port, []):
+            arrivals = channel.push(message, sent)
+            if node.component.inputs[target_port].mode == "sampled":
+                channel.forget(self.simulation.window[0])
+            if not node.windowed and target_port in node._trigger_ports:
+                for arrival in arrivals.tolist():
+                    node.wake_at(arrival)
+
+
+def _check_ticks(port: str, sent: IntArray, ran: IntArray) -> None:
+    """Refuse rows that are not of instants at which the block ran, in order.
+
+    What a row is dated with is when it was made: that decides when it arrives, and where it stands
+    in the recording.
+    """
+    if sent is ran:
+        return
+    if sent.dtype == np.int64:
+        place = last_at_or_before(ran, sent)
+        if place[0] >= 0 and bool((ran[place] == sent).all() and (place[1:] >= place[:-1]).all()):
+            return
+    raise ValueError(
+        f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "
+        f"they must be int64 and lie in the instants it ran at, in order: those of the wake "
+        f"[{ran[0]} ... {ran[-1]}], also where an input speaks of an earlier one"
+    )

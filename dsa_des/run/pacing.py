@@ -1,0 +1,100 @@
+"""Pacing of a run: simulated time goes by as fast as the clock on the wall, times a factor.
+
+A pacer only waits between look-ahead windows; it changes when results come, never what they are.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dsa_des.errors import UsageError
+from dsa_des.text.safe_text import shortened
+
+#: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
+LONGEST_WAIT_S = 0.1
+#: Systems refuse to sleep for centuries, s.
+LONGEST_SLEEP_S = 3600.0
+_SLOWEST, _FASTEST = 1e-6, 1e12
+
+
+def parse_factor(text: str) -> float:
+    """Return the factor of ``--realtime``.
+
+    Raises
+    ------
+    UsageError
+        If it is not a finite number above 0.
+    """
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not _SLOWEST <= factor <= _FASTEST:
+        raise UsageError(
+            f"--realtime {shortened(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
+            f"{_FASTEST:g}: simulated seconds per second, 1 for the speed of the clock"
+        )
+    return factor
+
+
+@dataclass
+class Pacer:
+    """Waits until the wall clock has come as far as the simulation, and notes when it is behind.
+
+    Parameters
+    ----------
+    factor : float
+        Simulated seconds per second.
+    now, sleep : callable
+        The clock, s, and what waits for so many seconds.
+    """
+
+    factor: float
+    now: Callable[[], float] = time.perf_counter
+    sleep: Callable[[float], None] = time.sleep
+    windows: int = 0
+    max_lag_s: float = 0.0
+    total_lag_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._started = self.now()
+
+    @property
+    def longest_window_s(self) -> float:
+        """Simulated time that a window may hold, s."""
+        return LONGEST_WAIT_S * self.factor
+
+    def start(self) -> None:
+        """Let simulated time 0 be now."""
+        self._started = self.now()
+
+    def __call__(self, time_s: float) -> None:
+        """Wait for the instant up to which the simulation has come."""
+        due = self._started + time_s / self.factor
+        while (ahead_s := due - self.now()) > 0.0:
+            self.sleep(min(ahead_s, LONGEST_SLEEP_S))
+        # Waking up late counts as well: whoever waits for the results waits for that too.
+        lag_s = max(0.0, self.now() - due)
+        self.windows += 1
+        self.max_lag_s = max(self.max_lag_s, lag_s)
+        self.total_lag_s += lag_s
+
+    def report(self) -> dict[str, float]:
+        """Return the factor and by how much windows ended late, wall seconds."""
+        mean_lag_s = self.total_lag_s / self.windows if self.windows else 0.0
+        return {
+            "factor": self.factor,
+            "windows": self.windows,
+            "max_lag_s": self.max_lag_s,
+            "mean_lag_s": mean_lag_s,
+        }
+
+    def sentence(self) -> str:
+        """Return the report for the terminal."""
+        said = self.report()
+        return (
+            f"paced at {self.factor:g} x wall clock: behind by at most "
+            f"{1000 * said['max_lag_s']:.1f} ms, {1000 * said['mean_lag_s']:.1f} ms on average, "
+            f"over {self.windows} windows"
+        )

@@ -1,0 +1,56 @@
+"""Plug-ins that summarise, print and draw a run; the engine itself knows no sensor.
+
+They are found by the entry-point group ``dsa_des.reports``; each is a class with the methods of
+`Report`, called without arguments.
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import installed
+from dsa_des.record.attempts import attempt
+from dsa_des.record.recording import Observer
+
+if TYPE_CHECKING:
+    from dsa_des.run.simulation import Simulation
+
+REPORTS = "dsa_des.reports"
+
+
+class Report(Protocol):
+    """What a report plug-in can do."""
+
+    def observers(self, simulation: "Simulation") -> list[Observer]:
+        """Return running summaries over the recorded rows of this run."""
+
+    def show(self, console: Any, summary: dict[str, Any]) -> None:
+        """Print the summary on a ``rich.console.Console`` that reads no markup."""
+
+    def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what changed from one run's recorded tables to another's."""
+
+    def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
+        """Draw figures from the Parquet tables in `folder` into it and return their paths.
+
+        The run is complete when this is called, and may be large: tables are read in pieces.
+        """
+
+
+def load_reports() -> list[Report]:
+    """Return one instance of every registered report, in the order of their names."""
+    return [installed(point)() for point in registered(REPORTS).values()]
+
+
+def draw_all(
+    reports: Iterable[Report], simulation: "Simulation", folder: Path, summary: dict[str, Any]
+) -> list[str]:
+    """Let every report draw its figures of a finished run, and return what went wrong.
+
+    A figure that fails takes nothing with it: the run is complete without.
+    """
+    notes: list[str] = []
+    for report in reports:
+        attempt("drawing", notes, report.draw, simulation, folder, summary)
+    return notes

@@ -1,0 +1,36 @@
+"""Wires that are not perfect: messages that come late, or not at all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.time.randomness import Stream
+
+
+@dataclass(frozen=True)
+class WireFaults:
+    """Keyed faults of one wire; a row's fate depends on the wire and on its instant only.
+
+    Parameters
+    ----------
+    jitter_ticks : float
+        Largest extra delay; each row takes a uniformly drawn part of it.
+    drop_probability : float
+    jitter, drops : Stream
+        Draws named after the wire.
+    """
+
+    jitter_ticks: float
+    drop_probability: float
+    jitter: Stream
+    drops: Stream
+
+    def kept(self, ticks: IntArray) -> BoolArray:
+        """Return which rows sent at `ticks` are not lost."""
+        return self.drops.uniform(ticks.astype(np.uint64), 0) >= self.drop_probability
+
+    def lateness(self, ticks: IntArray) -> IntArray:
+        """Return the extra delay of the rows sent at `ticks`, in ticks."""
+        draws = self.jitter.uniform(ticks.astype(np.uint64), 0)
+        return np.rint(draws * self.jitter_ticks).astype(np.int64)

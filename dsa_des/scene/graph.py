@@ -1,0 +1,170 @@
+"""The graph of a scene: its checks, and the order in which blocks run within an instant.
+
+Depth is the longest path to a block over undelayed wires; within a depth, blocks run in the order
+of their names. (A topological sort would do as well, but which of the many it gives depends on
+the order in the file.)
+"""
+
+from collections.abc import Collection, Mapping, Sequence, Set
+
+import networkx as nx
+
+from dsa_des.block.component import Component
+from dsa_des.errors import Problem
+from dsa_des.scene.scene_file import SceneFile
+from dsa_des.scene.wiring import Wire
+
+
+def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
+    """Return the graph of the blocks; an edge holds its wires as ``wires``.
+
+    An edge is ``delayed`` when all of its wires are.
+    """
+    graph = nx.DiGraph()
+    graph.add_nodes_from(sorted(blocks))
+    for wire in wires:
+        if not graph.has_edge(wire.source, wire.target):
+            graph.add_edge(wire.source, wire.target, wires=[], delayed=True)
+        edge = graph.edges[wire.source, wire.target]
+        edge["wires"].append(wire)
+        edge["delayed"] = edge["delayed"] and wire.delayed
+    return graph
+
+
+def undelayed(graph: nx.DiGraph) -> nx.DiGraph:
+    """Return the view of the graph over the edges that act within an instant."""
+    return nx.subgraph_view(graph, filter_edge=lambda a, b: not graph.edges[a, b]["delayed"])
+
+
+def check_graph(
+    scene: SceneFile,
+    graph: nx.DiGraph,
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+    unsure: Set[str] = frozenset(),
+) -> None:
+    """Add everything that is wrong with the wiring to `problems`.
+
+    Required inputs without a wire, blocks that no source reaches, cycles without a delay (each
+    hop listed), and feedback wires that do not say what they hold before the first message.
+    Blocks in `unsure`, which a faulty wire meant to feed, are not blamed for missing it.
+    """
+    known = {name for name, cls in classes.items() if cls is not None}
+    fed = {(wire.target, wire.input) for _, _, wires in graph.edges(data="wires") for wire in wires}
+    for name in sorted(known):
+        for port, declared in sorted(classes[name].inputs.items()):
+            if declared.required and (name, port) not in fed and name not in unsure:
+                message = (
+                    f"input {port!r} ({declared.message.__name__}) is required and has no wire"
+                )
+                problems.append(scene.problem(("blocks", name), message))
+    _check_cycles(scene, graph, problems)
+    if known == set(classes) and not unsure:
+        _check_reach(scene, graph, classes, problems)
+
+
+def _check_cycles(scene: SceneFile, graph: nx.DiGraph, problems: list[Problem]) -> None:
+    now = undelayed(graph)
+    for group in nx.strongly_connected_components(now):
+        first = min(group)
+        if len(group) == 1 and not now.has_edge(first, first):
+            continue
+        cycle = nx.find_cycle(now.subgraph(group), first)
+        hops = [
+            next(str(wire) for wire in graph.edges[a, b]["wires"] if not wire.delayed)
+            for a, b in cycle
+        ]
+        message = (
+            f"a cycle without delay: {'; '.join(hops)}. Give one of these wires a delay "
+            '(delay_s, or delay = "1 scan")'
+        )
+        problems.append(scene.problem(("wires",), message))
+    looped = in_cycles(graph)
+    for source, target, wires in graph.edges(data="wires"):
+        if source in looped and target in looped and looped[source] == looped[target]:
+            for wire in wires:
+                if wire.delayed and wire.holds is None:
+                    message = (
+                        f"{wire} is a feedback wire: say what it holds before the first "
+                        "message (holds = 'nothing' or a table)"
+                    )
+                    problems.append(scene.problem(("wires",), message))
+
+
+def _check_reach(
+    scene: SceneFile,
+    graph: nx.DiGraph,
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+) -> None:
+    sources = [
+        name for name in graph if not any(port.required for port in classes[name].inputs.values())
+    ]
+    if not sources and len(graph):
+        message = "no block is a source (has no required inputs)"
+        problems.append(scene.problem(("blocks",), message))
+        return
+    reached = set(sources).union(*(nx.descendants(graph, name) for name in sources))
+    for name in sorted(set(graph) - reached):
+        message = "no source reaches this block over the wires; wire it or remove it"
+        problems.append(scene.problem(("blocks", name), message))
+    if len(graph) > 1:
+        for name in sources:
+            if graph.out_degree(name) == 0:
+                message = "this source is wired to nothing; wire it or remove it"
+                problems.append(scene.problem(("blocks", name), message))
+
+
+def in_cycles(graph: nx.DiGraph) -> dict[str, int]:
+    """Return, for each block in a feedback loop, the number of its loop."""
+    looped: dict[str, int] = {}
+    for number, group in enumerate(nx.strongly_connected_components(graph)):
+        first = next(iter(group))
+        if len(group) > 1 or graph.has_edge(first, first):
+            looped.update(dict.fromkeys(group, number))
+    return looped
+
+
+def depths(graph: nx.DiGraph) -> dict[str, int]:
+    """Return the depth of each block: the longest path to it over undelayed edges."""
+    now = undelayed(graph)
+    depth: dict[str, int] = {}
+    for name in nx.topological_sort(now):
+        depth[name] = max((depth[before] + 1 for before in now.predecessors(name)), default=0)
+    return depth
+
+
+def windowed_blocks(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: Collection[str] = ()
+) -> set[str]:
+    """Return the blocks that may run in look-ahead windows.
+
+    A block runs at the widest grain that it and everything upstream allow: it must declare
+    itself windowed, have no process of its own, queue for no shared processor (`queued`), be in
+    no feedback loop, and be fed by windowed blocks only.
+    """
+    looped = in_cycles(graph)
+    acyclic = graph.subgraph(name for name in graph if name not in looped)
+    windowed: set[str] = set()
+    for name in nx.topological_sort(acyclic):
+        cls = classes[name]
+        alone = cls.process is None and name not in queued
+        if cls.windowed and alone and windowed.issuperset(graph.predecessors(name)):
+            windowed.add(name)
+    return windowed
+
+
+def window_order(
+    graph: nx.DiGraph, windowed: set[str], cut: Collection[tuple[str, str]] = ()
+) -> dict[str, int]:
+    """Return the depth of windowed blocks over all their edges, delayed ones included.
+
+    A window is handled block by block, so a sender must be done with it before its receiver
+    starts, whatever the delay between them; over the edges in `cut` it need not be.
+    """
+    part = nx.DiGraph(graph.subgraph(windowed))
+    part.remove_edges_from(cut)
+    depth: dict[str, int] = {}
+    for name in nx.topological_sort(part):
+        depth[name] = max((depth[before] + 1 for before in part.predecessors(name)), default=0)
+    return depth

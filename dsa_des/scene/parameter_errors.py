@@ -1,0 +1,155 @@
+"""What pydantic found wrong with a table, said in a scene's own words."""
+
+import re
+import typing
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsa_des.block.component import Parameters, as_written
+from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.scene.scene_file import Key, SceneFile
+
+
+def explain(
+    scene_file: SceneFile, key: Key, what: str, model: Any, error: ValidationError
+) -> list[Problem]:
+    """Return what is wrong with a table, one problem per key, with the nearest valid name.
+
+    Parameters
+    ----------
+    scene_file : SceneFile
+    key : tuple
+        Where the table stands in the scene.
+    what : str
+        What it describes, for example a block type.
+    model : type of Parameters
+    error : ValidationError
+    """
+    problems = []
+    for item in error.errors(include_url=False):
+        at = _existing_path(scene_file, key, item["loc"])
+        if item["type"] == "extra_forbidden":
+            allowed = _sibling_names(model, item["loc"])
+            hint = did_you_mean(str(item["loc"][-1]), allowed)
+            problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
+        elif length := _list_length(model, item):
+            given = _at(scene_file, at)
+            problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
+        elif item["type"].startswith("union_tag"):
+            problems.append(_wrong_kind(scene_file, at, item["ctx"]))
+        elif item["type"] == "missing":
+            given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
+            close = nearest(str(item["loc"][-1]), given)
+            hint = f" ({close!r} is given)" if close else ""
+            problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
+        else:
+            message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+            message = message.replace("Input should be", "must be", 1)
+            message = message.replace(
+                "a valid number, unable to parse string as a number", "a number"
+            )
+            message = message.replace("a valid boolean, unable to interpret input", "true or false")
+            message = re.sub(r"a valid dictionary.*", "a table", message)
+            message = message.replace("a valid list", "a list")
+            if item["type"] == "literal_error":
+                names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
+                close = nearest(str(item["input"]), names)
+                message += f"; did you mean {close!r}?" if close else ""
+            problems.append(_refused(scene_file, at, message, item["input"]))
+    return problems
+
+
+def _refused(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:
+    """Return what a validator said; that of a whole table is put at the key it speaks of."""
+    if not isinstance(value, Mapping):
+        return scene_file.problem(at, message, _shown(value))
+    about = re.fullmatch(r"(\w+) is (\S+): (.*)", message, re.DOTALL)
+    if about and about[1] in value:
+        return scene_file.problem((*at, about[1]), about[3], _shown(value[about[1]]))
+    return scene_file.problem(at, message)
+
+
+def _wrong_kind(scene_file: SceneFile, at: Key, context: Any) -> Problem:
+    """Return what is wrong with the key that says which of several tables this is."""
+    at = (*at, context["discriminator"].strip("'"))
+    if "tag" not in context:
+        return scene_file.problem(at, "is required and missing")
+    allowed = re.findall(r"'([^']*)'", context["expected_tags"])
+    close = nearest(context["tag"], allowed)
+    hint = f"; did you mean {close!r}?" if close else ""
+    return scene_file.problem(at, f"must be one of {', '.join(allowed)}{hint}", context["tag"])
+
+
+def _list_length(model: Any, item: Any) -> int:
+    """Return how long a list should have been, if that is what is wrong; else 0."""
+    if item["type"] not in ("tuple_type", "missing", "too_long"):
+        return 0
+    *path, last = item["loc"]
+    if isinstance(last, str):
+        path.append(last)
+    elif item["type"] != "missing":
+        return 0
+    for name in path:
+        found = model.model_fields.get(name) if isinstance(name, str) else None
+        if found is None:
+            continue
+        annotation = found.annotation
+        if typing.get_origin(annotation) is tuple and name == path[-1]:
+            return len(typing.get_args(annotation))
+        model = _nested_model(annotation) or model
+    return 0
+
+
+def _at(scene_file: SceneFile, key: Key) -> Any:
+    value: Any = scene_file.data
+    for part in key:
+        value = value[part]
+    return _shown(value)
+
+
+def _shown(value: Any) -> Any:
+    if isinstance(value, Fraction):
+        return as_written(value)
+    return str(value) if isinstance(value, str) else value
+
+
+def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
+    """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
+    value = _at(scene_file, key)
+    path: list[str | int] = list(key)
+    for position, part in enumerate(loc):
+        found = (isinstance(value, Mapping) and part in value) or (
+            isinstance(value, list) and isinstance(part, int) and part < len(value)
+        )
+        if found:
+            value = value[part]
+        elif position < len(loc) - 1 or not isinstance(value, Mapping):
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
+    """Return the names allowed where `loc` points, following nested models as far as they go."""
+    names = list(model.model_fields)
+    for part in loc[:-1]:
+        found = model.model_fields.get(part) if isinstance(part, str) else None
+        if found is not None:
+            nested = _nested_model(found.annotation)
+            if nested is None:
+                return []
+            model, names = nested, list(nested.model_fields)
+    return names
+
+
+def _nested_model(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, Parameters):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        nested = _nested_model(argument)
+        if nested is not None:
+            return nested
+    return None

@@ -1,0 +1,202 @@
+"""Reading scene files: TOML, ``extends`` in any table, and where each key was written.
+
+A table may say ``extends = "other.toml"`` (or a list of files): the keys of those files come
+first and its own keys override them, table by table. Paths are taken from the folder of the file
+that holds them.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dsa_des.block.component import SourcedText
+from dsa_des.errors import Problem, SceneError
+from dsa_des.files.input_files import (
+    LARGEST_TOML_BYTES,
+    InputFileError,
+    NoSuchFile,
+    is_folder,
+    is_regular_file,
+    read_input_text,
+)
+from dsa_des.files.toml_input import DEEPEST, TomlError, parse_toml
+from dsa_des.text.safe_text import shortened
+
+Key = tuple[str | int, ...]
+COMMAND_LINE = "command line"
+# Files that extend each other in a row; scenes have about four.
+_LONGEST_CHAIN = 32
+# Values taken from files, counted each time that a file is extended: files that extend the next
+# one twice would double them at every step.
+_MOST_VALUES = 20_000_000
+# What a file counts for, however short it is.
+_VALUES_PER_FILE = 20
+
+
+def dotted(key: Key) -> str:
+    """Return ``blocks.traffic.intruders[1].name`` for a key path."""
+    text = ""
+    for part in key:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+@dataclass
+class SceneFile:
+    """The merged tables of a scene and where each key came from.
+
+    Parameters
+    ----------
+    path : Path
+    data : dict
+        Merged tables; every text is a `SourcedText`.
+    sources : dict
+        For each key path that was written, the file (or ``command line``).
+    """
+
+    path: Path
+    data: dict[str, Any]
+    sources: dict[Key, str] = field(default_factory=dict)
+
+    def source_of(self, key: Key) -> str:
+        """Return the file in which `key`, or the nearest table around it, was written."""
+        for length in range(len(key), -1, -1):
+            if key[:length] in self.sources:
+                return self.sources[key[:length]]
+        return str(self.path)
+
+    def problem(self, key: Key, message: str, *value: Any) -> Problem:
+        """Return a `Problem` at `key`, naming the file that holds it."""
+        return Problem(self.source_of(key), dotted(key), message, *value)
+
+
+def read_scene_file(path: Path | str) -> SceneFile:
+    """Read a scene with everything it extends.
+
+    Raises
+    ------
+    SceneError
+        If a file is missing, is not TOML, or extends itself.
+    """
+    path = Path(path)
+    problems: list[Problem] = []
+    reader = _Reader(problems)
+    data = reader.file(path, (), ())
+    if problems:
+        raise SceneError(problems)
+    return SceneFile(path, data, reader.sources)
+
+
+class _Reader:
+    def __init__(self, problems: list[Problem]) -> None:
+        self.problems = problems
+        self.sources: dict[Key, str] = {}
+        #: What was read of each file: its real path, and its tables or what is wrong with it.
+        self._read: dict[Path, tuple[Path, dict[str, Any] | Exception]] = {}
+        self._taken = 0
+
+    def file(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
+        self._count(path, _VALUES_PER_FILE)
+        if path not in self._read:
+            self._read[path] = _tables_of(path)
+        real, tables = self._read[path]
+        if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
+            self.sources[at] = str(path)
+            return self._table(tables, path, at, (*chain, real))
+        if isinstance(tables, TomlError):
+            self.problems.append(Problem(str(path), "", str(tables)))
+            return {}
+        name = shortened(str(path), 300)
+        if real in chain:
+            message = f"extends itself by way of {name}"
+        elif isinstance(tables, dict):
+            message = f"is the {_LONGEST_CHAIN + 1}th file in a row that extends the next one: "
+            message += f"at most {_LONGEST_CHAIN} are read"
+        elif isinstance(tables, NoSuchFile):
+            what = f"there is no file {name}" if chain else "there is no such file"
+            message = what + _similar_file(path)
+        elif is_folder(path):
+            message = f"{name} is a folder; a TOML file is needed"
+        else:
+            message = f"{name} {tables}"
+        if at or chain:
+            source, key = self.sources.get(at, str(chain[-1])), dotted((*at, "extends"))
+            self.problems.append(Problem(source, key, message))
+        else:
+            self.problems.append(Problem(str(path), "", message))
+        return {}
+
+    def _count(self, path: Path, values: int = 1) -> None:
+        self._taken += values
+        if self._taken > _MOST_VALUES:
+            message = f"with all that it extends, has more than {_MOST_VALUES:,} values"
+            raise SceneError([Problem(str(path), "", message)])
+
+    def _table(
+        self, table: Mapping[str, Any], path: Path, at: Key, chain: tuple[Path, ...]
+    ) -> dict[str, Any]:
+        if len(at) > DEEPEST:
+            message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
+            self.problems.append(Problem(str(path), dotted(at), message))
+            return {}
+        merged: dict[str, Any] = {}
+        bases = table.get("extends", [])
+        for base in bases if isinstance(bases, list) else [bases]:
+            if not isinstance(base, str):
+                self.problems.append(
+                    Problem(str(path), dotted((*at, "extends")), "must be a file name", base)
+                )
+                continue
+            self.sources.setdefault(at, str(path))
+            base_source = self.sources[at]
+            merge(merged, self.file(path.parent / base, at, chain))
+            self.sources[at] = base_source
+        own = {
+            key: self._value(value, path, (*at, key), chain)
+            for key, value in table.items()
+            if key != "extends"
+        }
+        return merge(merged, own)
+
+    def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
+        self._count(path)
+        self.sources[at] = str(path)
+        if isinstance(value, dict):
+            return self._table(value, path, at, chain)
+        if isinstance(value, list):
+            return [self._value(item, path, (*at, i), chain) for i, item in enumerate(value)]
+        if isinstance(value, str):
+            return SourcedText.of(value, path.parent)
+        return value
+
+
+def _tables_of(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
+    """Return the real path of a file, and its tables or why it has none."""
+    try:
+        text = read_input_text(path, LARGEST_TOML_BYTES)
+        return Path(os.path.realpath(path)), parse_toml(text)
+    except (InputFileError, TomlError) as error:
+        return path, error
+
+
+def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Put the keys of `over` into `base`, table by table, and return `base`."""
+    for key, value in over.items():
+        if isinstance(value, dict) and isinstance(base.get(key), dict):
+            merge(base[key], value)
+        else:
+            base[key] = value
+    return base
+
+
+def _similar_file(path: Path) -> str:
+    from dsa_des.errors import nearest
+
+    try:
+        names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
+    except OSError:
+        return f" (there is no folder {shortened(str(path.parent), 300)})"
+    close = nearest(path.name, names)
+    return f"; did you mean {path.parent / close}?" if close else ""

@@ -1,0 +1,248 @@
+"""Reading the ``wires`` of a scene: ``"gate -> radar"`` or a table with a delay.
+
+A wire names blocks, and ports where a block has several that fit::
+
+    wires = [
+      "traffic -> transform -> gate",
+      "gate.targets -> radar.targets",
+      {from = "tracker.cue", to = "radar.cue", delay = "1 scan", holds = "nothing"},
+    ]
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from dsa_des.block.component import Component
+from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.scene.scene_file import Key, SceneFile
+from dsa_des.time.clock import parse_rational
+
+_END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
+_SCANS = re.compile(r"([0-9]+) scans?")
+_MOST_SCANS = 1_000_000
+_KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "holds")
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One connection between an output and an input.
+
+    Parameters
+    ----------
+    source, output, target, input : str
+        Block and port names.
+    delay_s : Fraction
+        Time on the wire; 0 for the same instant.
+    delay_scans : int
+        Delay counted in scans of the receiving block's clock (of the sender's when it has none).
+    holds : None, "nothing" or mapping
+        What the input holds before the first message; required of a feedback wire.
+    jitter_s : Fraction
+        Largest extra delay; each message takes a uniformly drawn part of it.
+    drop_probability : float
+        Share of the messages that are lost.
+    latency_s : Fraction
+        Processing time of the sending block, given in its table.
+    queued : bool
+        Whether the sending block's messages go through a shared processor.
+    """
+
+    source: str
+    output: str
+    target: str
+    input: str
+    delay_s: Fraction = Fraction(0)
+    delay_scans: int = 0
+    holds: Any = None
+    jitter_s: Fraction = Fraction(0)
+    drop_probability: float = 0.0
+    latency_s: Fraction = Fraction(0)
+    queued: bool = False
+
+    @property
+    def delayed(self) -> bool:
+        """Whether messages surely arrive later than they were made."""
+        return self.total_delay_s > 0 or self.delay_scans > 0 or self.queued
+
+    @property
+    def total_delay_s(self) -> Fraction:
+        """Time on the wire and, before it, in the sending block."""
+        # Studies ask this of every wire of every replica, and sums of fractions are slow.
+        return self.delay_s + self.latency_s if self.latency_s else self.delay_s
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.output} -> {self.target}.{self.input}"
+
+
+def read_wires(
+    scene: SceneFile,
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+    unsure: set[str] | None = None,
+) -> list[Wire]:
+    """Return the wires of a scene, sorted; what is wrong is added to `problems`.
+
+    Parameters
+    ----------
+    scene : SceneFile
+    classes : mapping
+        The class of each block; blocks whose type is unknown map to None and their wires are
+        not judged.
+    problems : list of Problem
+    unsure : set of str, optional
+        Receives the blocks that a faulty wire meant to feed.
+    """
+    entries = scene.data.get("wires", [])
+    if not isinstance(entries, list):
+        problems.append(scene.problem(("wires",), "must be a list of wires", entries))
+        return []
+    wires: list[Wire] = []
+    for position, entry in enumerate(entries):
+        key: Key = ("wires", position)
+        try:
+            hops = _hops(entry)
+        except _WireError as error:
+            problems.append(scene.problem(key, str(error), *error.value))
+            if unsure is not None:
+                unsure.update(classes)  # whom it meant to feed cannot be told
+            continue
+        for source, target, options in hops:
+            try:
+                wire = _connect(source, target, options, classes)
+            except _WireError as error:
+                problem = scene.problem(key, str(error), *error.value)
+                if problem not in problems:
+                    problems.append(problem)
+                wire = None
+            if wire is not None:
+                wires.append(wire)
+            elif unsure is not None:
+                name = target.partition(".")[0]
+                unsure.add(name if name in classes else nearest(name, classes) or name)
+    _two_writers(scene, wires, classes, problems)
+    return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
+
+
+class _WireError(Exception):
+    def __init__(self, message: str, *value: Any) -> None:
+        self.value = value
+        super().__init__(message)
+
+
+def _hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
+    if isinstance(entry, str):
+        ends = [end.strip() for end in entry.split("->")]
+        if len(ends) < 2 or not all(_END.fullmatch(end) for end in ends):
+            raise _WireError('must read "block -> block" or "block.output -> block.input"', entry)
+        if len(ends) > 2 and any("." in end for end in ends):
+            raise _WireError("ports can be named only in a wire between two blocks", entry)
+        return [(a, b, {}) for a, b in pairwise(ends)]
+    if not isinstance(entry, dict):
+        raise _WireError('must be text such as "gate -> radar", or a table', entry)
+    for name in entry:
+        if name not in _KEYS:
+            raise _WireError(f"unknown key {name!r}{did_you_mean(name, _KEYS)}")
+    source, target = entry.get("from"), entry.get("to")
+    for name, end in (("from", source), ("to", target)):
+        if not isinstance(end, str) or not _END.fullmatch(end.strip()):
+            raise _WireError(f'needs {name} = "block" or "block.port"', entry)
+    return [(str(source).strip(), str(target).strip(), _options(entry))]
+
+
+def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    if "delay" in entry and "delay_s" in entry:
+        raise _WireError("give delay or delay_s, not both", dict(entry))
+    if "delay" in entry:
+        match = _SCANS.fullmatch(str(entry["delay"]).strip())
+        if not match or not match[1].strip("0"):
+            raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
+        if len(match[1]) > 9 or int(match[1]) > _MOST_SCANS:
+            raise _WireError(f"delay must be at most {_MOST_SCANS:,} scans", entry["delay"])
+        options["delay_scans"] = int(match[1])
+    for key in ("delay_s", "jitter_s"):
+        if key in entry:
+            options[key] = _seconds(key, entry[key])
+    if "drop_probability" in entry:
+        share = entry["drop_probability"]
+        if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
+            raise _WireError("drop_probability must be a number from 0 to 1", share)
+        options["drop_probability"] = float(share)
+    if "holds" in entry:
+        holds = entry["holds"]
+        if holds != "nothing" and not isinstance(holds, dict):
+            raise _WireError("holds must be 'nothing' or a table of the message's fields", holds)
+        options["holds"] = holds
+    return options
+
+
+def _seconds(key: str, value: Any) -> Fraction:
+    try:
+        seconds = parse_rational(value)
+    except ValueError as error:
+        raise _WireError(f"{key} {error}", value) from None
+    if seconds < 0:
+        raise _WireError(f"{key} must be 0 or greater", value)
+    return seconds
+
+
+def _connect(
+    source_end: str,
+    target_end: str,
+    options: dict[str, Any],
+    classes: Mapping[str, type[Component]],
+) -> Wire | None:
+    source, _, output = source_end.partition(".")
+    target, _, input_name = target_end.partition(".")
+    for name in (source, target):
+        if name not in classes:
+            raise _WireError(f"the scene has no block {name!r}{did_you_mean(name, classes)}")
+    source_class, target_class = classes[source], classes[target]
+    if source_class is None or target_class is None:
+        return None
+    outputs, inputs = source_class.outputs, target_class.inputs
+    if output and output not in outputs:
+        raise _WireError(f"{source} has no output {output!r}{did_you_mean(output, outputs)}")
+    if input_name and input_name not in inputs:
+        raise _WireError(f"{target} has no input {input_name!r}{did_you_mean(input_name, inputs)}")
+    fitting = [
+        (o, i)
+        for o in sorted(outputs)
+        for i in sorted(inputs)
+        if output in ("", o)
+        and input_name in ("", i)
+        and issubclass(outputs[o].message, inputs[i].message)
+    ]
+    if len(fitting) == 1:
+        return Wire(source, fitting[0][0], target, fitting[0][1], **options)
+    sends = ", ".join(f"{o} ({p.message.__name__})" for o, p in sorted(outputs.items())) or "none"
+    takes = ", ".join(f"{i} ({p.message.__name__})" for i, p in sorted(inputs.items())) or "none"
+    what = "does not fit" if not fitting else "fits in several ways; name the ports"
+    raise _WireError(
+        f"{source_end} -> {target_end} {what}: outputs of {source}: {sends}; "
+        f"inputs of {target}: {takes}"
+    )
+
+
+def _two_writers(
+    scene: SceneFile,
+    wires: list[Wire],
+    classes: Mapping[str, type[Component]],
+    problems: list[Problem],
+) -> None:
+    writers: dict[tuple[str, str], list[Wire]] = {}
+    for wire in wires:
+        writers.setdefault((wire.target, wire.input), []).append(wire)
+    for (target, input_name), found in sorted(writers.items()):
+        ends = [f"{w.source}.{w.output}" for w in found]
+        if len(set(ends)) < len(ends):
+            twice = sorted({end for end in ends if ends.count(end) > 1})
+            message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
+            problems.append(scene.problem(("wires",), message))
+        elif len(found) > 1 and not classes[target].inputs[input_name].many:
+            message = f"{target}.{input_name} has {len(found)} writers: {', '.join(sorted(ends))}"
+            problems.append(scene.problem(("wires",), message))

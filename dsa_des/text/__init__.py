@@ -1,0 +1,1 @@
+"""Text that every reader takes: made printable, and JSON without ``NaN``."""

@@ -1,0 +1,204 @@
+"""Exact time: integer ticks, and clocks whose k-th scan never drifts.
+
+The resolution R (ticks per second) is chosen per scene so that every period, offset and delay is a
+whole number of ticks; two clocks then meet exactly when rational arithmetic says so, after a second
+or after a month. Seconds as float appear only where physics or people read them.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import IntArray
+
+NANOSECONDS = 10**9
+# Ticks are kept in int64 arrays; one bit is left for sums of two ticks.
+MAX_TICK = 2**62
+# Digits of an exact number's numerator and denominator. Fractions are whole numbers of any size,
+# and "1e-9999999" is one of ten million digits that every sum would carry along.
+_MOST_DIGITS = 60
+_LARGEST: int = 10**_MOST_DIGITS
+_EXPONENT = re.compile(r"[eE]([+-]?\d+)\s*$")
+_LONGEST_TEXT = 200
+
+
+def parse_rational(value: object) -> Fraction:
+    """Return a number or text such as ``"30000/1001"`` as an exact fraction.
+
+    A float is read the way it is written (29.97 becomes 2997/100): the binary value behind it
+    would never coincide with any other clock.
+
+    Parameters
+    ----------
+    value : int, float, str or Fraction
+
+    Raises
+    ------
+    ValueError
+        If the value is not a finite number, or one of too many digits.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str | Fraction):
+        raise ValueError('must be a number or a text such as "30000/1001"')
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError("must be finite")
+        value = repr(float(value))
+    elif isinstance(value, str) and _too_long(value):
+        raise ValueError(_TOO_LONG)
+    try:
+        number = Fraction(value)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError('must be a number or a text such as "30000/1001"') from None
+    if abs(number.numerator) > _LARGEST or number.denominator > _LARGEST:
+        raise ValueError(_TOO_LONG)
+    return number
+
+
+_TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_MOST_DIGITS} digits"
+
+
+def _too_long(text: str) -> bool:
+    """Tell, without expanding it, whether a text stands for a number of too many digits."""
+    exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
+    return len(text) > _LONGEST_TEXT or (
+        exponent is not None and abs(int(exponent[1])) > _LONGEST_TEXT
+    )
+
+
+def resolution(times_s: Iterable[Fraction]) -> int:
+    """Return the ticks per second in which all given times are whole: lcm(10^9, denominators)."""
+    return math.lcm(NANOSECONDS, *(time.denominator for time in times_s))
+
+
+@dataclass(frozen=True)
+class ClockSpec:
+    """What a scene says of a clock: rate in Hz, offset in s, rate error in ppm, jitter in s.
+
+    `jitter_s` is the standard deviation of the scan instants about their grid.
+    """
+
+    rate_hz: Fraction
+    offset_s: Fraction = Fraction(0)
+    rate_error_ppm: Fraction = Fraction(0)
+    jitter_s: float = 0.0
+
+    @property
+    def period_s(self) -> Fraction:
+        """Nominal time between scans in s."""
+        return 1 / self.rate_hz
+
+    def exact_times(self) -> list[Fraction]:
+        """Return the times (s) that must be whole ticks for this clock to be exact."""
+        return [self.period_s, self.offset_s]
+
+
+class ScanClock:
+    """The scan instants of one block, in ticks.
+
+    Scan k is at ``offset + k * period``, exactly. A clock with a rate error runs at
+    ``rate * (1 + ppm * 1e-6)``; its instants are rounded once each to the nearest tick (never
+    accumulated), so the error stays below half a tick for ever. Jitter adds a keyed normal draw,
+    cut at 0.45 period so that scans keep their order, and rounded once; a jittered first scan
+    never falls before tick 0.
+
+    Parameters
+    ----------
+    spec : ClockSpec
+    ticks_per_s : int
+    jitter_draw : callable, optional
+        Standard normal draws keyed by the scan numbers given to it.
+    """
+
+    def __init__(
+        self,
+        spec: ClockSpec,
+        ticks_per_s: int,
+        jitter_draw: Callable[[IntArray], np.ndarray] | None = None,
+    ) -> None:
+        self.spec = spec
+        self.ticks_per_s = ticks_per_s
+        offset = spec.offset_s * ticks_per_s
+        true_rate = spec.rate_hz * (1 + spec.rate_error_ppm / 1_000_000)
+        period = ticks_per_s / true_rate
+        if offset.denominator != 1:
+            raise ValueError(f"offset {spec.offset_s} s is not a whole number of ticks")
+        if period < 1:
+            raise ValueError(f"a rate of {float(spec.rate_hz)} Hz is above the tick rate")
+        self.offset = int(offset)
+        self.period = period
+        self._whole, rest = divmod(period.numerator, period.denominator)
+        self._rest, self._denominator = rest, period.denominator
+        self._jitter_draw = jitter_draw if spec.jitter_s > 0 else None
+        self._jitter_ticks = spec.jitter_s * ticks_per_s
+        self._jitter_limit = 0.45 * float(period)
+        self._last: tuple[int, int, Any] = (0, -1, None)
+
+    def _grid(self, scans: IntArray) -> IntArray:
+        ticks: IntArray = self.offset + scans * self._whole
+        if self._rest == 0:
+            return ticks
+        largest = int(np.abs(scans).max(initial=0))
+        if 2 * largest * self._rest + self._denominator < MAX_TICK:
+            extra = (2 * scans * self._rest + self._denominator) // (2 * self._denominator)
+        else:  # exact in Python integers; only rates given to many digits come here
+            exact = [self._grid_tick(k) for k in scans.ravel().tolist()]
+            return np.array(exact, dtype=np.int64).reshape(scans.shape)
+        return ticks + extra
+
+    def ticks(self, scans: IntArray) -> IntArray:
+        """Return the ticks of the given scan numbers (shape kept, int64)."""
+        scans = np.asarray(scans, dtype=np.int64)
+        ticks = self._grid(scans)
+        if self._jitter_draw is not None:
+            shift = self._jitter_ticks * self._jitter_draw(scans)
+            shift = np.clip(shift, -self._jitter_limit, self._jitter_limit)
+            ticks = np.maximum(ticks + np.rint(shift).astype(np.int64), 0)
+        return ticks
+
+    def tick_of(self, scan: int) -> int:
+        """Return the tick of one scan."""
+        if self._jitter_draw is None:
+            return self._grid_tick(scan)
+        return int(self.ticks(np.array([scan], dtype=np.int64))[0])
+
+    def first_scan_at_or_after(self, tick: int) -> int:
+        """Return the number of the first scan (not below 0) whose grid instant is >= tick."""
+        # Python integers, which neither round nor overflow; Fractions took ten times as long.
+        periods = (tick - self.offset) * self.period.denominator // self.period.numerator
+        guess = max(0, periods - 1)
+        while self._grid_tick(guess) < tick:
+            guess += 1
+        return guess
+
+    def _grid_tick(self, scan: int) -> int:
+        """Return one grid instant in Python integers, which cannot overflow."""
+        r, d = self._rest, self._denominator
+        return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
+
+    def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
+        """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
+        # Several blocks ask for the same scans of a window, one after the other.
+        if self._last[:2] != (start, end):
+            self._last = start, end, self._between(start, end)
+        return self._last[2]
+
+    def _between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
+        if end > MAX_TICK:
+            raise ValueError(f"end is {end}: ticks must stay below {MAX_TICK} (64 bits)")
+        if end <= start:
+            empty = np.empty(0, dtype=np.int64)
+            return empty, empty
+        margin = 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
+        first = self.first_scan_at_or_after(start - margin)
+        last = self.first_scan_at_or_after(end + margin)
+        scans = np.arange(first, last, dtype=np.int64)
+        ticks = self.ticks(scans)
+        if margin:
+            inside = (ticks >= start) & (ticks < end)
+            scans, ticks = scans[inside], ticks[inside]
+        return scans, ticks

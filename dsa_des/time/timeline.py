@@ -1,0 +1,57 @@
+"""One timeline for many replicas, laid end to end.
+
+Replicas of a scene that run in lock step share one run: replica r occupies the ticks from r times
+the span. Rows of many replicas are then rows of one long run, in order, and every array expression
+over rows is one over replicas and rows. Scan numbers carry the replica in their high bits, so that
+a draw is still a function of its own replica's seed and scan.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsa_des.arrays.types import IntArray
+from dsa_des.time.clock import MAX_TICK
+
+_SCAN_BITS = 40
+
+
+@dataclass(frozen=True)
+class ReplicaTime:
+    """How replicas lie on their common timeline.
+
+    Parameters
+    ----------
+    replicas : int
+    end_tick : int
+        Length of each run.
+    """
+
+    replicas: int
+    end_tick: int
+
+    @property
+    def span_ticks(self) -> int:
+        """Ticks from one replica's start to the next: nothing of one run reaches the other's."""
+        return 1 << (2 * self.end_tick).bit_length()
+
+    @property
+    def fits(self) -> bool:
+        """Whether the last replica's ticks stay below the largest tick."""
+        return self.replicas * self.span_ticks < MAX_TICK
+
+
+def first_scan(replica: int) -> int:
+    """Return what the scan number 0 of a replica is written as."""
+    return replica << _SCAN_BITS
+
+
+def split_scans(scans: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the replica and the scan number within it; -1, no scan, stays -1."""
+    replica = (scans + 1) >> _SCAN_BITS
+    return replica, scans - (replica << _SCAN_BITS)
+
+
+def own_scans(scans: IntArray) -> IntArray:
+    """Return the scan numbers within their replicas."""
+    return split_scans(np.asarray(scans, dtype=np.int64))[1]
