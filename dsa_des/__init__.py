@@ -6,7 +6,7 @@ The package knows no radar. Blocks are found by their registered names (see
 
 from typing import Any
 
-__version__ = "0.1.0"
+from dsa_des.record.version import __version__
 
 # Names are looked up on first use: `dsa-des --help` must not pay for NumPy or Arrow.
 _PUBLIC = {

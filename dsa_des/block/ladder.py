@@ -7,15 +7,12 @@ quantities rungs differ. The engine knows no quantity: the ladder's own function
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from dsa_des.block.component import Component
-    from dsa_des.block.wake import Wake
+from dsa_des.block.wake import Wake
 
 
 class Unavailable(Exception):
@@ -94,12 +91,12 @@ class Rung:
 
 #: Reads a ladder's quantities: from a block that has not run, one of its wakes and the reference's
 #: block to values by quantity, shape (rows, targets of the roster, ...), NaN where there is none.
-Measure = Callable[["Component", "Wake", "Component"], Mapping[str, AnyArray]]
+Measure = Callable[[Any, Wake, Any], Mapping[str, AnyArray]]
 
 #: Computes the block's error against a far more precise evaluation: from the block, a wake and
 #: (n, 2) pairs of row and target to errors by quantity, shape (n,). ImportError when a library that
 #: it needs is not installed; `Unavailable` where there is no better evaluation.
-Truth = Callable[["Component", "Wake", IntArray], Mapping[str, FloatArray]]
+Truth = Callable[[Any, Wake, IntArray], Mapping[str, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ class Ladder:
     measure: Measure
     truth: Truth | None = None
     clears: tuple[str, ...] = ()
-    applies: Callable[["Component"], str] | None = None
+    applies: Callable[[Any], str] | None = None
     map_function: str = ""
 
     def __post_init__(self) -> None:

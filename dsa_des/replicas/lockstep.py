@@ -11,13 +11,13 @@ from dataclasses import replace
 from typing import Any
 
 from dsa_des.block.component import ClockedParameters, Component, Context
-from dsa_des.block.effect import plan, unspent
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.replicas.watched_parameters import WatchedParameters
+from dsa_des.run.effect_plan import plan, unspent
 from dsa_des.run.node import Node
 from dsa_des.run.simulation import Simulation
 from dsa_des.scene.scene import Scene

@@ -17,10 +17,11 @@ from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.replicas.lockstep import LockStep, NotInLockStep
 from dsa_des.run.simulation import Simulation
+from dsa_des.scene.block import Block
 from dsa_des.scene.checks import check_times
 from dsa_des.scene.options import BlockOptions, with_latencies
 from dsa_des.scene.parameter_errors import explain
-from dsa_des.scene.scene import Block, Scene
+from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.time.clock import parse_rational
 

@@ -1,14 +1,32 @@
 """What a block with its own ``process(self, env)`` generator sees of the simulation."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import numpy as np
 
 from dsa_des.block.wake import Wake
 from dsa_des.run.events import Bell, WakeUp
+from dsa_des.run.run_state import RunState
 
-if TYPE_CHECKING:
-    from dsa_des.run.node import Node
+
+class OwnProcess(Protocol):
+    """The runtime of a block that has a process of its own."""
+
+    simulation: RunState
+
+    def priority(self) -> float:
+        """Return its place within an instant."""
+
+    def wait(self) -> Bell | WakeUp:
+        """Return the event of the next arrival at a trigger input."""
+
+    def receive(self) -> Wake:
+        """Return the inputs as they are now."""
+
+    @property
+    def send(self) -> Callable[..., None]:
+        """Send a message, or messages by output name, of some ticks."""
 
 
 class BlockEnvironment:
@@ -18,7 +36,7 @@ class BlockEnvironment:
     upstream; SimPy's own timeouts would resume it before them.
     """
 
-    def __init__(self, node: "Node") -> None:
+    def __init__(self, node: OwnProcess) -> None:
         self._node = node
 
     @property

@@ -7,7 +7,7 @@ the others by depth; ties within a depth go by name, or at random under ``shuffl
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import simpy
@@ -22,11 +22,9 @@ from dsa_des.run.block_environment import BlockEnvironment
 from dsa_des.run.channel import Channel
 from dsa_des.run.events import Bell, WakeUp
 from dsa_des.run.processors import Processor
+from dsa_des.run.run_state import RunState
 from dsa_des.time.clock import MAX_TICK, ScanClock
 from dsa_des.time.timeline import ReplicaTime
-
-if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0
@@ -71,7 +69,7 @@ class Node:
     has run; a channel's rows are collected by nobody else.
     """
 
-    simulation: "Simulation"
+    simulation: RunState
     component: Component
     windowed: bool
     priority: Callable[[], float]

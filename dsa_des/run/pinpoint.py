@@ -5,29 +5,37 @@ and scheduling are reproducible, so the run is repeated without recording, with 
 the instants in question, until the failing call holds a single one.
 """
 
+from collections.abc import Callable
+from typing import Any, Protocol
+
 from dsa_des.arrays.types import IntArray
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.scene.scene import Scene
 
 
-def pinpoint(scene: Scene, window: int | None, ticks: IntArray) -> BlockFailure | None:
-    """Return the first failure of the scene with its exact instant, or None if it won't repeat.
+class Repeated(Protocol):
+    """A run of the same scene once more."""
+
+    failed_at: IntArray
+
+    def run(self) -> Any:
+        """Run to the end, or raise the `BlockFailure`."""
+
+
+def pinpoint(repeat: Callable[[set[int]], Repeated], ticks: IntArray) -> BlockFailure | None:
+    """Return the first failure of a run with its exact instant, or None if it won't repeat.
 
     Parameters
     ----------
-    scene : Scene
-    window : int, optional
-        As given to the run that failed.
+    repeat : callable
+        Makes the run that failed again, with windows cut at the given ticks.
     ticks : ndarray of int64
         The instants of the call that failed.
     """
-    from dsa_des.run.simulation import Simulation
-
     cuts: set[int] = set()
     while not cuts.issuperset(ticks.tolist()):
         cuts.update(ticks.tolist())
         try:
-            again = Simulation(scene, window=window, cuts=cuts)
+            again = repeat(cuts)
         except (SceneError, BlockFailure):
             return None
         try:

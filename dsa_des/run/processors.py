@@ -9,17 +9,15 @@ every message is recorded in the table ``processing``.
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 import simpy
-from pydantic import Field
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import NonNegativeRational, Parameters, PositiveRational
 from dsa_des.block.message import Columns, Message, Text, static
 from dsa_des.run.events import Bell, WakeUp
+from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.time.randomness import Stream, key_of
 
 # Messages are finished before, and taken in after, every block of an instant.
@@ -27,21 +25,6 @@ FINISH_PRIORITY = 0.5
 ENTRY_PRIORITY = 1e9
 
 _OUTCOMES = ("done", "dropped", "skipped")
-
-
-class ProcessorParameters(Parameters):
-    """A table ``[processors.NAME]``."""
-
-    service_s: PositiveRational = Field(description="Time to work on one message, s.")
-    service_spread_s: NonNegativeRational = Field(
-        default=Fraction(0),
-        description="Largest extra time, s; each message takes a uniformly drawn part of it.",
-    )
-    when_busy: Literal["wait", "drop_oldest", "skip"] = Field(
-        default="wait",
-        description="Messages wait in line; or only the newest waits; or a block whose scan finds "
-        "the processor busy leaves that scan out.",
-    )
 
 
 @dataclass(eq=False)

@@ -9,19 +9,16 @@ while nothing comes back.
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
 
 from dsa_des.block.component import Component
+from dsa_des.record.recording import Recorder
 from dsa_des.run.channel import Channel
+from dsa_des.run.run_state import RewindableRun, RunningBlock
 from dsa_des.scene.graph import in_cycles, window_order
-
-if TYPE_CHECKING:
-    from dsa_des.record.recording import Recorder
-    from dsa_des.run.node import Node
-    from dsa_des.run.simulation import Simulation
 
 # At the start, and after something came back, a window has this part of its full length.
 _RESTART = 32
@@ -94,7 +91,7 @@ def may_rewind(graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued
     )
 
 
-def rewinding_windows(simulation: "Simulation", end: int) -> Iterator[tuple[int, int]]:
+def rewinding_windows(simulation: RewindableRun, end: int) -> Iterator[tuple[int, int]]:
     """Run and yield windows in which nothing came back unseen."""
     feedback = [
         channel
@@ -141,15 +138,15 @@ class Checkpoint:
 
     Parameters
     ----------
-    nodes : iterable of Node
+    nodes : iterable of RunningBlock
     recorder : Recorder or None
     trace : list or None
     """
 
     def __init__(
         self,
-        nodes: Iterable["Node"],
-        recorder: "Recorder | None",
+        nodes: Iterable[RunningBlock],
+        recorder: Recorder | None,
         trace: list[tuple[int, str]] | None,
     ) -> None:
         self._objects: list[tuple[Any, dict[str, Any]]] = []

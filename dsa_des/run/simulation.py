@@ -20,16 +20,17 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.effect import Planned, plan, unspent
 from dsa_des.block.message import Message
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, Problem, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.run.connections import check_reach, connect
+from dsa_des.run.effect_plan import Planned, plan, unspent
 from dsa_des.run.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.run.pinpoint import pinpoint
 from dsa_des.run.processors import Processing, Processor
 from dsa_des.run.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
+from dsa_des.run.run_state import RunningBlock
 from dsa_des.scene.graph import depths, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, ScanClock
@@ -440,12 +441,17 @@ class Simulation:
                 raise
             failure, cause = self.failure
             if self.pinpoints and len(self.failed_at) > 1 and not self.cuts:
-                exact = pinpoint(self.scene, self._window, self.failed_at)
+                exact = pinpoint(self._again, self.failed_at)
                 if exact is not None:
                     raise exact from exact.__cause__
             raise failure from cause
 
-    def fail(self, node: Node, ticks: IntArray, error: BaseException, scan: int = -1) -> None:
+    def _again(self, cuts: set[int]) -> "Simulation":
+        return Simulation(self.scene, window=self._window, cuts=cuts)
+
+    def fail(
+        self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
+    ) -> None:
         """Note that a block raised when it handled `ticks`, and leave SimPy."""
         if self.failure is not None:
             return  # a window that may be rewound goes on; the first failure counts

@@ -17,8 +17,8 @@ from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import MAX_TICK, ClockSpec, resolution
 
 if TYPE_CHECKING:
-    from dsa_des.run.processors import ProcessorParameters
-    from dsa_des.scene.scene import Block
+    from dsa_des.scene.block import Block
+    from dsa_des.scene.processor import ProcessorParameters
 
 # Assumed where a scene leaves its length to its sources.
 _A_DAY = Fraction(86400)

@@ -14,12 +14,13 @@ from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.block.sections import section_models
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.run.processors import ProcessorParameters
+from dsa_des.scene.block import Block
 from dsa_des.scene.checks import check_activity, check_lookalikes, check_times
 from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.scene.options import BlockOptions, split_options, with_latencies
 from dsa_des.scene.overrides import apply_set, apply_swap
 from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.scene.scene_file import COMMAND_LINE, Key, SceneFile, dotted, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires
 from dsa_des.time.clock import parse_rational
@@ -27,18 +28,6 @@ from dsa_des.time.clock import parse_rational
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
 _TOLERANCE = "accuracy"
 _MAX_SEED = 2**63
-
-
-@dataclass(frozen=True)
-class Block:
-    """One block of a scene: its name, its type as written, its class, its own parameters, and
-    what its table says to the engine."""
-
-    name: str
-    type_name: str
-    cls: type[Component]
-    parameters: Parameters
-    options: BlockOptions = BlockOptions()
 
 
 @dataclass
