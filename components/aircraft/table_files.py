@@ -26,7 +26,7 @@ class TableFile:
     ----------
     path : Path
     table : object
-        `components.radar.rcs.AspectTable` or `components.aircraft.silhouette_table.AspectTable`.
+        `components.aircraft.rcs_table.AspectTable`, or that of `silhouette_table`.
     """
 
     path: Path
@@ -34,7 +34,7 @@ class TableFile:
 
 
 def _rcs(path: Path) -> Any:
-    from components.radar.rcs import AspectTable
+    from components.aircraft.rcs_table import AspectTable
 
     return AspectTable.from_csv(path)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.figures import style_of
+from components.display.styles import style_of
 from dsa_des.arrays.types import FloatArray
 
 

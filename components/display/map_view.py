@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from components.display.fields_of_view import Outline
-from components.display.figures import DPI
 from components.display.flights import Flights
 from components.display.positions import Positions, where_detected
+from dsa_des.record.drawing import DPI
 
 # Inches: the map is as wide as it may be, and as high as the flights need.
 MAP_WIDTH_IN, _MAP_HEIGHTS_IN = 6.4, (3.8, 6.6)

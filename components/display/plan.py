@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.display.fields_of_view import draw_outline, outline_of, reach_text
-from components.display.figures import drawing, figure_text, mark_of, style_of
 from components.display.flights import Flights, Track
 from components.display.labels import Labels
 from components.display.map_view import MAP_WIDTH_IN, MapView
 from components.display.marks import Detected
 from components.display.positions import positions
+from components.display.styles import mark_of, style_of
 from components.display.terminal import distance_text
 from components.display.thinning import evenly, staggered
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray
+from dsa_des.record.drawing import drawing, figure_text
 
 if TYPE_CHECKING:
     from dsa_des.run.simulation import Simulation

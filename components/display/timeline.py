@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.figures import DPI, drawing, figure_text, mark_of, style_of
 from components.display.flights import Flights
 from components.display.marks import Detected, read_fused
 from components.display.scan_times import ScansShown, SensorScans, read_scans, scans_between
+from components.display.styles import mark_of, style_of
 from components.display.thinning import by_target, evenly, staggered
+from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
     from dsa_des.run.simulation import Simulation

@@ -179,7 +179,7 @@ def _draw(
     from matplotlib.colors import LogNorm
     from matplotlib.lines import Line2D
 
-    from components.display.figures import drawing
+    from dsa_des.record.drawing import drawing
 
     styles: list[Any] = list(zip(contours, ("#FFFFFF", "#D55E00"), ("--", "-"), strict=True))
     with drawing(7.4, 3.5, path) as figure:

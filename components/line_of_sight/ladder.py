@@ -40,7 +40,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
     """Return a transform's errors against the line of sight at 40 digits (needs mpmath)."""
-    from components.high_precision.high_precision import line_of_sight_errors
+    from components.high_precision.line_of_sight import line_of_sight_errors
 
     states, seen = wake["states"], block.run(wake)
     errors = []

@@ -9,7 +9,7 @@ from components.optical.infrared_area import infrared_area
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
 from components.optical.tabulated_area import area_by_table, table_of_targets
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 
 # Cells worked on together, so that what is in flight stays in the processor's cache.

@@ -14,7 +14,9 @@ from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
-from components.sensor.sensor import Cells, Look, Sensor, SensorParameters
+from components.sensor.look import Cells, Look
+from components.sensor.parameters import SensorParameters
+from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
 

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from components.atmosphere.visibility import KOSCHMIEDER
 from components.optical.line_of_sight_rate import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
-
-# ln 50, as meteorologists round it: visibility is where a black object's contrast falls to 2 %.
-KOSCHMIEDER = 3.912
 
 
 def contrast_gain(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.optical.line_of_sight_rate import line_of_sight_rate
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

@@ -8,7 +8,7 @@ from components.optical.area_of_cells import area_of_cells
 from components.optical.background import Background
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import VISIBLE
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 
 

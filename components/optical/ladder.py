@@ -7,7 +7,7 @@ import numpy as np
 
 from components.optical.convex_hull import union_area
 from components.sensor.ladder_values import over_cells
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.aircraft.known_targets import known_targets
 from components.optical.infrared_area import PLUME_SHARE_OF_BACK, plume_area
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

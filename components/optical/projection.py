@@ -8,7 +8,7 @@ from pydantic import Field
 
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import INFRARED, VISIBLE
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.ladder import Ladder
 

@@ -4,7 +4,9 @@ import numpy as np
 from pydantic import Field
 
 from components.optical.ladder import VISIBLE
-from components.sensor.sensor import Cells, Look, Sensor, SensorParameters
+from components.sensor.look import Cells, Look
+from components.sensor.parameters import SensorParameters
+from components.sensor.sensor import Sensor
 
 
 class RangeBoundaryParameters(SensorParameters):

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.optical.silhouette import visible_area
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 
 

@@ -12,7 +12,7 @@ from components.atmosphere.visibility import (
 )
 from components.environment.tables import Weather
 from components.optical.contrast import visibility_transmission
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

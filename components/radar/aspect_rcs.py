@@ -3,7 +3,7 @@
 import numpy as np
 
 from components.geometry.attitude import aspect_angles
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 
 

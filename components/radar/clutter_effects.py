@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.radar.ground_clutter import ground_clutter_rcs_m2, height_above_terrain_m
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.aircraft.known_targets import known_targets
 from components.sensor.ladder_values import over_cells
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
@@ -39,7 +39,7 @@ def measure_pd(block: Component, wake: Wake, reference: Component) -> dict[str, 
 
 def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
     """Return the errors of Pd at the SNR in use against sums at 40 digits (needs mpmath)."""
-    from components.high_precision.high_precision import detection_error
+    from components.high_precision.detection import detection_error
 
     radar: Any = block
     if not hasattr(radar, "models_in_use"):

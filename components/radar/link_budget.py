@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
@@ -26,7 +27,6 @@ from components.radar.radar_equation import (
     snr,
     wavelength,
 )
-from components.radar.rcs import dbsm_to_m2
 from components.radar.required_snr import required_snr
 
 __all__ = [

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
-from components.sensor.sensor import SensorParameters
+from components.sensor.parameters import SensorParameters
 from dsa_des.block.component import Parameters
 
 

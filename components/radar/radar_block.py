@@ -9,7 +9,8 @@ import numpy as np
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
-from components.sensor.sensor import Cells, Sensor
+from components.sensor.look import Cells
+from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
 
 CellFactor = Callable[[Cells], FloatArray]

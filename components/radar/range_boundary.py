@@ -8,7 +8,7 @@ from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
-from components.sensor.sensor import Cells, Look
+from components.sensor.look import Cells, Look
 
 
 class RangeBoundaryParameters(RadarParameters):

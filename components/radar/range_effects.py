@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.radar.radar_block import CellFactor
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

@@ -8,7 +8,7 @@ import numpy as np
 from components.aircraft.aircraft import Aircraft
 from components.aircraft.known_targets import known_targets
 from components.radar.aspect_rcs import mean_rcs_m2
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Verdict

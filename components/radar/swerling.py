@@ -16,7 +16,7 @@ from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_o
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather_effects import WEATHER_EFFECTS
-from components.sensor.sensor import Cells, Look
+from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 
 

@@ -21,7 +21,7 @@ from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.weather_effects import WEATHER_EFFECTS
-from components.sensor.sensor import Cells, Look
+from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
 from dsa_des.block.wake import Wake

@@ -10,7 +10,7 @@ from components.atmosphere.slant_path import one_way_attenuation_db, two_way_tra
 from components.environment.tables import Weather
 from components.radar.radar_block import CellFactor
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 

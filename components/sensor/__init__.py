@@ -3,15 +3,16 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from components.sensor.look import Cells, Look
     from components.sensor.parameters import SensorParameters
-    from components.sensor.sensor import Cells, Look, Sensor
+    from components.sensor.sensor import Sensor
 
 __all__ = ["Cells", "Look", "Sensor", "SensorParameters"]
 
 # Looked up on first use: whoever imports one file of the package does not pay for the others.
 _HOMES = {
-    "Cells": "components.sensor.sensor",
-    "Look": "components.sensor.sensor",
+    "Cells": "components.sensor.look",
+    "Look": "components.sensor.look",
     "Sensor": "components.sensor.sensor",
     "SensorParameters": "components.sensor.parameters",
 }

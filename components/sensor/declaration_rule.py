@@ -10,7 +10,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
 if TYPE_CHECKING:
-    from components.sensor.sensor import Cells, Look
+    from components.sensor.look import Cells, Look
 
 
 class Declaration(Effect):

@@ -8,7 +8,8 @@ import numpy as np
 from components.geometry.angles import wrap_pi
 from components.messages.reach import RANGE
 from components.messages.targets import RelativeTargets
-from components.sensor.sensor import Cells, Sensor
+from components.sensor.look import Cells
+from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.wake import Wake
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from components.aircraft.rcs_table import AspectTable, dbsm_to_m2
 from components.geometry.field_of_view import inside
 from components.radar.detection import (
     detection_probability,
@@ -20,7 +21,7 @@ from components.radar.detection import (
     miss_probability,
 )
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth, with_bandwidth
-from components.radar.rcs import AspectTable, dbsm_to_m2, fluctuating_rcs
+from components.radar.rcs import fluctuating_rcs
 from components.radar.swerling import SwerlingParameters
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.radar.detection import detection_probability
 from components.radar.link_budget import (
     LinkBudget,
@@ -17,7 +18,6 @@ from components.radar.link_budget import (
     wavelength,
     with_bandwidth,
 )
-from components.radar.rcs import dbsm_to_m2
 from components.radar.required_snr import required_snr
 
 # Thesis Table 2.2 (OASys).

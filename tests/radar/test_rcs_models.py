@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from components.aircraft.rcs_table import AspectTable, dbsm_to_m2
 from components.radar.detection import detection_probability, detection_threshold
-from components.radar.rcs import AspectTable, dbsm_to_m2, fluctuating_rcs, m2_to_dbsm
+from components.radar.rcs import fluctuating_rcs, m2_to_dbsm
 
 
 def test_decibels_both_ways():

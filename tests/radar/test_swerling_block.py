@@ -12,7 +12,7 @@ from components.radar.detection import detection_probability
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from components.radar.threshold_radar import ThresholdParameters, ThresholdRadar
-from components.sensor.sensor import Cells
+from components.sensor.look import Cells
 from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import MemorySink, Recorder

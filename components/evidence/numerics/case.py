@@ -1,8 +1,6 @@
 """What is a hard case, and how does its number become text?"""
 
-import importlib
 from dataclasses import dataclass
-from typing import Any
 
 DIGITS = 12
 
@@ -39,19 +37,3 @@ class Case:
             return "NaN"
         whole = float(value).is_integer() and abs(value) < 1e15
         return str(int(value)) if whole else f"{float(value):.{self.digits}g}"
-
-
-def multiprecision() -> Any:
-    """Return the library mpmath, which the references are computed with.
-
-    Raises
-    ------
-    ImportError
-        If it is not installed.
-    """
-    try:
-        return importlib.import_module("mpmath")
-    except ImportError as error:
-        raise ImportError(
-            "the references need the library mpmath: pip install 'dsa-des[test]'"
-        ) from error

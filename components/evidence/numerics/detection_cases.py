@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.evidence.numerics.case import Case, multiprecision
+from components.evidence.numerics.case import Case
+from components.high_precision.multiprecision import multiprecision
 from components.radar.detection import (
     detection_probability,
     detection_threshold,

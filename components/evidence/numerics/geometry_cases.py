@@ -4,11 +4,12 @@ import math
 from fractions import Fraction
 from typing import Any
 
-from components.evidence.numerics.case import Case, multiprecision
+from components.evidence.numerics.case import Case
 from components.geometry import ellipsoid, geodesic
 from components.geometry.angles import longitude_difference_deg
 from components.geometry.attitude import body_angles
 from components.geometry.sensor_angles import sensor_angles
+from components.high_precision.multiprecision import multiprecision
 
 DEG = math.pi / 180.0
 Position = tuple[float, float, float]

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from components.evidence.numerics.case import Case, multiprecision
+from components.evidence.numerics.case import Case
+from components.high_precision.multiprecision import multiprecision
 from components.optical.line_of_sight_rate import line_of_sight_rate
 from components.optical.signature import pixels_covered
 from components.optical.silhouette import visible_area

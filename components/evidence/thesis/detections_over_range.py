@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
 from components.evidence.thesis.plotting import BLUE, ORANGE, legend_below, panels
@@ -12,7 +13,6 @@ from components.evidence.thesis.radar_range import CLASSES
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 from components.radar.detection import detection_probability
-from components.radar.rcs import dbsm_to_m2
 from dsa_des.arrays.types import FloatArray
 
 EDGES_KM = np.arange(1.0, 16.0)

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.radar_range import CLASSES, LARGE_DIFFERS, ROUNDED, pd_at, rounding
 from components.evidence.thesis.row import Row
 from components.radar.link_budget import LinkBudget, with_bandwidth
-from components.radar.rcs import dbsm_to_m2
 from components.radar.required_snr import required_snr
 
 

@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from components.display.figures import STYLES, drawing
+from components.display.styles import STYLES
+from dsa_des.record.drawing import drawing
 
 #: Half a page.
 WIDTH_IN, HEIGHT_IN = 6.6, 3.9

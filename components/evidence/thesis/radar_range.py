@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.row import Row
 from components.radar.detection import detection_probability
 from components.radar.link_budget import LinkBudget, detection_range
-from components.radar.rcs import dbsm_to_m2
 from components.radar.swerling import SwerlingParameters
 
 NAUTICAL_MILE_KM = 1.852

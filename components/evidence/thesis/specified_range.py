@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREEN, GREY, ORANGE, legend_below, panels
 from components.evidence.thesis.project_files import radar
@@ -11,7 +12,6 @@ from components.evidence.thesis.radar_range import NAUTICAL_MILE_KM, pd_at
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 from components.radar.link_budget import detection_range
-from components.radar.rcs import dbsm_to_m2
 from components.radar.swerling import SwerlingParameters
 
 RCS_DBSM = 10.0 * float(np.log10(5.0))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.aircraft.rcs_table import dbsm_to_m2
 from components.evidence.thesis import tecvol
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREEN, GREY, ORANGE, SKY, panels
@@ -12,7 +13,6 @@ from components.evidence.thesis.radar_range import NAUTICAL_MILE_KM
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import SceneRun, run, scene
 from components.radar.link_budget import detection_range
-from components.radar.rcs import dbsm_to_m2
 
 #: Scene in ``configs/systems`` → the project and its sensor in Table 2.4.
 SYSTEMS = {
