@@ -1,7 +1,8 @@
 """``dsa-des check``: everything that can be known of a scene without running it."""
 
 from dsa_des.block.foreign import Foreign, Imports, imports
-from dsa_des.commands.loading import load, say_if_long
+from dsa_des.commands.loading import load
+from dsa_des.run.long_run import say_if_long
 from dsa_des.run.simulation import Simulation
 from dsa_des.scene.collection import no_collection
 from dsa_des.terminal.terminal import say

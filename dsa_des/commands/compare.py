@@ -25,6 +25,7 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import claim_folder
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
 from dsa_des.studies.printing import short, times
@@ -68,7 +69,7 @@ def compare_command(
         _check_new(Path(out))
     studies = [_study_at(Path(path), replicas) for path in paths]
     for study in studies:
-        record = StudyRecord.of(study) if isinstance(study, Study) else study
+        record = record_of(study) if isinstance(study, Study) else study
         known_results(record.results_list(), results)
     home = Path(out) if out is not None else claim_folder(_HOME, "compare")
     try:

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from dsa_des.block.effect import Planned
 from dsa_des.commands.loading import load
+from dsa_des.run.effect_plan import Planned
 from dsa_des.run.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal

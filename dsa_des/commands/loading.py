@@ -2,19 +2,8 @@
 
 from collections.abc import Iterable
 
-from dsa_des.run.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal.terminal import say
-
-# Half a minute of the processor, for most scenes.
-_MANY_SCANS = 1e7
-
-
-def say_if_long(simulation: Simulation) -> None:
-    """Say on standard error that a run will take long: nobody should wait for it unawares."""
-    if simulation.scans > _MANY_SCANS:
-        message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
-        say(f"{message}{simulation.scans:.2g} scans", err=True)
 
 
 def load(

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from dsa_des import __version__
 from dsa_des.errors import UsageError
-from dsa_des.studies.record import record_text
+from dsa_des.record.version import __version__
+from dsa_des.studies.record import StudyRecord, record_text
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_tables import json_safe
 
@@ -41,6 +41,11 @@ def description(study: Study) -> dict[str, Any]:
     """Return the content of ``study.json`` as a table."""
     content: dict[str, Any] = json.loads(description_text(study))
     return content
+
+
+def record_of(study: Study) -> StudyRecord:
+    """Return the record of a study as its folder will hold it."""
+    return StudyRecord.model_validate_json(description_text(study))
 
 
 def _files_in(value: Any) -> set[Path]:

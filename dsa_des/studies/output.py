@@ -10,6 +10,7 @@ from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.seal import parquet
@@ -40,7 +41,7 @@ class Tables:
     def __init__(self, study: Study | StudyRecord, folder: StudyFolder) -> None:
         self.folder = folder
         self.study = study if isinstance(study, Study) else None
-        self.record = StudyRecord.of(study) if isinstance(study, Study) else study
+        self.record = record_of(study) if isinstance(study, Study) else study
         record = self.record
         self.results = record.results_list()
         axes = [axis.column for axis in record.axes]
@@ -222,7 +223,7 @@ class Tables:
 
     def _draw_run(self, cell: int, replica: int) -> list[Path]:
         """Run one replica of a cell again and draw it as ``dsa-des run`` does."""
-        from dsa_des.commands.run import record_run
+        from dsa_des.run.recorded_run import record_run
 
         if self.study is None:  # nothing of the folder's is imported, so nothing is run
             return []

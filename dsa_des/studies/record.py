@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from dsa_des import __version__
+from dsa_des.record.version import __version__
 from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result
 from dsa_des.studies.study import Study, run_command, set_text
 from dsa_des.studies.study_tables import json_safe
@@ -127,13 +127,6 @@ class StudyRecord(StudyHead):
             if figure.kind != "run" and figure.metric is None:
                 raise ValueError("a figure needs a metric")
         return self
-
-    @staticmethod
-    def of(study: Study) -> "StudyRecord":
-        """Return the record of a study."""
-        from dsa_des.studies.identity import description_text
-
-        return StudyRecord.model_validate_json(description_text(study))
 
     def schema_of_parts(self) -> "pa.Schema":
         """Return the columns of the study's parts."""

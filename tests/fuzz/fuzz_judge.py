@@ -158,9 +158,10 @@ def _simulate(argv: list[str]) -> None:
     @_scene_options
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
-        from dsa_des.commands.loading import load, say_if_long
+        from dsa_des.commands.loading import load
         from dsa_des.files.toml_text import to_toml
         from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
+        from dsa_des.run.long_run import say_if_long
         from dsa_des.run.reports import load_reports
         from dsa_des.run.simulation import Simulation
         from dsa_des.text.plain_json import json_text

@@ -1,0 +1,161 @@
+"""A run into a folder: recorded, summed up and drawn; there as a whole or not at all."""
+
+import hashlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from dsa_des.files.output_file import write_file
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.toml_text import to_toml
+from dsa_des.record.attempts import attempt
+from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.run_folder import write_run_json
+from dsa_des.record.version import __version__
+from dsa_des.run.long_run import say_if_long
+from dsa_des.run.pacing import Pacer
+from dsa_des.run.reports import draw_all, load_reports
+from dsa_des.run.simulation import Outcome, Simulation
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal import terminal
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import shortened
+
+_VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
+
+
+def record_run(
+    loaded: Scene,
+    target: Path | OutputFolder,
+    *,
+    simulate_everything: bool = False,
+    silent: bool = True,
+    pacer: Pacer | None = None,
+) -> dict[str, Any]:
+    """Run a checked scene into the folder `target` and return its summary.
+
+    Raises
+    ------
+    UsageError
+        If the folder holds something other than a run, or there is no place for it.
+    OutputError
+        If the results cannot be written.
+    """
+    if isinstance(target, Path):
+        target = OutputFolder(target)
+    target.check()
+    recorder = Recorder([])
+    simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
+    say_if_long(simulation)
+    if pacer is not None:
+        simulation.limit_windows(pacer.longest_window_s)
+    reports = load_reports()
+    notes: list[str] = []
+    observers = ObserverSink(
+        (observer for report in reports for observer in report.observers(simulation)), notes
+    )
+    with target.writing() as folder:
+        # Arrow takes longer to import than most scenes to check: not before all is well.
+        from dsa_des.record.arrow import ParquetSink
+
+        tables = ParquetSink(folder)
+        recorder.sinks += [tables, observers]
+        started = time.perf_counter()
+        try:
+            with _progress(simulation, silent=silent) as progress:
+                outcome = simulation.run(_paced(progress, pacer))
+        finally:
+            tables.release()
+        summary = _summary(observers, outcome, target.path, notes)
+        if pacer is not None:
+            summary["realtime"] = pacer.report()
+        scene_text = to_toml(loaded.resolved())
+        write_file(folder / "scene.toml", scene_text.encode())
+        wall_s = time.perf_counter() - started
+        info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        if notes:
+            info["notes"] = list(notes)
+        write_run_json(folder, info)
+    summary["out"] = str(target.path)
+    # The run has its name: whatever happens while figures are drawn, it is not lost.
+    notes += draw_all(reports, simulation, target.path, summary)
+    write_run_json(target.path, info)  # with the figures among its files
+    for note in notes:
+        say(f"note: {note}; the run itself is complete in {target.path}", err=True)
+    return summary
+
+
+def _summary(
+    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+) -> dict[str, Any]:
+    return {
+        **observers.result(),
+        **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
+        "simulated_s": outcome.duration_s,
+        "cpu_s": outcome.cpu_s,
+        "out": str(target),
+    }
+
+
+def _info(
+    simulation: Simulation,
+    recorder: Recorder,
+    outcome: Outcome,
+    summary: dict[str, Any],
+    scene_text: str,
+    wall_s: float,
+) -> dict[str, Any]:
+    """Return the content of run.json; only ``timings`` may differ between two runs."""
+    own = ("simulated_s", "cpu_s", "out", "realtime")
+    sections = {key: value for key, value in summary.items() if key not in own}
+    timings = {"cpu_s": outcome.cpu_s, "wall_s": wall_s}
+    if "realtime" in summary:
+        timings["realtime"] = summary["realtime"]
+    return {
+        "title": simulation.scene.title,
+        "seed": simulation.scene.seed,
+        "duration_s": outcome.duration_s,
+        "ticks_per_s": simulation.ticks_per_s,
+        "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
+        "versions": {
+            "dsa_des": __version__,
+            "python": sys.version.split()[0],
+            **{name: version(name) for name in _VERSIONS_OF},
+        },
+        "look_ahead": outcome.windowed,
+        "rows": recorder.rows,
+        "summary": sections,
+        "timings": timings,
+    }
+
+
+def _paced(
+    progress: Callable[[float], None] | None, pacer: Pacer | None
+) -> Callable[[float], None] | None:
+    """Return what is called after each window: the pacer first, then the progress bar."""
+    if pacer is None:
+        return progress
+
+    def after_window(time_s: float) -> None:
+        pacer(time_s)
+        if progress is not None:
+            progress(time_s)
+
+    pacer.start()
+    return after_window
+
+
+@contextmanager
+def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[float], None] | None]:
+    """Show a progress bar on a terminal; nothing in a pipe."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    with terminal.progress("seconds") as bar:
+        title = shortened(simulation.scene.title)
+        task = bar.add_task(title, total=float(simulation.duration_s))
+        yield lambda time_s: bar.update(task, completed=time_s)
