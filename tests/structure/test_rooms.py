@@ -1,0 +1,209 @@
+"""Two rooms, one arrow: who may import whom, and what the engine may know by name.
+
+Every import counts: at the top of a file, inside a function, under ``TYPE_CHECKING``, and the
+name of a module written as text, as for a lookup on first use. None of them needs an exception.
+"""
+
+import ast
+import dataclasses
+import importlib
+import re
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import networkx as nx
+import pytest
+
+from dsa_des.block.message import Message
+
+ROOT = Path(__file__).parents[2]
+ENGINE, BLOCKS = "dsa_des", "components"
+MOST_FILES = 12
+
+#: Words of messages that mean something to an engine without sensors, too.
+COMMON_WORDS = {
+    "target",  # the receiving end of a wire
+    "scan", "scans", "offsets",  # what a clock counts, and how entries belong to rows
+    "skipped",  # what becomes of a message at a busy processor
+    "confidence",  # of an interval
+    "pixels",  # a unit
+}  # fmt: skip
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """All modules by dotted name; a package stands for its ``__init__.py``."""
+    found = {}
+    for room in (ENGINE, BLOCKS):
+        for path in sorted((ROOT / room).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def folder_of(module: str) -> str:
+    return module if modules()[module].name == "__init__.py" else module.rpartition(".")[0]
+
+
+@cache
+def tree_of(module: str) -> ast.Module:
+    return ast.parse(modules()[module].read_text(encoding="utf-8"))
+
+
+def docstrings(tree: ast.Module) -> set[int]:
+    """The nodes of docstrings and of other bare strings, which are for people."""
+    return {
+        id(node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    }
+
+
+@cache
+def entry_point_groups() -> set[str]:
+    """Names such as ``dsa_des.embed``, which as text mean a group and no module."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        return set(tomllib.load(file)["project"]["entry-points"])
+
+
+def named(tree: ast.Module) -> set[str]:
+    """Modules of ours that a file imports, at any place and in any way."""
+    found = set()
+    prose = docstrings(tree)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute, so that they can be searched for"
+            full = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in modules() else str(node.module) for name in full}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            name = node.value.partition(":")[0].rstrip(".")
+            if id(node) not in prose and "." in name and name not in entry_point_groups():
+                found.add(name)
+    return found & modules().keys()
+
+
+@cache
+def imports() -> nx.DiGraph:
+    graph = nx.DiGraph()
+    graph.add_nodes_from(modules())
+    graph.add_edges_from(
+        (module, other) for module in modules() for other in named(tree_of(module))
+    )
+    graph.remove_edges_from(list(nx.selfloop_edges(graph)))
+    return graph
+
+
+def circles(graph: nx.DiGraph) -> list[list[str]]:
+    return [sorted(ring) for ring in nx.strongly_connected_components(graph) if len(ring) > 1]
+
+
+def test_files_import_each_other_in_no_circle():
+    assert circles(imports()) == []
+
+
+def test_folders_import_each_other_in_no_circle():
+    folders = nx.DiGraph()
+    why: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for source, target in imports().edges:
+        arrow = folder_of(source), folder_of(target)
+        if arrow[0] != arrow[1]:
+            folders.add_edge(*arrow)
+            why.setdefault(arrow, []).append((source, target))
+    rings = circles(folders)
+    ties = {
+        arrow: files
+        for ring in rings
+        for arrow, files in why.items()
+        if arrow[0] in ring and arrow[1] in ring
+    }
+    assert rings == [], ties
+
+
+def test_the_engine_imports_no_block():
+    assert [edge for edge in imports().edges if edge[0].split(".")[0] == ENGINE
+            and edge[1].split(".")[0] == BLOCKS] == []  # fmt: skip
+    text = re.compile(r"^\s*(from|import)\s+components\b", re.MULTILINE)
+    found = [
+        m for m, p in modules().items() if m.split(".")[0] == ENGINE and text.search(p.read_text())
+    ]
+    assert found == []
+
+
+def test_nothing_imports_what_makes_the_pages():
+    pages = f"{BLOCKS}.evidence"
+    inside = {module for module in modules() if f"{module}.".startswith(f"{pages}.")}
+    assert inside
+    assert [edge for edge in imports().edges if edge[1] in inside and edge[0] not in inside] == []
+
+
+@pytest.mark.parametrize("room", [ENGINE, BLOCKS])
+def test_few_files_lie_in_the_corridor(room):
+    files = sorted(p.name for p in (ROOT / room).iterdir() if p.is_file())
+    assert len(files) <= MOST_FILES, files
+
+
+def test_every_package_says_what_it_is_in_a_sentence_of_its_own():
+    said = {
+        module: ast.get_docstring(tree_of(module)) or ""
+        for module, path in modules().items()
+        if path.name == "__init__.py"
+    }
+    assert [
+        module for module, text in said.items() if not text.partition("\n")[0].endswith(".")
+    ] == []
+    assert len(set(said.values())) == len(said)
+
+
+def messages_of(room: str) -> list[type[Message]]:
+    """Messages that a room defines; other rooms may be imported already, and do not count."""
+    for module in modules():
+        if module.startswith(f"{room}."):
+            importlib.import_module(module)
+    found, todo = [], [Message]
+    while todo:
+        message = todo.pop()
+        todo += message.__subclasses__()
+        found.append(message)
+    return [message for message in found if f"{message.__module__}.".startswith(f"{room}.")]
+
+
+def words_of(messages: list[type[Message]]) -> set[str]:
+    """Tables, columns and fields of messages."""
+    words = set()
+    for message in messages:
+        words |= {field.name for field in dataclasses.fields(message)}
+        for table, columns in message.recorded.items():
+            words |= {table, *columns}
+    return words
+
+
+def mentioned(tree: ast.Module) -> set[str]:
+    """Identifiers in the texts of a file, without what is prose, and the attributes it reads."""
+    prose = docstrings(tree)
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            found.add(node.attr)
+        elif (
+            isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose
+        ):
+            # A sentence for people may say "detections"; a key of a table is a word by itself.
+            found |= {w for w in re.findall(r"\w+", node.value) if "_" in w} | {node.value}
+    return found
+
+
+def test_the_engine_names_no_column_of_a_message_of_components():
+    sensors = words_of(messages_of(f"{BLOCKS}.messages"))
+    sensors -= (
+        words_of(messages_of(f"{ENGINE}.block") + messages_of(f"{ENGINE}.run")) | COMMON_WORDS
+    )
+    assert {"azimuth_rad", "detections", "snr_db", "true_range_m"} <= sensors
+    found = {
+        module: sorted(mentioned(tree_of(module)) & sensors)
+        for module in modules()
+        if module.split(".")[0] == ENGINE and mentioned(tree_of(module)) & sensors
+    }
+    assert found == {}
