@@ -52,6 +52,12 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
     }
 
 
+def share_that_differs(changes: Mapping[str, Any]) -> float:
+    """Return detections gained and lost, of what `compare_runs` returned, per one before."""
+    changed = changes.get("detections_gained", 0) + changes.get("detections_lost", 0)
+    return float(changed / max(changes.get("detections_reference", 0), 1))
+
+
 def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float, float]]:
     """Return time and true range by (sensor/target, tick)."""
     table = tables.get("detections")

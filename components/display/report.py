@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from components.display.change import share_that_differs
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.recording import Observer
+from dsa_des.run.reports import Change, Difference
 
 if TYPE_CHECKING:
     from dsa_des.run.simulation import Simulation
@@ -14,6 +16,17 @@ if TYPE_CHECKING:
 
 class DetectAndSenseReport:
     """Summarises, prints and draws runs; registered in ``dsa_des.reports``."""
+
+    changes = (
+        Change("first seen, m", "first_detection_range_change_m", "+,.0f"),
+        Change("s", "first_detection_time_change_s", "+.2f"),
+        Change("gained", "detections_gained", "d"),
+        Change("lost", "detections_lost", "d"),
+        Change("fused", "fused_share", ".1%"),
+    )
+    difference = Difference(
+        "detections that differ", "share of detections gained or lost", share_that_differs
+    )
 
     def observers(self, simulation: "Simulation") -> list[Observer]:
         """Return running summaries with the sections ``sensors`` and ``fused``.
@@ -41,6 +54,11 @@ class DetectAndSenseReport:
         from components.display.change import compare_runs
 
         return compare_runs(reference, other)
+
+    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+        """Return which targets a sensor no longer sees at all."""
+        missed = changes.get("never_detected")
+        return [f"never sees {', '.join(missed)}"] if missed else []
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw ``plan.png`` and ``timeline.png`` into a run's folder.

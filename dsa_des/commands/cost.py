@@ -1,7 +1,6 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,10 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
+from dsa_des.costs.comparison import Comparison
 from dsa_des.costs.front import parse_budgets
 from dsa_des.costs.output import draw_costs, print_costs, write_table
-from dsa_des.costs.study import Compare, RungCost, applies, climb
+from dsa_des.costs.study import RungCost, applies, climb
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
@@ -76,7 +76,8 @@ def cost_of_accuracy(
             chain = found.rows
             notes.append(found.picked)
             write_table(folder / "chain.parquet", chain)
-            draw_chain(folder / "chain.png", variants.scene.title, chain)
+            label = compare.difference.label
+            draw_chain(folder / "chain.png", variants.scene.title, chain, label)
         content: dict[str, Any] = {"rows": rows, "notes": notes}
         if whole_chain:
             content["chain"] = chain
@@ -84,7 +85,7 @@ def cost_of_accuracy(
     if as_json:
         say_json(rows + chain)
     else:
-        print_costs(costs, chain, notes)
+        print_costs(costs, chain, notes, compare)
         names = sorted(path.name for path in target.path.iterdir())
         say()
         say(f"{target.path}: {', '.join(names)}")
@@ -134,17 +135,9 @@ def ladders_to_climb(
     return climbs, notes
 
 
-def comparison() -> Compare:
-    """Return what tells runs apart: the sections of all registered reports together."""
-    reports = [report for report in load_reports() if hasattr(report, "compare")]
-
-    def compare(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for report in reports:
-            found.update(report.compare(reference, other))
-        return found
-
-    return compare
+def comparison() -> Comparison:
+    """Return what tells runs apart: all registered reports together."""
+    return Comparison(load_reports())
 
 
 def _draw_maps(name: str, out: str | None) -> None:

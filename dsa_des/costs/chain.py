@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.ladder import Unavailable
+from dsa_des.costs.comparison import Comparison
 from dsa_des.costs.front import on_front
-from dsa_des.costs.study import Compare, RungCost
+from dsa_des.costs.study import RungCost
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.drawing import drawing, figure_text
@@ -36,10 +37,10 @@ class ChainStudy:
     picked: str
 
 
-def run_chain(variants: Variants, costs: Sequence[RungCost], compare: Compare) -> ChainStudy:
+def run_chain(variants: Variants, costs: Sequence[RungCost], comparison: Comparison) -> ChainStudy:
     """Run combinations of rungs and compare what they find with the references together.
 
-    The error is the share of detections gained or lost. Every combination is run seven times,
+    The error is the comparison's `Difference`. Every combination is run seven times,
     interleaved, without recording; its cost is the shortest of them.
     """
     groups = [
@@ -62,13 +63,11 @@ def run_chain(variants: Variants, costs: Sequence[RungCost], compare: Compare) -
     for combination in combinations:
         try:
             scene = variants.with_rungs(_choices(combination))
-            effect = compare(reference, _recorded(scene))
+            effect = comparison(reference, _recorded(scene))
         except (Unavailable, SceneError, BlockFailure):
             continue
-        changed = effect.get("detections_gained", 0) + effect.get("detections_lost", 0)
-        error = changed / max(effect.get("detections_reference", 0), 1)
         scenes.append(scene)
-        rows.append(_row(combination, error, effect))
+        rows.append(_row(combination, comparison, effect))
     times = _timed(scenes)
     for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
         row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_target_scans(scene), 1)
@@ -138,22 +137,24 @@ def _target_scans(scene: Scene) -> int:
     return scans * width
 
 
-def _row(combination: Sequence[RungCost], error: float, effect: dict[str, Any]) -> dict[str, Any]:
+def _row(
+    combination: Sequence[RungCost], comparison: Comparison, effect: dict[str, Any]
+) -> dict[str, Any]:
     return {
         "block": "whole chain",
         "ladder": "chain",
         "rung": ", ".join(f"{c.block} {c.rung}" for c in combination),
         "reference": ", ".join(f"{c.block} {c.reference}" for c in combination),
         "in_scene": all(c.in_scene for c in combination),
-        "error_quantity": "detections that differ",
+        "error_quantity": comparison.difference.name,
         "error_unit": "share",
-        "error_p95": error,
+        "error_p95": comparison.difference.share(effect),
         "effect": effect,
     }
 
 
-def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw the share of detections that differ against the cost of the whole chain."""
+def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: str) -> None:
+    """Draw how much runs differ, named by `label`, against the cost of the whole chain."""
     best = sorted(
         (row for row in rows if row["pareto"]), key=lambda row: row["cpu_us_per_target_scan"]
     )
@@ -180,6 +181,6 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]]) -> None:
         axes.set_yscale("log")
         axes.set_title(f"{figure_text(title, 80)}: the whole chain")
         axes.set_xlabel("CPU time of the run, µs per target-scan")
-        axes.set_ylabel("share of detections gained or lost")
+        axes.set_ylabel(label)
         axes.legend(fontsize=8)
         figure.subplots_adjust(bottom=(key_in + 0.6) / height_in, left=0.11, right=0.97, top=0.93)

@@ -7,19 +7,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from dsa_des.costs.comparison import Comparison, shown
 from dsa_des.costs.study import RungCost
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.terminal import terminal
 from dsa_des.text.safe_text import printable, shortened
 
-_EFFECT_COLUMNS = (
-    ("first seen, m", "first_detection_range_change_m", "+,.0f"),
-    ("s", "first_detection_time_change_s", "+.2f"),
-    ("gained", "detections_gained", "d"),
-    ("lost", "detections_lost", "d"),
-    ("fused", "fused_share", ".1%"),
-)
 _NO_ERROR = "-"
 
 
@@ -47,7 +41,10 @@ def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def print_costs(
-    costs: Sequence[RungCost], chain: Sequence[Mapping[str, Any]], notes: Sequence[str]
+    costs: Sequence[RungCost],
+    chain: Sequence[Mapping[str, Any]],
+    notes: Sequence[str],
+    comparison: Comparison,
 ) -> None:
     """Print one table per ladder."""
     from rich.table import Table
@@ -63,34 +60,31 @@ def print_costs(
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column("rung", no_wrap=True)
         for heading in ("us/target-scan", "mean", "p95", "max",
-                        *(heading for heading, _, _ in _EFFECT_COLUMNS)):  # fmt: skip
+                        *(change.heading for change in comparison.changes)):  # fmt: skip
             table.add_column(heading, justify="right", no_wrap=True)
         table.add_column("")
         for cost in rungs:
-            table.add_row(*_cells(cost))
+            table.add_row(*_cells(cost, comparison))
         console.print(table, highlight=False)
     if chain:
-        _print_chain(console, chain)
+        _print_chain(console, chain, comparison)
     for note in notes:
         console.print(f"note: {note}", highlight=False)
 
 
-def _cells(cost: RungCost) -> list[str]:
+def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
     name = cost.rung + (" (scene)" if cost.in_scene else "")
     if cost.unavailable:
         missing = f"not available: {cost.unavailable}"
-        return [name, *[_NO_ERROR] * (4 + len(_EFFECT_COLUMNS)), missing]
+        return [name, *[_NO_ERROR] * (4 + len(comparison.changes)), missing]
     errors = [cost.error.mean, cost.error.p95, cost.error.maximum]
-    effects = [
-        _NO_ERROR if (value := cost.effect.get(key)) is None else format(value, form)
-        for _, key, form in _EFFECT_COLUMNS
-    ]
+    effects = [shown(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
         f"{cost.cpu_us_per_target_scan:.3g} ± {cost.cpu_spread_us:.1g}",
         *(_NO_ERROR if math.isnan(error) else f"{error:.3g}" for error in errors),
         *effects,
-        "; ".join(_remarks(cost)),
+        "; ".join(_remarks(cost) + comparison.remarks(cost.effect)),
     ]
 
 
@@ -102,28 +96,26 @@ def _remarks(cost: RungCost) -> list[str]:
         remarks.append("inside the budget")
     if cost.rung == cost.reference:
         remarks.append(f"own error {cost.error_note}" if cost.errors else cost.error_note)
-    missed = cost.effect.get("never_detected")
-    if missed:
-        remarks.append(f"never sees {', '.join(missed)}")
     return remarks
 
 
-def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]]) -> None:
+def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: Comparison) -> None:
     from rich.table import Table
     from rich.text import Text
 
     console.print()
     console.print(Text.assemble(("whole chain", "bold"), ", the front"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("us/target-scan", "detections that differ", "first seen, m", "rungs"):
+    telling = comparison.changes[:1]
+    headings = [change.heading for change in telling]
+    for heading in ("us/target-scan", comparison.difference.name, *headings, "rungs"):
         table.add_column(heading, justify="left" if heading == "rungs" else "right")
     for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"])):
         if row["pareto"]:
-            first = row["effect"].get("first_detection_range_change_m")
             table.add_row(
                 f"{row['cpu_us_per_target_scan']:.3g}",
                 f"{row['error_p95']:.2%}",
-                _NO_ERROR if first is None else f"{first:+,.0f}",
+                *(shown(change, row["effect"], _NO_ERROR) for change in telling),
                 row["rung"],
             )
     console.print(table, highlight=False)

@@ -4,7 +4,8 @@ They are found by the entry-point group ``dsa_des.reports``; each is a class wit
 `Report`, called without arguments.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -19,8 +20,51 @@ if TYPE_CHECKING:
 REPORTS = "dsa_des.reports"
 
 
+@dataclass(frozen=True)
+class Change:
+    """A number of `Report.compare` as tables show it.
+
+    Parameters
+    ----------
+    heading : str
+        Of its column, with the unit.
+    key : str
+        In what `Report.compare` returns.
+    form : str
+        Format specification, such as ``+.2f``.
+    """
+
+    heading: str
+    key: str
+    form: str
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How much two runs differ, as one number.
+
+    Parameters
+    ----------
+    name : str
+        What is counted, for tables: ``detections that differ``.
+    label : str
+        The same for the axis of a figure.
+    share : callable
+        From what `Report.compare` returned to a share, 0 where the runs are alike.
+    """
+
+    name: str
+    label: str
+    share: Callable[[Mapping[str, Any]], float]
+
+
 class Report(Protocol):
     """What a report plug-in can do."""
+
+    #: Numbers of `compare` that are worth a column, the most telling one first.
+    changes: Sequence[Change]
+    #: What is weighed against the cost of whole scenes.
+    difference: Difference
 
     def observers(self, simulation: "Simulation") -> list[Observer]:
         """Return running summaries over the recorded rows of this run."""
@@ -30,6 +74,9 @@ class Report(Protocol):
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
+
+    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+        """Return what of `compare`'s result is better said in words."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
         """Draw figures from the Parquet tables in `folder` into it and return their paths.

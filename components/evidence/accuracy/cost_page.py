@@ -114,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     variants, first = costs_of("first_light.toml")
     draw_costs(images / "cost_first_light.png", variants.scene.title, first)
     chain = run_chain(variants, first, compare)
-    draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows)
+    label = compare.difference.label
+    draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows, label)
     _, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
     draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
     page = _PAGE.format(
