@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
-from dsa_des.commands import run as run_module
 from dsa_des.files.unfinished import PREFIX
+from dsa_des.run import recorded_run as run_module
 
 
 def call(*arguments: object) -> Result:
