@@ -9,6 +9,11 @@ from typing import Annotated, Any
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from dsa_des.component import ScenePath
+from dsa_des.input_files import InputFileError, status_of
+from dsa_des.safe_text import shortened
+
+#: A table of every degree in both angles is a hundredth of it.
+LARGEST_TABLE_BYTES = 64 * 1024 * 1024
 
 _PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
 
@@ -51,12 +56,12 @@ def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
         if isinstance(value, TableFile):
             return value
         path = _PATH.validate_python(value)
+        name = shortened(str(path), 300)
         try:
-            status = path.stat()
+            status = status_of(path, LARGEST_TABLE_BYTES)
             return _read(reader, path, status.st_mtime_ns, status.st_size)
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-            raise ValueError(f"must be a table that can be read: {path}: {reason}") from None
+        except InputFileError as error:
+            raise ValueError(f"must be a table that can be read: {name}: {error}") from None
 
     return validate
 

@@ -6,6 +6,7 @@ or after a month. Seconds as float appear only where physics or people read them
 """
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,6 +19,12 @@ from dsa_des.types import IntArray
 NANOSECONDS = 10**9
 # Ticks are kept in int64 arrays; one bit is left for sums of two ticks.
 MAX_TICK = 2**62
+# Digits of an exact number's numerator and denominator. Fractions are whole numbers of any size,
+# and "1e-9999999" is one of ten million digits that every sum would carry along.
+_MOST_DIGITS = 60
+_LARGEST: int = 10**_MOST_DIGITS
+_EXPONENT = re.compile(r"[eE]([+-]?\d+)\s*$")
+_LONGEST_TEXT = 200
 
 
 def parse_rational(value: object) -> Fraction:
@@ -33,18 +40,34 @@ def parse_rational(value: object) -> Fraction:
     Raises
     ------
     ValueError
-        If the value is not a finite number.
+        If the value is not a finite number, or one of too many digits.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str | Fraction):
         raise ValueError('must be a number or a text such as "30000/1001"')
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError("must be finite")
-        return Fraction(repr(value))
+        value = repr(float(value))
+    elif isinstance(value, str) and _too_long(value):
+        raise ValueError(_TOO_LONG)
     try:
-        return Fraction(value)
+        number = Fraction(value)
     except (ValueError, ZeroDivisionError):
         raise ValueError('must be a number or a text such as "30000/1001"') from None
+    if abs(number.numerator) > _LARGEST or number.denominator > _LARGEST:
+        raise ValueError(_TOO_LONG)
+    return number
+
+
+_TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_MOST_DIGITS} digits"
+
+
+def _too_long(text: str) -> bool:
+    """Tell, without expanding it, whether a text stands for a number of too many digits."""
+    exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
+    return len(text) > _LONGEST_TEXT or (
+        exponent is not None and abs(int(exponent[1])) > _LONGEST_TEXT
+    )
 
 
 def resolution(times_s: Iterable[Fraction]) -> int:

@@ -11,11 +11,21 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
 
 from dsa_des.clock import ClockSpec, parse_rational
 from dsa_des.effects import Effect
+from dsa_des.input_files import resolve_home
 from dsa_des.ladder import Ladder
+from dsa_des.limits import refuse_extremes
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.randomness import Stream, Streams
@@ -54,7 +64,7 @@ class SourcedText(str):
 def _resolve_path(value: object) -> Path:
     if not isinstance(value, str | Path) or not str(value):
         raise ValueError("must be a path, as text")
-    path = Path(str(value)).expanduser()
+    path = resolve_home(str(value))
     if isinstance(value, SourcedText) and not path.is_absolute():
         path = value.folder / path
     return path
@@ -69,6 +79,13 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
+    @field_validator("*", mode="after")
+    @classmethod
+    def _computable(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse numbers that no physics can compute with (`dsa_des.limits`)."""
+        refuse_extremes(info.field_name or "", value)
+        return value
+
 
 class ClockedParameters(Parameters):
     """Parameters of a block with a scan clock of its own."""
@@ -78,7 +95,7 @@ class ClockedParameters(Parameters):
         default=Fraction(0), description="Time of the first scan, s."
     )
     rate_error_ppm: Rational = Field(
-        default=Fraction(0), description="Error of the scan rate, parts per million."
+        default=Fraction(0), le=1_000_000, description="Error of the scan rate, parts per million."
     )
     jitter_s: float = Field(
         default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from dsa_des.channel import Channel
+from dsa_des.clock import MAX_TICK
 from dsa_des.errors import Problem, SceneError
 from dsa_des.process import Demand, Node
 from dsa_des.randomness import Streams
@@ -72,6 +73,25 @@ def find_demands(
     return [found[key] for key in sorted(found)]
 
 
+def check_reach(scene: Scene, nodes: Mapping[str, Node], end_tick: int) -> None:
+    """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
+    delays = sum(
+        channel.delay_ticks
+        for node in nodes.values()
+        for channels in node.channels.values()
+        for channel in channels
+    )
+    jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
+    if end_tick + delays + jitter >= MAX_TICK:
+        longest_s = MAX_TICK / scene.ticks_per_s
+        message = (
+            f"the run lasts {end_tick / scene.ticks_per_s:.4g} s and the wires take up to "
+            f"{(delays + jitter) / scene.ticks_per_s:.4g} s: this scene's ticks reach "
+            f"{longest_s:.4g} s"
+        )
+        raise SceneError([_problem(scene, "duration_s", message)])
+
+
 def _problem(scene: Scene, key: str, message: str) -> Problem:
     return Problem(str(scene.path), key, message)
 
@@ -96,4 +116,11 @@ def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
         message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
         raise SceneError([_problem(scene, "wires", message)])
     # Rounded down: a message must not arrive a tick after the scan it was sent for.
-    return wire.delay_scans * int(clock.period)
+    delay = wire.delay_scans * int(clock.period)
+    if delay >= MAX_TICK:
+        message = (
+            f"{wire}: {wire.delay_scans} scans take longer than this scene's ticks reach, "
+            f"{MAX_TICK / scene.ticks_per_s:.4g} s"
+        )
+        raise SceneError([_problem(scene, "wires", message)])
+    return delay

@@ -9,10 +9,26 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
+from dsa_des.safe_text import MOST_OF_A_VALUE, printable, shortened
+
+#: Problems that are listed in one error; the others are only counted.
+MOST_PROBLEMS = 20
+# What one problem shows of a value, a key and a message.
+_KEY_LENGTH = 200
+_LINE_LENGTH = 1000
+_MOST_LINES = 2 * MOST_PROBLEMS
+# Names longer or more than these are not compared: that takes longer than a user waits.
+_LONGEST_NAME = 100
+_MOST_NAMES = 2000
+
 
 def nearest(name: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed name closest to a misspelt one, or None when nothing is close."""
-    names = list(allowed)
+    if len(name) > _LONGEST_NAME:
+        return None
+    names = [candidate for candidate in allowed if len(candidate) <= _LONGEST_NAME]
+    if len(names) > _MOST_NAMES:
+        return None
     lower = {candidate.lower(): candidate for candidate in names}
     found = get_close_matches(name.lower(), list(lower), n=1, cutoff=0.6)
     return lower[found[0]] if found else None
@@ -26,8 +42,42 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
         return f"; did you mean {close!r}?"
     if not names:
         return ""
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    shown = ", ".join(shortened(name, MOST_OF_A_VALUE) for name in names[:12])
+    shown += ", ..." if len(names) > 12 else ""
     return f"; allowed: {shown}"
+
+
+class Lines(str):
+    """A message of several lines, each of which is printable already."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, lines: Iterable[object]) -> "Lines":
+        """Return lines, made printable, as one message."""
+        return cls("\n".join(printable(line) for line in lines))
+
+
+def shown_value(value: Any) -> str:
+    """Return how a value is shown in a message: as Python writes it, cut off where it is long."""
+    if isinstance(value, str):
+        # Cut before it is quoted: a long text is not copied.
+        return shortened(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        left, right = "{}" if isinstance(value, dict) else "[]" if isinstance(value, list) else "()"
+        text = left
+        for item in value:
+            text += ", " if len(text) > 1 else ""
+            text += shown_value(item)
+            if isinstance(value, dict):
+                text += f": {shown_value(value[item])}"
+            if len(text) > MOST_OF_A_VALUE:
+                return shortened(text, MOST_OF_A_VALUE)
+        text += "," if isinstance(value, tuple) and len(value) == 1 else ""
+        return shortened(text + right, MOST_OF_A_VALUE)
+    return shortened(repr(value), MOST_OF_A_VALUE)
 
 
 _UNSET: Any = object()
@@ -55,15 +105,22 @@ class Problem:
     value: Any = _UNSET
 
     def __str__(self) -> str:
-        where = f"{self.source}: {self.key}" if self.key else self.source
+        where = shortened(self.source, _LINE_LENGTH)
+        where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
-            shown = repr(self.value)
-            where += f" = {shown if len(shown) <= 80 else shown[:77] + '...'}"
-        return f"{where}: {self.message}"
+            where += f" = {shown_value(self.value)}"
+        # On one line whatever stands in a name: nobody can write a message of ours.
+        lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
+        return f"{where}: " + "\n".join(
+            shortened(line, _LINE_LENGTH) for line in lines[:_MOST_LINES]
+        )
 
 
 class SceneError(Exception):
-    """A scene cannot be run; `problems` lists everything that is wrong with it."""
+    """A scene cannot be run; `problems` lists everything that is wrong with it.
+
+    As text, the first `MOST_PROBLEMS` of them and the number of all.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = list(problems)
@@ -73,12 +130,20 @@ class SceneError(Exception):
         if len(self.problems) == 1:
             return str(self.problems[0])
         lines = [f"{len(self.problems)} problems:"]
-        lines += [f"  {problem}" for problem in self.problems]
+        lines += [f"  {problem}" for problem in self.problems[:MOST_PROBLEMS]]
+        if len(self.problems) > MOST_PROBLEMS:
+            lines.append(f"  and {len(self.problems) - MOST_PROBLEMS} more")
         return "\n".join(lines)
 
 
 class UsageError(Exception):
-    """A command was called with something it cannot use (exit code 2)."""
+    """A command was called with something it cannot use (exit code 2).
+
+    Each argument is one line of the message.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(printable(line) for line in self.args)
 
 
 class BlockFailure(Exception):
@@ -97,6 +162,21 @@ class BlockFailure(Exception):
         )
         super().__init__(block, path, time_s, scan, reason)
 
+    #: Exit code of a command that it ends.
+    exit_code = 1
+
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
-        return f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        return printable(
+            f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        )
+
+
+class SetupFailure(BlockFailure):
+    """A block raised an exception before anything ran: the scene cannot be used."""
+
+    exit_code = 2
+
+
+class OutputError(Exception):
+    """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

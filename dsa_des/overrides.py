@@ -5,17 +5,18 @@ name, its wires and the parameters the new type knows, and lists those it droppe
 """
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from dsa_des.block_options import BlockOptions
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, did_you_mean
-from dsa_des.registry import UnknownType, find
+from dsa_des.registry import NotImported, UnknownType, find
 from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, dotted
+from dsa_des.toml_input import DEEPEST, NotToml, TomlError, parse_toml
 
 #: An item of a list, ``[3]`` or ``3``, and what follows it.
+_INDEX = re.compile(r"[0-9]{1,9}")
 _ITEM = re.compile(r"\[?([^.\[\]]*)\]?\.?(.*)")
 
 
@@ -29,12 +30,19 @@ def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value as TOML would read it; what is not TOML is text."""
+    """Return a value as TOML would read it; what is not TOML is text.
+
+    Raises
+    ------
+    TomlError
+        If it is nested too deeply or holds a whole number of too many digits.
+    """
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text
-    return _sourced(value)
+        value = parse_toml(f"value = {text}")
+    except NotToml:
+        return _sourced(text)
+    # What follows a line's end would be further keys.
+    return _sourced(value["value"] if set(value) == {"value"} else text)
 
 
 def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
@@ -42,8 +50,12 @@ def apply_set(scene: SceneFile, assignment: str) -> list[Problem]:
     parsed = parse_assignment(assignment, "--set")
     if isinstance(parsed, Problem):
         return [parsed]
-    text, value = parsed
-    return set_value(scene, text, parse_value(value), COMMAND_LINE)
+    text, written = parsed
+    try:
+        value = parse_value(written)
+    except TomlError as error:
+        return [Problem(COMMAND_LINE, text, str(error))]
+    return set_value(scene, text, value, COMMAND_LINE)
 
 
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
@@ -71,6 +83,9 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
             hint = did_you_mean(str(step), container)
             return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
         key.append(step)
+        if len(key) > DEEPEST:
+            message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
+            return [Problem(source, text, message)]
         if not rest:
             container[step] = value
             break
@@ -99,7 +114,11 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
         return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
     try:
-        cls = find(type_name)
+        cls = find(type_name, dotted(_type_key(name)))
+    except NotImported:  # what it would drop is not known: nothing is dropped
+        blocks[name]["type"] = _sourced(type_name)
+        scene.sources[_type_key(name)] = COMMAND_LINE
+        return [], []
     except UnknownType as error:
         return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
     block = blocks[name]
@@ -130,7 +149,7 @@ def _step(container: Any, rest: str) -> tuple[str | int, str, str]:
     """
     if isinstance(container, list):
         part, tail = _ITEM.match(rest).groups()  # type: ignore[union-attr]
-        inside = part.isdecimal() and int(part) < len(container)
+        inside = _INDEX.fullmatch(part) is not None and int(part) < len(container)
         return int(part) if inside else part, part, tail
     there = [
         name for name in container if rest == name or rest.startswith((f"{name}.", f"{name}["))

@@ -9,11 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dsa_des.errors import UsageError
+from dsa_des.safe_text import shortened
 
 #: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
 LONGEST_WAIT_S = 0.1
 #: Systems refuse to sleep for centuries, s.
 LONGEST_SLEEP_S = 3600.0
+_SLOWEST, _FASTEST = 1e-6, 1e12
 
 
 def parse_factor(text: str) -> float:
@@ -28,10 +30,10 @@ def parse_factor(text: str) -> float:
         factor = float(text)
     except ValueError:
         factor = math.nan
-    if not (math.isfinite(factor) and factor > 0.0):
+    if not _SLOWEST <= factor <= _FASTEST:
         raise UsageError(
-            f"--realtime {text}: must be a number above 0: simulated seconds per second, 1 for "
-            "the speed of the clock"
+            f"--realtime {shortened(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
+            f"{_FASTEST:g}: simulated seconds per second, 1 for the speed of the clock"
         )
     return factor
 

@@ -3,11 +3,12 @@
 import re
 import typing
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 from pydantic import ValidationError
 
-from dsa_des.component import Parameters
+from dsa_des.component import Parameters, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene_file import Key, SceneFile
 
@@ -110,6 +111,8 @@ def _at(scene_file: SceneFile, key: Key) -> Any:
 
 
 def _shown(value: Any) -> Any:
+    if isinstance(value, Fraction):
+        return as_written(value)
     return str(value) if isinstance(value, str) else value
 
 

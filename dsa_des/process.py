@@ -21,6 +21,7 @@ from dsa_des.message import Message, by_output
 from dsa_des.processors import Processor
 from dsa_des.replica_time import ReplicaTime
 from dsa_des.sorted_union import last_at_or_before, sorted_union
+from dsa_des.strangers import is_ours_to_obey
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -122,7 +123,9 @@ class Node:
             yield from own(env)
         except Abort:
             raise
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
 
@@ -245,7 +248,9 @@ class Node:
             self.send(self.runner.run(wake), ticks)
         except Abort:
             raise
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             self.simulation.fail(self, ticks, error, int(scans[0]))
 
     def _collect(self, port: str, end: int) -> list[Arrivals]:

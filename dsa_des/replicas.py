@@ -211,7 +211,10 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
 def key_path(key: str) -> tuple[str | int, ...]:
     """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
     parts = key.replace("[", ".").replace("]", "").split(".")
-    return tuple(int(part) if part.isdecimal() else part for part in parts)
+    return tuple(
+        int(part) if part.isascii() and part.isdecimal() and len(part) < 10 else part
+        for part in parts
+    )
 
 
 def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:

@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 from dsa_des.clock import MAX_TICK, ClockSpec, resolution
 from dsa_des.errors import Problem
+from dsa_des.safe_text import shortened
 from dsa_des.scene_file import Key, SceneFile
+from dsa_des.strangers import Left, strangers_code
 from dsa_des.wiring import Wire
 
 if TYPE_CHECKING:
+    from dsa_des.processors import ProcessorParameters
     from dsa_des.scene import Block
 
 # Assumed where a scene leaves its length to its sources.
@@ -48,10 +51,10 @@ def check_times(
     wires: Sequence[Wire],
     duration_s: Fraction | None,
     problems: list[Problem],
+    processors: "Mapping[str, ProcessorParameters] | None" = None,
 ) -> int:
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
-    specs = {name: block.cls.clock_of(block.parameters) for name, block in blocks.items()}
-    clocks = {name: spec for name, spec in specs.items() if spec is not None}
+    clocks = _clocks(scene, blocks, problems)
     late = [wire for wire in wires if wire.total_delay_s or wire.jitter_s]
     times = [wire.total_delay_s for wire in late]
     for spec in clocks.values():
@@ -59,7 +62,10 @@ def check_times(
     ticks_per_s = resolution(times)
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
-        shown = (f"{name} {spec.rate_hz} Hz + {spec.offset_s} s" for name, spec in clocks.items())
+        shown = (
+            shortened(f"{name} {spec.rate_hz} Hz + {spec.offset_s} s", 100)
+            for name, spec in clocks.items()
+        )
         message = (
             "these clocks have no common tick that fits 64 bits for the whole run: "
             f"{', '.join(shown)}; give offsets to fewer digits or rates as simpler fractions"
@@ -73,9 +79,35 @@ def check_times(
     for wire in late:
         if wire.total_delay_s + wire.jitter_s >= longest_s:
             problems.append(scene.problem(("wires",), f"{wire}: delay_s {limit}"))
+    for name, processor in (processors or {}).items():
+        for what in ("service_s", "service_spread_s"):
+            if (time_s := getattr(processor, what)) >= longest_s:
+                key: Key = ("processors", name, what)
+                problems.append(scene.problem(key, limit, str(time_s)))
     for name, spec in clocks.items():
         _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)
     return ticks_per_s
+
+
+def _clocks(
+    scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]
+) -> dict[str, ClockSpec]:
+    """Return the scan clock of every block that has one; a class that cannot say is a problem."""
+    clocks: dict[str, ClockSpec] = {}
+    for name, block in blocks.items():
+        try:
+            with strangers_code():
+                spec = block.cls.clock_of(block.parameters)
+        except Left as error:
+            message = f"{block.cls.path()} cannot say its clock (clock_of): {error}"
+            problems.append(scene.problem(("blocks", name), message))
+            continue
+        if isinstance(spec, ClockSpec):
+            clocks[name] = spec
+        elif spec is not None:
+            message = f"{block.cls.path()} gives no clock: clock_of must return a ClockSpec or None"
+            problems.append(scene.problem(("blocks", name), message))
+    return clocks
 
 
 def _check_clock(
@@ -104,6 +136,10 @@ def check_activity(
     problems: list[Problem],
 ) -> None:
     """Add blocks that would never run, and wires that hold a message for a queued input."""
+    faults: list[Problem] = []
+    clocks = _clocks(scene, blocks, faults)
+    if faults:  # said before
+        return
     woken = {
         wire.target
         for wire in wires
@@ -111,7 +147,7 @@ def check_activity(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
-        if not alive and block.cls.clock_of(block.parameters) is None:
+        if not alive and name not in clocks:
             message = (
                 "would never run: it has no scan clock, no process of its own, and no wire into "
                 "a trigger input"

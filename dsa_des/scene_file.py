@@ -5,7 +5,7 @@ first and its own keys override them, table by table. Paths are taken from the f
 that holds them.
 """
 
-import tomllib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +13,26 @@ from typing import Any
 
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, SceneError
+from dsa_des.input_files import (
+    LARGEST_TOML_BYTES,
+    InputFileError,
+    NoSuchFile,
+    is_folder,
+    is_regular_file,
+    read_input_text,
+)
+from dsa_des.safe_text import shortened
+from dsa_des.toml_input import DEEPEST, TomlError, parse_toml
 
 Key = tuple[str | int, ...]
 COMMAND_LINE = "command line"
+# Files that extend each other in a row; scenes have about four.
+_LONGEST_CHAIN = 32
+# Values taken from files, counted each time that a file is extended: files that extend the next
+# one twice would double them at every step.
+_MOST_VALUES = 20_000_000
+# What a file counts for, however short it is.
+_VALUES_PER_FILE = 200
 
 
 def dotted(key: Key) -> str:
@@ -76,43 +93,54 @@ class _Reader:
     def __init__(self, problems: list[Problem]) -> None:
         self.problems = problems
         self.sources: dict[Key, str] = {}
+        #: What was read of each file: its real path, and its tables or what is wrong with it.
+        self._read: dict[Path, tuple[Path, dict[str, Any] | Exception]] = {}
+        self._taken = 0
 
     def file(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
-        text = self._text(path, at, chain)
-        if text is None:
+        self._count(path, _VALUES_PER_FILE)
+        if path not in self._read:
+            self._read[path] = _tables_of(path)
+        real, tables = self._read[path]
+        if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
+            self.sources[at] = str(path)
+            return self._table(tables, path, at, (*chain, real))
+        if isinstance(tables, TomlError):
+            self.problems.append(Problem(str(path), "", str(tables)))
             return {}
-        try:
-            table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            self.problems.append(Problem(str(path), "", f"is not valid TOML: {error}"))
-            return {}
-        self.sources[at] = str(path)
-        return self._table(table, path, at, (*chain, path.resolve()))
-
-    def _text(self, path: Path, at: Key, chain: tuple[Path, ...]) -> str | None:
-        where = Problem(str(path), "", "")
-        if at or chain:
-            where = Problem(self.sources.get(at, str(chain[-1])), dotted((*at, "extends")), "")
-        if path.resolve() in chain:
-            message = f"extends itself by way of {path}"
-        elif path.is_dir():
-            message = f"{path} is a folder; a TOML file is needed"
+        name = shortened(str(path), 300)
+        if real in chain:
+            message = f"extends itself by way of {name}"
+        elif isinstance(tables, dict):
+            message = f"is the {_LONGEST_CHAIN + 1}th file in a row that extends the next one: "
+            message += f"at most {_LONGEST_CHAIN} are read"
+        elif isinstance(tables, NoSuchFile):
+            what = f"there is no file {name}" if chain else "there is no such file"
+            message = what + _similar_file(path)
+        elif is_folder(path):
+            message = f"{name} is a folder; a TOML file is needed"
         else:
-            try:
-                return path.read_text(encoding="utf-8")
-            except FileNotFoundError:
-                what = f"there is no file {path}" if chain else "there is no such file"
-                message = what + _similar_file(path)
-            except UnicodeDecodeError:
-                message = f"{path} is not a text file in UTF-8"
-            except OSError as error:
-                message = f"{path} cannot be read: {error.strerror}"
-        self.problems.append(Problem(where.source, where.key, message))
-        return None
+            message = f"{name} {tables}"
+        if at or chain:
+            source, key = self.sources.get(at, str(chain[-1])), dotted((*at, "extends"))
+            self.problems.append(Problem(source, key, message))
+        else:
+            self.problems.append(Problem(str(path), "", message))
+        return {}
+
+    def _count(self, path: Path, values: int = 1) -> None:
+        self._taken += values
+        if self._taken > _MOST_VALUES:
+            message = f"with all that it extends, has more than {_MOST_VALUES:,} values"
+            raise SceneError([Problem(str(path), "", message)])
 
     def _table(
         self, table: Mapping[str, Any], path: Path, at: Key, chain: tuple[Path, ...]
     ) -> dict[str, Any]:
+        if len(at) > DEEPEST:
+            message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
+            self.problems.append(Problem(str(path), dotted(at), message))
+            return {}
         merged: dict[str, Any] = {}
         bases = table.get("extends", [])
         for base in bases if isinstance(bases, list) else [bases]:
@@ -133,6 +161,7 @@ class _Reader:
         return merge(merged, own)
 
     def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
+        self._count(path)
         self.sources[at] = str(path)
         if isinstance(value, dict):
             return self._table(value, path, at, chain)
@@ -141,6 +170,15 @@ class _Reader:
         if isinstance(value, str):
             return SourcedText.of(value, path.parent)
         return value
+
+
+def _tables_of(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
+    """Return the real path of a file, and its tables or why it has none."""
+    try:
+        text = read_input_text(path, LARGEST_TOML_BYTES)
+        return Path(os.path.realpath(path)), parse_toml(text)
+    except (InputFileError, TomlError) as error:
+        return path, error
 
 
 def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -157,8 +195,8 @@ def _similar_file(path: Path) -> str:
     from dsa_des.errors import nearest
 
     try:
-        names = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
+        names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
     except OSError:
-        return f" (there is no folder {path.parent})"
+        return f" (there is no folder {shortened(str(path.parent), 300)})"
     close = nearest(path.name, names)
     return f"; did you mean {path.parent / close}?" if close else ""

@@ -8,6 +8,7 @@ nothing that is recorded.
 import random
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -17,11 +18,11 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dsa_des.clock import ScanClock
+from dsa_des.clock import MAX_TICK, ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
-from dsa_des.connections import connect
+from dsa_des.connections import check_reach, connect
 from dsa_des.effects import Planned, plan, unspent
-from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.errors import BlockFailure, Problem, SceneError, SetupFailure
 from dsa_des.graph import depths, window_order
 from dsa_des.message import Message
 from dsa_des.pinpoint import pinpoint
@@ -32,10 +33,16 @@ from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
 from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
 from dsa_des.scene import Scene
+from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
+# At a microsecond each, the fewest that anything takes, eleven days.
+_MOST_SCANS = 1e12
+# What a block raises, before anything runs, because of what its table says: nothing it can be
+# made of, or nothing that can be computed or held in memory.
+_REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 
 
 @dataclass
@@ -63,9 +70,14 @@ class Outcome:
     def report(self) -> dict[str, Any]:
         """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
         sections: dict[str, Any] = {}
-        for component in self.components.values():
-            for section, content in component.report().items():
-                sections.setdefault(section, {}).update(content)
+        for name, component in self.components.items():
+            try:
+                for section, content in component.report().items():
+                    sections.setdefault(section, {}).update(content)
+            except BaseException as error:
+                if is_ours_to_obey(error):
+                    raise
+                raise _failure(name, type(component), self.duration_s, error) from error
         return sections
 
 
@@ -135,6 +147,9 @@ class Simulation:
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
         connect(scene, self.nodes, self.replicas)
+        if self.replicas is None:  # replicas in lock step were judged one by one
+            check_reach(scene, self.nodes, self.end_tick)
+            self._refuse_endless_work()
         self.window_ticks = self._window_length(window)
 
     #: Whether a failure inside a window is traced to its instant by running the scene again.
@@ -162,15 +177,36 @@ class Simulation:
                 sections=self.scene.sections,
                 simulate_everything=simulate_everything,
             )
-            try:
+            with self._preparing(name, problems):
                 components[name] = block.cls(name, self._parameters(name), context)
-            except (ValueError, OSError) as error:
-                problems.append(self._problem(f"blocks.{name}", error))
-            except Exception as error:
-                raise _failure(name, block.cls, 0.0, error) from error
         if problems:
             raise SceneError(problems)
         return components
+
+    @contextmanager
+    def _preparing(self, name: str, problems: list[Problem]) -> Iterator[None]:
+        """Make what a block raises before the run an error that names it."""
+        try:
+            yield
+        except (SceneError, BlockFailure):
+            raise
+        except _REFUSALS as error:
+            problems.append(self._problem(f"blocks.{name}", reason_of(error)))
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            path = self.scene.blocks[name].cls.path()
+            raise SetupFailure(name, path, 0.0, None, told(error)) from error
+
+    def _asked(self, name: str, what: str, *arguments: Any) -> Any:
+        """Return what a method of a block returns before the run."""
+        problems: list[Problem] = []
+        answer = None
+        with self._preparing(name, problems):
+            answer = getattr(self.components[name], what)(*arguments)
+        if problems:
+            raise SceneError(problems)
+        return answer
 
     def _parameters(self, name: str) -> Any:
         return self.scene.blocks[name].parameters
@@ -181,12 +217,16 @@ class Simulation:
     def _duration(self) -> Fraction:
         if self.scene.duration_s is not None:
             return self.scene.duration_s
-        lengths = [component.natural_duration_s() for component in self.components.values()]
+        lengths = [self._asked(name, "natural_duration_s") for name in self.components]
         known = [length for length in lengths if length is not None]
         if not known:
             message = "is required: no block of this scene has a length of its own"
             raise SceneError([self._problem("duration_s", message)])
-        return max(known)
+        longest = max(known)
+        if longest * self.ticks_per_s >= MAX_TICK:
+            message = f"is {float(longest):.4g} s by the data of its blocks: give a shorter one"
+            raise SceneError([self._problem("duration_s", message)])
+        return longest
 
     def _offer_down_the_chain(self) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
@@ -195,7 +235,7 @@ class Simulation:
         """
         for name in sorted(self.components, key=lambda name: (self._place[name], name)):
             self.components[name].context.producers = [
-                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
+                Producer(wire.source, wire.input, self._asked(wire.source, "offer", wire.output))
                 for wire in self.scene.wires
                 if wire.target == name
             ]
@@ -208,11 +248,11 @@ class Simulation:
         problems: list[Problem] = []
         for name, component in self.components.items():
             component.context.duration_s = self.duration_s
-            try:
+            known = len(problems)
+            with self._preparing(name, problems):
                 found = plan(component, self.scene.tolerance, everything=everything)
                 built = {i: i.effect.build(component) for i in found if i.built}
-            except (ValueError, OSError) as error:
-                problems.append(self._problem(f"blocks.{name}", error))
+            if len(problems) > known:
                 continue
             planned += found
             if not everything:
@@ -230,16 +270,12 @@ class Simulation:
         for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             component = self.components[name]
             component.context.consumers = [
-                Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
+                Consumer(wire.target, wire.input, self._asked(wire.target, "request", wire.input))
                 for wire in self.scene.wires
                 if wire.source == name
             ]
-            try:
+            with self._preparing(name, problems):
                 component.setup()
-            except (ValueError, OSError) as error:
-                problems.append(self._problem(f"blocks.{name}", error))
-            except Exception as error:
-                raise _failure(name, type(component), 0.0, error) from error
         if problems:
             raise SceneError(problems)
 
@@ -290,6 +326,20 @@ class Simulation:
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
             self.recorder.record(block, message)
+
+    @property
+    def scans(self) -> float:
+        """How many scans of all clocks together the run has, about."""
+        clocks = [node.clock for node in self.nodes.values() if node.clock is not None]
+        return float(sum(self.end_tick / clock.period for clock in clocks))
+
+    def _refuse_endless_work(self) -> None:
+        if self.scans > _MOST_SCANS:
+            message = (
+                f"is {float(self.duration_s):.4g} s, in which the clocks of this scene make "
+                f"{self.scans:.2g} scans: at most {_MOST_SCANS:.0e} are simulated"
+            )
+            raise SceneError([self._problem("duration_s", message)])
 
     def _window_length(self, window: int | None) -> int:
         """Return the ticks of a window that holds about the wanted number of scans."""
@@ -407,11 +457,19 @@ class Simulation:
             raise Abort
 
 
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, with its kind where its text alone says little."""
+    if isinstance(error, ArithmeticError):
+        return f"its numbers are too large or too small to be computed with ({error})"
+    if isinstance(error, MemoryError):
+        return f"needs more memory than there is ({error})" if str(error) else "needs more memory"
+    return str(error)
+
+
 def _failure(
     name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
 ) -> BlockFailure:
-    reason = f"{type(error).__name__}: {error}"
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, reason)
+    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, told(error))
 
 
 def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Callable[[], float]:

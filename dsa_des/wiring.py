@@ -22,7 +22,8 @@ from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene_file import Key, SceneFile
 
 _END = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_]\w*)?")
-_SCANS = re.compile(r"(\d+) scans?")
+_SCANS = re.compile(r"([0-9]+) scans?")
+_MOST_SCANS = 1_000_000
 _KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "holds")
 
 
@@ -158,8 +159,10 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
         raise _WireError("give delay or delay_s, not both", dict(entry))
     if "delay" in entry:
         match = _SCANS.fullmatch(str(entry["delay"]).strip())
-        if not match or int(match[1]) == 0:
+        if not match or not match[1].strip("0"):
             raise _WireError('delay must read "1 scan" or "N scans"', entry["delay"])
+        if len(match[1]) > 9 or int(match[1]) > _MOST_SCANS:
+            raise _WireError(f"delay must be at most {_MOST_SCANS:,} scans", entry["delay"])
         options["delay_scans"] = int(match[1])
     for key in ("delay_s", "jitter_s"):
         if key in entry:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.table_rows import row_values, table_rows
 
 _SQUARE_FOOT_M2 = 0.3048**2
 
@@ -207,26 +207,18 @@ def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
         If a column is missing, a cell is not a number, or the table has a hole.
     """
     rows: list[tuple[float, float, float]] = []
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        header: list[str] | None = None
-        factor = 1.0
-        columns: tuple[int, int, int] = (0, 0, 0)
-        reader = csv.reader(file)
-        for cells in reader:
-            if not any(cell.strip() for cell in cells) or cells[0].lstrip().startswith("#"):
-                continue
-            if header is None:
-                header = [cell.strip().lower() for cell in cells]
-                columns, factor = _find_columns(path, header)
-                continue
-            try:
-                az, el, area = (float(cells[column]) for column in columns)
-            except (ValueError, IndexError):
-                raise ValueError(
-                    f"{path}, line {reader.line_num} is {','.join(cells)!r}: it must hold a number "
-                    f"in each of {', '.join(header[column] for column in columns)}"
-                ) from None
-            rows.append((az, el, area * factor))
+    header: list[str] | None = None
+    factor = 1.0
+    columns: tuple[int, int, int] = (0, 0, 0)
+    for number, cells in table_rows(path):
+        if header is None:
+            header = [cell.strip().lower() for cell in cells]
+            columns, factor = _find_columns(path, header)
+            continue
+        az, el, area = row_values(
+            f"{path}, line {number}", header, cells, columns, ("az_deg", "el_deg", "area_m2")
+        )
+        rows.append((az, el, area * factor))
     if header is None or not rows:
         raise ValueError(f"{path} is empty: it must hold a header and one row per direction")
     nodes = np.array(rows)
@@ -243,10 +235,13 @@ def _find_columns(
     area_name = next((name for name in AREA_COLUMNS if name in header), None)
     for name in ("az_deg", "el_deg"):
         if name not in header:
-            raise ValueError(f"{path} has the columns {', '.join(header)}: {name} is missing")
+            raise ValueError(
+                f"{path}: none of its {len(header)} columns is {name}; it must have az_deg, el_deg "
+                "and an area"
+            )
     if area_name is None:
         raise ValueError(
-            f"{path} has the columns {', '.join(header)}: an area is missing "
+            f"{path}: none of its {len(header)} columns is an area "
             f"(one of {', '.join(AREA_COLUMNS)})"
         )
     columns = (header.index("az_deg"), header.index("el_deg"), header.index(area_name))

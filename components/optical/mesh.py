@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from components.checks import FloatArray, finite
 from components.optical.aspect_table import AspectTable
+from dsa_des.input_files import InputFileError, status_of
+from dsa_des.safe_text import shortened
 
 DEFAULT_ROWS = 1024
 
@@ -189,8 +193,22 @@ def load_mesh(
         raise ImportError(
             "reading a mesh needs the library trimesh: pip install 'dsa-des[mesh]'"
         ) from error
-    loaded: Any = trimesh.load(str(path), force="mesh")
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)
+    # What trimesh cannot read is said once, below; by itself it would print tracebacks as well.
+    log = logging.getLogger("trimesh")
+    if not log.handlers:
+        log.addHandler(logging.NullHandler())
+    try:
+        status_of(Path(path))
+        loaded: Any = trimesh.load(str(path), force="mesh")
+        loaded.merge_vertices(merge_tex=True, merge_norm=True)
+        if len(loaded.faces) == 0:
+            raise ValueError("it holds no triangles")
+    except InputFileError as error:
+        raise ValueError(f"{path} {error}") from None
+    # A reader of a dozen formats says "this is no mesh" with a dozen kinds of exceptions.
+    except Exception as error:
+        reason = shortened(" ".join(str(error).split()), 200) or type(error).__name__
+        raise ValueError(f"{path} is not a mesh that can be read: {reason}") from None
     vertices = np.empty((len(loaded.vertices), 3))
     for column, letter in enumerate(axes):
         axis, sign = _AXES[letter]

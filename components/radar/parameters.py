@@ -76,7 +76,7 @@ class LinkBudgetParameters(RadarParameters):
     aspect_rcs: bool = Field(
         default=True, description="Whether an aircraft's rcs_table is used; else its rcs_dbsm."
     )
-    pulses: int = Field(default=1, ge=1, description="Pulses integrated non-coherently.")
+    pulses: int = Field(default=1, ge=1, le=1000, description="Pulses integrated non-coherently.")
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -20,6 +19,7 @@ from components.checks import (
     unflatten,
 )
 from components.radar.inputs import checked_model
+from components.table_rows import row_values, table_rows
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9
@@ -267,26 +267,19 @@ class AspectTable:
         wanted = ("az_deg", "el_deg", "dbsm")
         header: list[str] = []
         rows: list[list[float]] = []
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            for cells in reader:
-                if not any(cell.strip() for cell in cells) or cells[0].strip().startswith("#"):
-                    continue
-                if not header:
-                    header = [cell.strip().lower() for cell in cells]
-                    for name in wanted:
-                        if name not in header:
-                            raise ValueError(
-                                f"{path} has the columns {', '.join(header)}: it must have {name}"
-                            )
-                    continue
-                try:
-                    rows.append([float(cells[header.index(name)]) for name in wanted])
-                except (ValueError, IndexError):
-                    raise ValueError(
-                        f"{path}, line {reader.line_num} is {','.join(cells)!r}: it must have a "
-                        f"number in each of the columns {', '.join(wanted)}"
-                    ) from None
+        for number, cells in table_rows(path):
+            if not header:
+                header = [cell.strip().lower() for cell in cells]
+                for name in wanted:
+                    if name not in header:
+                        raise ValueError(
+                            f"{path}: none of its {len(header)} columns is {name}; it must have "
+                            f"{', '.join(wanted)}"
+                        )
+                continue
+            columns = [header.index(name) for name in wanted]
+            quantities = ("az_deg", "el_deg", "rcs_dbsm")
+            rows.append(row_values(f"{path}, line {number}", header, cells, columns, quantities))
         if not rows:
             raise ValueError(f"{path} is empty: it must have a header and one row per direction")
         nodes = np.array(rows)

@@ -12,6 +12,7 @@ from components.aircraft import Aircraft
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
+from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
 from components.traffic.traffic_file import TrafficFile
 from dsa_des.component import ScenePath
@@ -86,6 +87,13 @@ class RecordedTraffic(TrafficSource):
         other: FloatArray = target.sample_times_s  # type: ignore[attr-defined]
         return np.union1d(own, other)
 
+    def sample_times(self) -> list[SampleTimes]:
+        """Return the sample times of the ownship, and those of each target."""
+        if not self.targets:
+            return [SharedTimes(self.content.ownship.sample_times_s)]
+        each = OwnTimes([target.sample_times_s for target in self.content.intruders])
+        return [SharedTimes(self.content.ownship.sample_times_s), each]
+
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and what the file's own clock said at time 0."""
         source = {"start_time_s": self.content.start_time_s, "notes": self.content.notes}
@@ -102,7 +110,7 @@ class DaaFile(RecordedTraffic):
         reference = (self.p.reference_lat_deg, self.p.reference_lon_deg, self.p.reference_alt_m)
         try:
             state = self.p.file.stat()
-        except OSError:  # the reader says what is wrong with it
+        except (OSError, ValueError):  # the reader says what is wrong with it
             return _read_daa(self.p.file, None, reference)
         return _read_daa(self.p.file, (state.st_mtime_ns, state.st_size), reference)
 

@@ -9,9 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from components.traffic.normals import FloatArray
-from components.traffic.traffic_file import Problems, TrafficFile
+from components.traffic.traffic_file import (
+    MOST_OF_A_CELL,
+    MOST_PROBLEMS,
+    Problems,
+    TrafficFile,
+)
 from components.traffic.trajectory import SampledTrajectory
 from components.traffic.units import ANGLE_DEG, LENGTH_M, NO_UNIT, SPEED_MPS, TIME_S, clean_token
+from dsa_des.safe_text import shortened
 
 UNITS = {
     "time": TIME_S,
@@ -40,6 +46,10 @@ _LIMITS = {
     "sy": (-4e6, 4e6, "lie within ±4,000 km"),
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
+# A file in which nobody is seen for longer than this has a wrong time in it: a run over it would
+# simulate the years in between.
+_LONGEST_SILENCE_S = 86400.0
+
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
 
@@ -68,7 +78,11 @@ def unit_factor(
     plain = clean_token(token)
     if plain in known:
         return known[plain]
-    what = "has no unit" if plain in NO_UNIT else f"unit {token!r} is unknown here"
+    what = (
+        "has no unit"
+        if plain in NO_UNIT
+        else f"unit {shortened(token, MOST_OF_A_CELL)!r} is unknown here"
+    )
     problems.add(f"{what}: it must be one of {', '.join(known)}", line=line, column=header)
     return 1.0
 
@@ -142,15 +156,18 @@ class SampleTable:
             self._problems.fail("there are no samples: at least two aircraft are needed")
         if len(names) == 1:
             self._problems.add(
-                f"there is one aircraft only, {names[0]!r}: an ownship and at least one intruder "
-                "are needed"
+                f"there is one aircraft only, {shortened(names[0])!r}: an ownship and at least "
+                "one intruder are needed"
             )
         own = names[0] if ownship is None else ownship
         if own not in self._aircraft:
             self._problems.add(
-                f"there is no aircraft {own!r}: it must be one of {', '.join(names)}"
+                f"there is no aircraft {own!r}: it must be one of "
+                f"{', '.join(shortened(name) for name in names[:MOST_PROBLEMS])}"
+                f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
         samples = {name: self._sorted(name, rows) for name, rows in self._aircraft.items()}
+        self._refuse_long_silence()
         self._problems.raise_if_any()
         start = min(float(columns["time"][0]) for columns in samples.values())
         made = {}
@@ -171,15 +188,16 @@ class SampleTable:
                 if "_" in cell:
                     raise ValueError(cell)
         except ValueError:
+            shown = shortened(cell, MOST_OF_A_CELL)
             hint = "; use a decimal point" if cell.replace(",", ".", 1) != cell else ""
-            what = f"{cell!r} is not a number" if cell else "the cell is empty"
+            what = f"{shown!r} is not a number" if cell else "the cell is empty"
             self._problems.add(
                 f"{what}: a finite number is needed{hint}", line=line, column=column.header
             )
             return None
         if not math.isfinite(value):
             self._problems.add(
-                f"{cell!r} is not finite: a finite number is needed",
+                f"{shortened(cell, MOST_OF_A_CELL)!r} is not finite: a finite number is needed",
                 line=line,
                 column=column.header,
             )
@@ -187,7 +205,9 @@ class SampleTable:
         low, high, allowed = _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
         if not low <= value <= high:
             self._problems.add(
-                f"{cell} is out of range: it must {allowed}", line=line, column=column.header
+                f"{shortened(cell, MOST_OF_A_CELL)} is out of range: it must {allowed}",
+                line=line,
+                column=column.header,
             )
             return None
         return value
@@ -213,6 +233,27 @@ class SampleTable:
                 column=header,
             )
         return {key: values[order] for key, values in columns.items()}
+
+    def _refuse_long_silence(self) -> None:
+        """Note times after which the whole file falls silent for more than a day."""
+        seen = [
+            (time_s, line)
+            for rows in self._aircraft.values()
+            for time_s, line in zip(rows.values.get("time", ()), rows.lines, strict=True)
+        ]
+        if not seen:
+            return
+        seen.sort()
+        times = np.array([time_s for time_s, _ in seen])
+        for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):
+            (before_s, line_before), (after_s, line) = seen[i], seen[i + 1]
+            self._problems.add(
+                f"the time is {after_s:.15g} s, and the one before it, in line {line_before}, is "
+                f"{before_s:.15g} s: the file may not be without a sample for more than "
+                f"{_LONGEST_SILENCE_S:g} s",
+                line=line,
+                column=self._columns["time"].header,
+            )
 
     def _trajectory(self, name: str, columns: dict[str, FloatArray]) -> SampledTrajectory:
         velocity = None

@@ -11,14 +11,20 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
-from components.geometry.ellipsoid import line_of_sight
 from components.known_flights import Flights, KnownFlights
 from components.known_targets import KnownTraffic
 from components.reach import FarthestLook, farthest_look
 from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
+from components.traffic.closest_approach import (
+    Approaches,
+    closest_approaches,
+    looked_at_one_by_one,
+)
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
+from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
+from components.traffic.sample_times import SampleTimes
 from components.traffic.state import TrajectoryState
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
@@ -266,29 +272,56 @@ class TrafficSource(Component):
         """Return the times at which the source itself knows this target and the ownship, s."""
         raise TypeError(f"{type(self).__name__} does not say when its samples are")
 
+    def sample_times(self) -> list[SampleTimes]:
+        """Return the times of `sample_times_s`, for all targets together.
+
+        A source that says it this way is summed up faster, and in little memory however long the
+        run is: a target's times are those of all the items together.
+        """
+        return []
+
     def report(self) -> dict[str, Any]:
         """Return the closest approach of every target over the run."""
         end_s = float(self.context.duration_s)
+        names = self.roster.names
+        best = self._closest_approaches(end_s)
+        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), strict=True)
         return {
             "targets": {
-                target.name: {"closest_approach": self._closest_approach(target, end_s)}
-                for target in self.targets
+                name: {
+                    "closest_approach": {"time_s": time_s, "range_m": range_m}
+                    if math.isfinite(range_m)
+                    else None
+                }
+                for name, time_s, range_m in found
             }
         }
 
-    def _closest_approach(self, target: Trajectory, end_s: float) -> dict[str, float] | None:
-        times = self.sample_times_s(target)
-        times = times[(times >= 0) & (times <= end_s)]
-        own, other = self.own.at(times), target.at(times)
-        both = own.present & other.present
-        if not both.any():
-            return None
-        _, _, range_m = line_of_sight(
-            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
-            validate=False,
-        )  # fmt: skip
-        nearest = int(np.argmin(np.where(both, range_m, np.inf)))
-        return {"time_s": float(times[nearest]), "range_m": float(range_m[nearest])}
+    def _closest_approaches(self, end_s: float) -> Approaches:
+        samples = self.sample_times()
+        if not samples:
+            return looked_at_one_by_one(self.own, self.targets, self.sample_times_s, end_s)
+        best = Approaches.none(len(self.targets))
+        speeds = max_speeds_mps(self.targets)
+        present_s = _present_together_s(self.own, self.targets, end_s)
+        for times in samples:
+            closest_approaches(
+                self.own.at, self.fleet.each, times,
+                closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
+            )  # fmt: skip
+        return best
+
+
+def _present_together_s(
+    own: Any, targets: Sequence[Any], end_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the first and the last time (targets,) of a run at which both may be there, s."""
+    first, last = intervals_present_s([own])[0].tolist()
+    intervals = intervals_present_s(targets)
+    return (
+        np.maximum(intervals[:, 0], max(first, 0.0)),
+        np.minimum(intervals[:, 1], min(last, end_s)),
+    )
 
 
 def roster_of(

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from components.traffic.traffic_file import Problems, did_you_mean
+from dsa_des.input_files import InputFileError, NoSuchFile, is_folder, read_input_bytes
 
 _SEPARATORS = re.compile(r"[,;]")
 _TOKEN = re.compile(r"\[[^\]]*\]|[^\s,;\[\]]+")
@@ -28,14 +29,14 @@ def read_lines(path: Path, problems: Problems) -> list[tuple[int, str]]:
         Line number from 1 and the stripped text; blank lines and lines starting with # left out.
     """
     try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        close = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
+        data = read_input_bytes(path)
+    except NoSuchFile:
+        close = [p.name for p in path.parent.glob("*")] if is_folder(path.parent) else []
         problems.fail(f"there is no such file{did_you_mean(path.name, close)}")
-    except IsADirectoryError:
-        problems.fail("this is a directory: give the file itself")
-    except OSError as error:
-        problems.fail(f"the file cannot be read: {error.strerror or error}")
+    except InputFileError as error:
+        if is_folder(path):
+            problems.fail("this is a directory: give the file itself")
+        problems.fail(f"the file {error}")
     text = _decoded(data)
     if text is None:
         problems.fail(

@@ -1,0 +1,73 @@
+"""What stands in the rows of a table written as CSV, with their line numbers?"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+
+from dsa_des.input_files import read_input_text
+from dsa_des.limits import refuse_extremes
+
+
+def table_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
+    """Give the rows of a table that hold something, with their lines from 1.
+
+    Blank lines and lines that start with # are left out. A cell never spans lines, so that a
+    stray quote cannot swallow what follows it.
+
+    Raises
+    ------
+    InputFileError
+        If the file cannot be read, or is not UTF-8 text.
+    ValueError
+        If a cell is longer than any number, naming the line.
+    """
+    text = read_input_text(Path(path))
+    for number, line in enumerate(text.replace("\r", "\n").split("\n"), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            cells = next(csv.reader([line]))
+        except csv.Error as error:
+            raise ValueError(f"{path}, line {number}: cannot be read: {error}") from None
+        if any(cell.strip() for cell in cells):
+            yield number, cells
+
+
+def row_values(
+    place: str,
+    header: Sequence[str],
+    cells: Sequence[str],
+    columns: Sequence[int],
+    quantities: Sequence[str],
+) -> list[float]:
+    """Return the numbers of a row.
+
+    Parameters
+    ----------
+    place : str
+        File and line, for messages.
+    header, cells : names of the columns, and what the row has in them
+    columns : numbers of the columns to read
+    quantities : what they hold, with units at the end (`dsa_des.limits`)
+
+    Raises
+    ------
+    ValueError
+        If a cell is missing, is no number, or holds one that cannot be computed with.
+    """
+    values = []
+    for column, quantity in zip(columns, quantities, strict=True):
+        try:
+            value = float(cells[column].replace("_", "no number"))
+        except (ValueError, IndexError):
+            wanted = ", ".join(header[column] for column in columns)
+            raise ValueError(
+                f"{place}: it must have a number in each of the columns {wanted}"
+            ) from None
+        try:
+            refuse_extremes(quantity, value)
+        except ValueError as error:
+            raise ValueError(f"{place}: {header[column]} is {value:g}: {error}") from None
+        values.append(value)
+    return values

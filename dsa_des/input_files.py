@@ -1,0 +1,131 @@
+"""Opening what somebody named as a file: regular files of a bearable size, and nothing else.
+
+A pipe would wait for ever, a device never ends, and a name may be no name at all; all of it is
+found out before a byte is read.
+"""
+
+import os
+import stat
+from pathlib import Path
+
+#: Files of tables and traffic; a day of dense traffic is a tenth of it.
+LARGEST_BYTES = 512 * 1024 * 1024
+#: Files in TOML, which is read at about a megabyte per second.
+LARGEST_TOML_BYTES = 256 * 1024 * 1024
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+class InputFileError(ValueError):
+    """A named file cannot be read; the message says why, without its name."""
+
+
+class NoSuchFile(InputFileError):
+    """There is no file of that name."""
+
+
+def resolve_home(text: str) -> Path:
+    """Return a path with ``~`` at its start resolved.
+
+    Raises
+    ------
+    InputFileError
+        If it names a user who has no home folder here, or holds a NUL character.
+    """
+    if "\0" in text:
+        raise InputFileError("holds a NUL character: no file can have such a name")
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        user = text.split("/", 1)[0]
+        raise InputFileError(f"there is no home folder of {user[:80]!r}") from None
+
+
+def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
+    """Return the status of a regular file that may be read.
+
+    Raises
+    ------
+    InputFileError
+        If there is no such file, it is anything else than a regular file, or it is too large.
+    """
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise NoSuchFile("there is no such file") from None
+    except ValueError:
+        raise InputFileError("holds a NUL character: no file can have such a name") from None
+    except OSError as error:
+        raise InputFileError(f"cannot be read: {_reason(error)}") from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((what for is_kind, what in _KINDS if is_kind(status.st_mode)), "no file")
+        raise InputFileError(f"is {kind}: a regular file is needed")
+    if status.st_size > largest_bytes:
+        raise InputFileError(
+            f"holds {status.st_size / 2**20:,.0f} MB: at most {largest_bytes / 2**20:,.0f} MB "
+            "are read"
+        )
+    return status
+
+
+def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
+    """Return what is in a regular file.
+
+    Raises
+    ------
+    InputFileError
+        As `status_of`, or if it cannot be read.
+    """
+    status_of(path, largest_bytes)
+    try:
+        with path.open("rb") as file:
+            # Files such as those of /proc say that they are empty and are not.
+            content = file.read(largest_bytes + 1)
+    except OSError as error:
+        raise InputFileError(f"cannot be read: {_reason(error)}") from None
+    if len(content) > largest_bytes:
+        raise InputFileError(f"holds more than {largest_bytes / 2**20:,.0f} MB")
+    return content
+
+
+def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
+    """Return the text of a regular file in UTF-8, with or without a byte-order mark.
+
+    Raises
+    ------
+    InputFileError
+        As `read_input_bytes`, or if it is not UTF-8 text.
+    """
+    try:
+        text = read_input_bytes(path, largest_bytes).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputFileError("is not a text file in UTF-8") from None
+    if "\0" in text:
+        raise InputFileError("is not a text file: it holds NUL characters")
+    return text.replace("\r\n", "\n")
+
+
+def is_regular_file(path: Path) -> bool:
+    """Tell whether a path is a regular file; what can be no path is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Tell whether a path is a folder; what can be no path is none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or type(error).__name__).lower()
