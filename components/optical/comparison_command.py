@@ -126,8 +126,10 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
     table: dict[str, Any] = eo if isinstance(eo, dict) else {}
     for name in _AREAS:
         value = table.get(name)
+        if name not in table:
+            raise ValueError(f"{options.aircraft} has no eo.{name}: --aircraft needs it")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{options.aircraft} has no number eo.{name}: --aircraft needs it")
+            raise ValueError(f"{options.aircraft}: eo.{name} is no number: --aircraft needs one")
     return {name: float(table[name]) for name in _AREAS}
 
 
