@@ -397,7 +397,10 @@ def test_csv_ownship_that_is_not_there(tmp_path):
     [
         (A0 + B0 + A1.replace("11\n", "10.0000001\n"), "must be at least 1e-06 s later"),
         (A0 + B0 + A1.replace("45,", "46,").replace("11\n", "10.01\n"), "A flies at up to 1.1"),
-        (A0 + B0 + B1.replace("11\n", "86411\n"), "may not be without a sample for more than 86400"),
+        (
+            A0 + B0 + B1.replace("11\n", "86411\n"),
+            "may not be without a sample for more than 86400",
+        ),
     ],
 )
 def test_times_that_cannot_be_meant(tmp_path, rows, message):
