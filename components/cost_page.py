@@ -13,6 +13,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from dsa_des.interruption import plain_ending
+
 DOCS = Path(__file__).parents[1] / "docs"
 _CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -94,6 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from dsa_des.costs.output import draw_costs
     from dsa_des.costs.study import RungCost, climb
     from dsa_des.costs.variants import Variants
+    from dsa_des.output_file import write_file
 
     compare = comparison()
 
@@ -121,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         encounter_name=options.encounter.name,
         encounter_says=options.encounter_says,
     )
-    (options.docs / "accuracy-and-cost.md").write_text(page, encoding="utf-8")
+    write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
 
 
@@ -231,4 +234,5 @@ def _chain(chain: Any) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

@@ -1,7 +1,6 @@
 """The part of docs/accuracy-and-cost.md on where each model of the Earth is good enough."""
 
 import math
-import shutil
 import tempfile
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from components.geometry.error_map import (
     draw_error_map,
     error_maps,
 )
+from dsa_des.output_file import write_file
 
 FIGURE = "error_map_angle.png"
 _LATITUDES_DEG = np.array([0.0, 30.0, 52.0, 75.0])
@@ -30,7 +30,7 @@ def error_map_section(images: Path) -> str:
     """
     with tempfile.TemporaryDirectory() as folder:
         drawn = {path.name: path for path in draw_error_map(Path(folder))}
-        shutil.copyfile(drawn[FIGURE], images / FIGURE)
+        write_file(images / FIGURE, drawn[FIGURE].read_bytes())
     maps = {found.model: found for found in error_maps(_LATITUDES_DEG, _RANGES_M)}
     lines = [
         "`dsa-des cost --map geometry`",

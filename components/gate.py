@@ -68,4 +68,6 @@ class Gate(Component):
                 place[rows] = np.arange(len(rows))
                 seen = [values[rows] for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
-        return GatedTargets(**vars(targets), decisions=decisions)
+        # Behind another gate, that one's decisions were for the sensors there.
+        fields = {**vars(targets), "tick": wake.ticks, "decisions": decisions}
+        return GatedTargets(**fields)

@@ -14,6 +14,9 @@ from components.aircraft import Roster
 from dsa_des.message import Message, Text, per_entry, static
 from dsa_des.types import AnyArray, FloatArray, IntArray
 
+_BITS_OF_INT64 = 63
+_COUNTED_BITS = 12
+
 
 @dataclass(frozen=True)
 class SensorOffer:
@@ -155,7 +158,7 @@ class FusedDetections(Message):
     range_m : (entries,)
         NaN when no contributing sensor measures range.
     contributors : (entries,) of int
-        Bit i is set when ``sensors[i]`` contributed.
+        Bit i is set when ``sensors[i]`` contributed; of the type `mask_type` gives.
     angle_source, range_source : (entries,) of int
         Index into `sensors`; -1 for none.
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
@@ -276,12 +279,25 @@ class Tracks(Message):
         )  # fmt: skip
 
 
+def mask_type(sensors: int) -> type:
+    """Return the NumPy type of masks with a bit for each sensor.
+
+    Beyond 63 sensors masks are Python's integers, which hold any number of bits.
+    """
+    return np.int64 if sensors <= _BITS_OF_INT64 else object
+
+
 def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
     """Return the names behind bit masks, joined by ``+``."""
-    used = np.bincount(contributors, minlength=1)
-    masks = np.flatnonzero(used)
-    codes = (np.cumsum(used > 0) - 1).take(contributors)
-    names = tuple(
-        "+".join(name for i, name in enumerate(sensors) if int(mask) >> i & 1) for mask in masks
-    )
+    if len(sensors) <= _COUNTED_BITS:  # counting was measured to be the fastest
+        used = np.bincount(contributors, minlength=1)
+        masks = np.flatnonzero(used)
+        codes = (np.cumsum(used > 0) - 1).take(contributors)
+    else:
+        masks, codes = np.unique(contributors, return_inverse=True)
+    names = tuple("+".join(_names_in(int(mask), sensors)) for mask in masks)
     return Text(codes, names)
+
+
+def _names_in(mask: int, sensors: tuple[str, ...]) -> list[str]:
+    return [name for i, name in enumerate(sensors) if mask >> i & 1]

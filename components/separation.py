@@ -3,18 +3,29 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isnan
 from typing import Any
 
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.sample_times import (
+    SampleTimes,
+    SharedTimes,
+    regular_count,
+    regular_times_s,
+)
 from components.traffic.source import TrafficSource
 from dsa_des.component import Context
 from dsa_des.randomness import Streams
 from dsa_des.scene import Block, Scene
-from dsa_des.types import BoolArray, FloatArray
+from dsa_des.types import FloatArray
+
+#: Times looked at together: it bounds the memory, however long the run.
+MOST_AT_ONCE = 65_536
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +67,7 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
-def separations(scene: Scene, step_s: float) -> list[Separation]:
+def separations(scene: Scene, step_s: float) -> "list[Flight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -70,13 +81,60 @@ def separations(scene: Scene, step_s: float) -> list[Separation]:
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
-    grid = np.round(np.arange(int(float(duration) / step_s) + 1) * step_s, 9)
-    return [_separation(source, target, grid) for target in source.targets]
+    count = regular_count(step_s, float(duration))
+    return [Flight(source, number, step_s, count) for number in range(len(source.targets))]
 
 
-def _separation(source: Any, target: Any, grid: FloatArray) -> Separation:
-    samples = source.sample_times_s(target)
-    time_s = np.union1d(grid, samples[(samples >= 0.0) & (samples <= grid[-1])])
+class Flight:
+    """The distances of one target from the ownship, in pieces of time one after the other.
+
+    Parameters
+    ----------
+    source : TrafficSource
+    number : int
+        Which of its targets.
+    step_s : float
+        Spacing of the grid.
+    count : int
+        Number of its times.
+    """
+
+    def __init__(self, source: Any, number: int, step_s: float, count: int) -> None:
+        self._source, self._number = source, number
+        self._target = source.targets[number]
+        self.name: str = self._target.name
+        self._step_s, self._count = step_s, count
+
+    def pieces(self) -> Iterator[Separation]:
+        """Give the distances, about `MOST_AT_ONCE` at a time."""
+        samples = self._samples()
+        after_s = 0.0
+        for start in range(0, self._count, MOST_AT_ONCE):
+            number = np.arange(start, min(start + MOST_AT_ONCE, self._count))
+            time_s = regular_times_s(self._step_s, number)
+            last_s = float(time_s[-1])
+            for times in samples:
+                time_s = np.union1d(time_s, _between(times, self._number, after_s, last_s))
+            yield _separation(self._source, self._target, time_s)
+            after_s = float(np.nextafter(last_s, np.inf))
+
+    def _samples(self) -> list[SampleTimes]:
+        every: list[SampleTimes] = self._source.sample_times()
+        if every:
+            return every
+        times = SharedTimes(self._source.sample_times_s(self._target))
+        return [times]
+
+
+def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> FloatArray:
+    """Return the times of a target in [first_s, last_s]."""
+    one = np.array([target])
+    first, last = times.between(one, np.array([first_s]), np.array([last_s]))
+    number = np.arange(first[0], last[0] + 1)
+    return times.at(np.full(len(number), target), number)
+
+
+def _separation(source: Any, target: Any, time_s: FloatArray) -> Separation:
     own, other = source.own.at(time_s), target.at(time_s)
     _, elevation_rad, range_m = line_of_sight(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
@@ -92,11 +150,30 @@ def _separation(source: Any, target: Any, grid: FloatArray) -> Separation:
     )
 
 
-def first_inside(separation: Separation, horizontal_m: float, vertical_m: float) -> float:
-    """Return when a target first is within both distances (exclusive), s; NaN if it never is."""
-    inside: BoolArray = (separation.horizontal_m < horizontal_m) & (
-        separation.vertical_m < vertical_m
-    )
-    if not inside.any():
-        return float("nan")
-    return float(separation.time_s[np.argmax(inside)])
+def closest(flight: Flight) -> tuple[float, float]:
+    """Return the smallest range (m) and its time (s), the first of several."""
+    best = (float("inf"), float("nan"))
+    for piece in flight.pieces():
+        place = int(np.argmin(piece.range_m))
+        if piece.range_m[place] < best[0]:
+            best = float(piece.range_m[place]), float(piece.time_s[place])
+    return best
+
+
+def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
+    """Return when a target first is within each pair of distances (exclusive), s; NaN if never.
+
+    Parameters
+    ----------
+    flight : Flight
+    *limits_m : (horizontal, vertical)
+    """
+    found = [float("nan")] * len(limits_m)
+    for piece in flight.pieces():
+        for number, (horizontal_m, vertical_m) in enumerate(limits_m):
+            inside = (piece.horizontal_m < horizontal_m) & (piece.vertical_m < vertical_m)
+            if isnan(found[number]) and inside.any():
+                found[number] = float(piece.time_s[np.argmax(inside)])
+        if not any(map(isnan, found)):
+            break
+    return found

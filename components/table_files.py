@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from dsa_des.component import ScenePath
-from dsa_des.errors import shortened
 from dsa_des.input_files import InputFileError, status_of
+from dsa_des.safe_text import shortened
 
 #: A table of every degree in both angles is a hundredth of it.
 LARGEST_TABLE_BYTES = 64 * 1024 * 1024

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from dsa_des.errors import shortened
 from dsa_des.input_files import InputFileError, read_input_text
 from dsa_des.limits import refuse_extremes
 
@@ -65,9 +64,8 @@ def row_values(
             value = float(cells[column].replace("_", "no number"))
         except (ValueError, IndexError):
             wanted = ", ".join(header[column] for column in columns)
-            row = shortened(",".join(cells), 80)
             raise ValueError(
-                f"{place} is {row!r}: it must hold a number in each of the columns {wanted}"
+                f"{place}: it must have a number in each of the columns {wanted}"
             ) from None
         try:
             refuse_extremes(quantity, value)

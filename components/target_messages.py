@@ -4,7 +4,7 @@ All messages hold rows (one per scan, see `dsa_des.message`). Angles are in radi
 clockwise and elevation upward.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
@@ -12,16 +12,10 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft import Roster
+from components.known_flights import KnownFlights
 from components.reach import Decision
-from dsa_des.message import Message, per_row, static
-from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
-
-#: Where the ownship and some targets (columns of the roster) are at times (rows, columns): two
-#: states as `components.traffic.state.TrajectoryState` holds them. Sources whose aircraft move
-#: whatever sensors report can give it.
-Flights = Callable[[IntArray, FloatArray], tuple[Any, Any]]
-#: The fields (rows, targets) of `RelativeTargets`, for some columns at times (rows, columns).
-Revisit = Callable[[IntArray, FloatArray], dict[str, AnyArray]]
+from dsa_des.message import Message, per_row, per_row_tick, static
+from dsa_des.types import BoolArray, FloatArray, IntArray
 
 
 @dataclass(eq=False)
@@ -42,8 +36,9 @@ class TrafficStates(Message):
     culled : (rows,) of int, or None
         How many of the roster are out of everybody's reach at each instant; those among the
         columns are not `present`. None where all are moved.
-    flights : Flights or None
-        For whoever must know them at other instants: a beam that sweeps. None where nobody does.
+    flights : KnownFlights or None
+        The flights as each row knows them, for a beam that sweeps: it must know them at other
+        instants. None where nobody does.
     """
 
     own_lat_deg: FloatArray
@@ -62,7 +57,7 @@ class TrafficStates(Message):
     roster: Roster = static()
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
-    flights: Flights | None = static(default=None, kw_only=True)
+    flights: KnownFlights | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
 
@@ -97,8 +92,11 @@ class RelativeTargets(Message):
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
         ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
-    revisit : Revisit or None
-        The targets at other instants than those of the rows.
+    revisit : KnownFlights or None
+        The targets at other instants than those of the rows, as each row knows their flights.
+    state_tick : (rows,) of int, or None
+        The instant at which the aircraft were there: earlier than `tick` where the traffic's
+        message took its time. None where it is `tick`.
     """
 
     azimuth_rad: FloatArray
@@ -116,7 +114,8 @@ class RelativeTargets(Message):
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
-    revisit: Revisit | None = static(default=None, kw_only=True)
+    revisit: KnownFlights | None = per_row(default=None, kw_only=True)
+    state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
 

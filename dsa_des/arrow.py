@@ -1,6 +1,7 @@
 """Recorded columns as Arrow data, and Parquet files of them."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -165,6 +166,16 @@ class ParquetSink:
         for table, writer in self._writers.items():
             self._flush(table, whole=False)
             writer.close()
+
+    def release(self) -> None:
+        """Let go of files that are still open, after a failure: what is in them is lost anyway.
+
+        A writer that could not write would try again when it is collected, and complain then.
+        """
+        for writer in self._writers.values():
+            with suppress(OSError, pa.ArrowException):
+                writer.close()
+            writer.is_open = False
 
 
 def _written_schema(schema: Schema) -> pa.Schema:

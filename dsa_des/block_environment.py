@@ -56,7 +56,7 @@ class BlockEnvironment:
 
     def send(self, result: Any) -> None:
         """Send a message, or messages by output name; their tick must be `now`."""
-        self._node.send(result, self.now, self.now + 1)
+        self._node.send(result, self.tick_array())
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

@@ -44,24 +44,26 @@ class Channel:
         self._replicas = replicas
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
+        #: First arrival of every message pushed since `state` or `set_state`.
+        self._pushed: list[int] | None = None
 
     def hold(self, message: Message, tick: int) -> None:
         """Make `message` the last arrived one, as if it had come at `tick`."""
         self._last = (np.array([tick], dtype=np.int64), message)
 
     def state(self) -> tuple[Any, Any]:
-        """Return what waits and what is held, for `set_state`."""
+        """Return what waits and what is held, for `set_state`; note pushes from now on."""
+        self._pushed = []
         return tuple(self._waiting), self._last
 
     def set_state(self, state: tuple[Any, Any]) -> None:
         """Go back to a state that `state` gave."""
         self._waiting, self._last = deque(state[0]), state[1]
+        self._pushed = []
 
-    def earliest_since(self, state: tuple[Any, Any]) -> int | None:
-        """Return the tick of the first arrival of what was pushed since a `state`, or None."""
-        before = {id(item) for item in state[0]}
-        ticks = [int(item[0][0]) for item in self._waiting if id(item) not in before]
-        return min(ticks) if ticks else None
+    def earliest_pushed(self) -> int | None:
+        """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
+        return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | None = None) -> IntArray:
         """Deposit a message and return the ticks at which its rows arrive, in order.
@@ -87,6 +89,8 @@ class Channel:
             if len(arrivals) == 0:
                 return arrivals
         self._waiting.append((arrivals, message))
+        if self._pushed is not None:
+            self._pushed.append(int(arrivals[0]))
         return arrivals
 
     def forget(self, tick: int) -> None:

@@ -1,7 +1,8 @@
 """The command line: ``dsa-des run``, ``check``, ``graph``, ``explain``, ``cost``, ``components``.
 
 This file declares commands and nothing else; it imports click only, so that ``--help`` is instant.
-Exit codes: 0 done, 1 a block failed while it ran, 2 the scene or the call is wrong.
+Exit codes: 0 done, 1 a block failed while it ran or results could not be written, 2 the scene or
+the call is wrong, 130 ctrl-C, 143 SIGTERM.
 """
 
 from collections.abc import Callable
@@ -81,6 +82,11 @@ def run(**options: Any) -> None:
 
 @main.command()
 @_scene_options
+@click.option(
+    "--no-import",
+    is_flag=True,
+    help="Import no module that SCENE names (module:Class, other packages' types); check the rest.",
+)
 @plain_errors
 def check(**options: Any) -> None:
     """Check SCENE without running it; report everything that is wrong at once."""

@@ -4,17 +4,55 @@ Each entry point is a `click.Command` in a module that imports click only, so th
 instant: a command imports what it needs when it is called.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import click
 
 from dsa_des.entry_points import registered
+from dsa_des.interruption import plain_ending
+from dsa_des.plain_errors import plain_output
+from dsa_des.safe_text import printable
 
 COMMANDS = "dsa_des.commands"
 
 
+@contextmanager
+def _printable_errors() -> Iterator[None]:
+    """Escape what click repeats of the arguments in its own errors."""
+    try:
+        yield
+    except click.ClickException as error:
+        attributes = vars(error)  # click calls them final
+        for name in ("message", "ui_filename"):
+            if name in attributes:
+                attributes[name] = printable(attributes[name])
+        raise
+
+
 class PluginGroup(click.Group):
-    """A command group whose registered commands are loaded when they are named or listed."""
+    """A command group whose registered commands are loaded when they are named or listed.
+
+    Whatever it runs ends in one line: also when a signal interrupts it (exit code 130 for ctrl-C,
+    143 for SIGTERM) and when its output cannot be written (1).
+    """
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a command and end the program."""
+        with plain_ending(), plain_output():
+            return super().main(*args, **kwargs)
+
+    # click turns KeyboardInterrupt into exit code 1 outside of these two.
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Read the command line."""
+        with plain_ending(), _printable_errors():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that the command line names."""
+        with plain_ending(), _printable_errors():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return our own commands and the registered ones, sorted."""
@@ -25,7 +63,9 @@ class PluginGroup(click.Group):
         own = super().get_command(ctx, cmd_name)
         if own is not None or cmd_name not in registered(COMMANDS):
             return own
-        found: Any = registered(COMMANDS)[cmd_name].load()
+        from dsa_des.foreign import installed
+
+        found: Any = installed(registered(COMMANDS)[cmd_name])
         if not isinstance(found, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"

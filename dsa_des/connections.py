@@ -65,7 +65,8 @@ def find_demands(
         ):
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
-                found[reached] = Demand(node.name, node.clock, reached[1], replicas)
+                end_tick = node.simulation.end_tick
+                found[reached] = Demand(node.name, node.clock, reached[1], replicas, end_tick)
             elif reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)

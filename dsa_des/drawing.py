@@ -1,25 +1,47 @@
-"""Figures without a window system, the same bytes on every drawing."""
+"""Figures without a window system, the same bytes on every drawing.
 
+Text in them is text: nothing is read as mathematics, control characters are escapes, lines that
+would push the figure aside are cut, and letters that the font lacks are boxes without a warning.
+"""
+
+import io
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from dsa_des.safe_text import printable, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+from dsa_des.output_file import write_file
 
 DPI = 110
+#: Longest name and longest line in a figure.
+MOST_OF_A_LABEL = 32
+_MOST_OF_A_LINE = 200
+_MOST_LINES = 60
 
 
 @contextmanager
-def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG when the block is done.
+def drawing(
+    width_in: float, height_in: float, path: Path | BinaryIO, dpi: int = DPI
+) -> Iterator[Any]:
+    """Give an empty figure and write it as PNG, to a file or a stream, when the block is done.
 
-    Neither the user's matplotlibrc nor the date goes into it.
+    The file is there as a whole or not at all. Neither the user's matplotlibrc nor the date goes
+    into it.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context():
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        # Names may hold letters that the font lacks, and be too long for their place.
+        warnings.filterwarnings("ignore", message="(?s)Glyph .* missing from")
+        warnings.filterwarnings("ignore", message=".* layout not applied")
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(
             {
@@ -32,12 +54,53 @@ def drawing(width_in: float, height_in: float, path: Path) -> Iterator[Any]:
                 "text.parse_math": False,  # a dollar sign in a name is a dollar sign
             }
         )
-        figure = Figure(figsize=(width_in, height_in), dpi=DPI)
+        figure = Figure(figsize=(width_in, height_in), dpi=dpi)
         canvas = FigureCanvasAgg(figure)
         yield figure
-        with warnings.catch_warnings():
-            # Names may hold letters that the font lacks; they are drawn as boxes.
-            warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            canvas.print_png(
-                str(path), metadata={"Software": None}, pil_kwargs={"compress_level": 4}
-            )
+        _make_plain(figure)
+        content = io.BytesIO()
+        canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
+        if isinstance(path, Path):
+            write_file(path, content.getvalue())
+        else:
+            path.write(content.getvalue())
+
+
+def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
+    """Return a name fit for a figure: printable, cut where it is long, shown in a legend.
+
+    Matplotlib leaves legend entries out that begin with ``_``; a blank before it helps.
+    """
+    text = shortened(name, most)
+    return f" {text}" if text.startswith("_") else text
+
+
+def tight(figure: "Figure") -> None:
+    """Fit the axes of a figure to its texts, after these were made plain."""
+    _make_plain(figure)
+    figure.tight_layout()
+
+
+def _make_plain(figure: "Figure") -> None:
+    """Cut and escape every text that was put into a figure, whoever put it there."""
+    from matplotlib.text import Text
+    from matplotlib.ticker import LogFormatter, LogFormatterMathtext
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                axis.set_major_formatter(LogFormatter())
+            if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+                axis.set_minor_formatter(LogFormatter(minor_thresholds=(1, 0.4)))
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+        shown = text.get_text()
+        if not shown.isprintable() or len(shown) > _MOST_OF_A_LINE:
+            text.set_text(_cut(shown))
+
+
+def _cut(text: str) -> str:
+    lines = [shortened(line, _MOST_OF_A_LINE) for line in text.split("\n")]
+    if len(lines) > _MOST_LINES:
+        lines = [*lines[: _MOST_LINES - 1], "…"]
+    return printable("\n".join(lines), lines=True)

@@ -20,11 +20,13 @@ from dsa_des.clock import MAX_TICK, parse_rational
 from dsa_des.component import Component
 from dsa_des.entry_points import registered
 from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.foreign import installed
 from dsa_des.graph import in_cycles
 from dsa_des.message import Message
 from dsa_des.scan_cursor import ScanCursor
 from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
+from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -39,7 +41,7 @@ for _constant in (_FIRST_ROW, _NO_ROW, _NO_SCAN):
 
 def __getattr__(name: str) -> Any:
     if name in registered(EMBED):
-        return registered(EMBED)[name].load()
+        return installed(registered(EMBED)[name])
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -290,7 +292,9 @@ class HostDriven:
             )
             try:
                 result = runner.component.run(wake)
-            except Exception as error:
+            except BaseException as error:
+                if is_ours_to_obey(error):
+                    raise
                 raise self._failure(runner, step, error) from error
             if result is None:
                 continue
@@ -302,8 +306,8 @@ class HostDriven:
                     sent[runner.name, output] = given
         return step
 
-    def _failure(self, runner: _Runner, step: Step, error: Exception) -> BlockFailure:
-        reason = f"{type(error).__name__}: {error}"
+    def _failure(self, runner: _Runner, step: Step, error: BaseException) -> BlockFailure:
+        reason = told(error)
         path, time_s = type(runner.component).path(), step.tick / self.ticks_per_s
         return BlockFailure(runner.name, path, time_s, step.scans.get(runner.name), reason)
 

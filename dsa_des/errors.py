@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
+from dsa_des.safe_text import MOST_OF_A_VALUE, printable, shortened
+
 #: Problems that are listed in one error; the others are only counted.
 MOST_PROBLEMS = 20
 # What one problem shows of a value, a key and a message.
-_VALUE_LENGTH = 80
 _KEY_LENGTH = 200
 _LINE_LENGTH = 1000
+_MOST_LINES = 2 * MOST_PROBLEMS
 # Names longer or more than these are not compared: that takes longer than a user waits.
 _LONGEST_NAME = 100
 _MOST_NAMES = 2000
@@ -40,21 +42,27 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
         return f"; did you mean {close!r}?"
     if not names:
         return ""
-    shown = ", ".join(shortened(name, _VALUE_LENGTH) for name in names[:12])
+    shown = ", ".join(shortened(name, MOST_OF_A_VALUE) for name in names[:12])
     shown += ", ..." if len(names) > 12 else ""
     return f"; allowed: {shown}"
 
 
-def shortened(text: str, length: int = _LINE_LENGTH) -> str:
-    """Return a text of at most `length` characters; what is cut off is replaced by dots."""
-    return text if len(text) <= length else text[: length - 3] + "..."
+class Lines(str):
+    """A message of several lines, each of which is printable already."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, lines: Iterable[object]) -> "Lines":
+        """Return lines, made printable, as one message."""
+        return cls("\n".join(printable(line) for line in lines))
 
 
 def shown_value(value: Any) -> str:
     """Return how a value is shown in a message: as Python writes it, cut off where it is long."""
     if isinstance(value, str):
         # Cut before it is quoted: a long text is not copied.
-        return shortened(repr(str(value[: _VALUE_LENGTH + 1])), _VALUE_LENGTH)
+        return shortened(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, dict | list | tuple):
@@ -65,11 +73,11 @@ def shown_value(value: Any) -> str:
             text += shown_value(item)
             if isinstance(value, dict):
                 text += f": {shown_value(value[item])}"
-            if len(text) > _VALUE_LENGTH:
-                return shortened(text, _VALUE_LENGTH)
+            if len(text) > MOST_OF_A_VALUE:
+                return shortened(text, MOST_OF_A_VALUE)
         text += "," if isinstance(value, tuple) and len(value) == 1 else ""
-        return shortened(text + right, _VALUE_LENGTH)
-    return shortened(repr(value), _VALUE_LENGTH)
+        return shortened(text + right, MOST_OF_A_VALUE)
+    return shortened(repr(value), MOST_OF_A_VALUE)
 
 
 _UNSET: Any = object()
@@ -97,13 +105,15 @@ class Problem:
     value: Any = _UNSET
 
     def __str__(self) -> str:
-        where = shortened(self.source)
+        where = shortened(self.source, _LINE_LENGTH)
         where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
             where += f" = {shown_value(self.value)}"
-        # A file's own report has several lines.
-        lines = [shortened(line) for line in self.message.splitlines()[: 2 * MOST_PROBLEMS]]
-        return f"{where}: " + "\n".join(lines)
+        # On one line whatever stands in a name: nobody can write a message of ours.
+        lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
+        return f"{where}: " + "\n".join(
+            shortened(line, _LINE_LENGTH) for line in lines[:_MOST_LINES]
+        )
 
 
 class SceneError(Exception):
@@ -127,7 +137,13 @@ class SceneError(Exception):
 
 
 class UsageError(Exception):
-    """A command was called with something it cannot use (exit code 2)."""
+    """A command was called with something it cannot use (exit code 2).
+
+    Each argument is one line of the message.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(printable(line) for line in self.args)
 
 
 class BlockFailure(Exception):
@@ -146,6 +162,21 @@ class BlockFailure(Exception):
         )
         super().__init__(block, path, time_s, scan, reason)
 
+    #: Exit code of a command that it ends.
+    exit_code = 1
+
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
-        return f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        return printable(
+            f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
+        )
+
+
+class SetupFailure(BlockFailure):
+    """A block raised an exception before anything ran: the scene cannot be used."""
+
+    exit_code = 2
+
+
+class OutputError(Exception):
+    """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

@@ -11,7 +11,7 @@ from pathlib import Path
 #: Files of tables and traffic; a day of dense traffic is a tenth of it.
 LARGEST_BYTES = 512 * 1024 * 1024
 #: Files in TOML, which is read at about a megabyte per second.
-LARGEST_TOML_BYTES = 16 * 1024 * 1024
+LARGEST_TOML_BYTES = 256 * 1024 * 1024
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),

@@ -6,12 +6,14 @@ is recorded equals the separate runs' recordings, with the replica as an additio
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from dsa_des.clock import ScanClock
-from dsa_des.component import ClockedParameters, Component, Context, Parameters
+from dsa_des.component import ClockedParameters, Component, Context
 from dsa_des.effects import plan, unspent
 from dsa_des.errors import BlockFailure
+from dsa_des.process import Node
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_clock import ReplicaClock
@@ -20,6 +22,7 @@ from dsa_des.replica_time import ReplicaTime
 from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
 from dsa_des.split_block import NotInLockStep, SplitBlock
+from dsa_des.watched_parameters import WatchedParameters
 
 __all__ = ["LockStep", "NotInLockStep"]
 
@@ -61,9 +64,16 @@ class LockStep(Simulation):
     ) -> None:
         self._scenes = list(scenes)
         self._report = report
+        #: Blocks that are split, by name; the engine still asks `components` for all but `run`.
+        self.split: dict[str, SplitBlock] = {}
+        #: By block, which of its parameters are not the same in all replicas.
+        self._differing: dict[str, set[str]] = {}
+        self._watched: dict[str, WatchedParameters] = {}
         _check_alike(self._scenes)
-        super().__init__(self._scenes[0], recorder=recorder, window=window)
-        self._cells = max(1, max(component.width for component in self.components.values()))
+        try:
+            super().__init__(self._scenes[0], recorder=recorder, window=window)
+        except BlockFailure as failure:
+            raise _unwrapped(failure) from None
 
     # -- building ------------------------------------------------------------------------------
 
@@ -79,22 +89,48 @@ class LockStep(Simulation):
                 f"of 64-bit ticks at {self.ticks_per_s} per second"
             )
         for name, component in self.components.items():
-            if not (component.serves_replicas() and self._same_parameters(name)):
+            if not self._shared(name, component):
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
                 make = self._maker(name, component)
-                self.components[name] = SplitBlock(component, make, self._finished)
+                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finished)
+            elif name in self._watched:
+                reason = f"block {name} reads parameters of its clock, which differ"
+                self._watched[name].refuse(NotInLockStep(reason))
 
-    def _same_parameters(self, name: str) -> bool:
+    def _shared(self, name: str, component: Component) -> bool:
+        """Whether one instance serves all replicas."""
+        if not component.serves_replicas():
+            return False
+        if name in self._watched:
+            return not self._watched[name].read
+        return not self._differing[name]
+
+    def _find_differing(self, name: str) -> set[str]:
         first = self._scenes[0].blocks[name].parameters
-        clocked = isinstance(first, ClockedParameters)
+        found: set[str] = set()
         for scene in self._scenes[1:]:
             other = scene.blocks[name].parameters
-            if other is first or other == first:
-                continue
-            if not clocked or _without_clock(other) != _without_clock(first):
-                return False
-        return True
+            if other is not first and other != first:
+                fields = type(first).model_fields
+                found.update(n for n in fields if getattr(other, n) != getattr(first, n))
+        return found
+
+    def _parameters(self, name: str) -> Any:
+        """Return what a block is made with: the first replica's, watched where clocks differ."""
+        parameters = self.scene.blocks[name].parameters
+        differing = self._differing[name] = self._find_differing(name)
+        of_the_clock = isinstance(parameters, ClockedParameters) and differing <= _OF_THE_CLOCK
+        if not differing or not of_the_clock:
+            return parameters
+        self._watched[name] = WatchedParameters(parameters, differing)
+        return self._watched[name].parameters
+
+    def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
+        nodes = super()._build_nodes(window, shuffle_ties)
+        for name, instances in self.split.items():
+            nodes[name].runner = instances
+        return nodes
 
     def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
         block = self.scene.blocks[name]
@@ -107,6 +143,7 @@ class LockStep(Simulation):
                 sections=scene.sections,
             )  # fmt: skip
             component = block.cls(name, scene.blocks[name].parameters, context)
+            self._check_same_length(face, component)
             planned = plan(component, scene.tolerance)
             context.tolerance = unspent(planned, scene.tolerance)
             context.effects = {i.effect.name: i.effect.build(component) for i in planned if i.built}
@@ -128,6 +165,13 @@ class LockStep(Simulation):
                     "differs between replicas"
                 )
 
+    def _check_same_length(self, face: Component, component: Component) -> None:
+        """Refuse an instance by whose data its replica would last longer or shorter."""
+        if self.scene.duration_s is not None:
+            return
+        if component.natural_duration_s() != face.natural_duration_s():
+            raise NotInLockStep(f"block {face.name} gives some replica another duration")
+
     def rehearse(self) -> None:
         """Make what each replica has for itself, and let it go.
 
@@ -136,21 +180,27 @@ class LockStep(Simulation):
         NotInLockStep
             If that shows that the replicas cannot run together.
         """
-        for component in self.components.values():
-            if isinstance(component, SplitBlock):
-                for number in range(len(self._scenes)):
-                    component.make(number)
+        for block in self.split.values():
+            for number in range(len(self._scenes)):
+                block.make(number)
 
     def _finished(self, number: int, component: Component) -> None:
         if self._report is not None:
             self._report(number, component.report())
 
     def _clock(self, name: str, component: Component) -> ScanClock | None:
+        found = [component.clock_of(scene.blocks[name].parameters) for scene in self._scenes]
+        specs = [spec for spec in found if spec is not None]
+        if not specs:
+            return None
+        if len(specs) < len(found):
+            raise NotInLockStep(f"block {name} has a clock of its own in some replicas only")
+        if len({(spec.rate_hz, spec.rate_error_ppm) for spec in specs}) > 1:
+            for wire in self.scene.wires:
+                if wire.delay_scans and name in (wire.source, wire.target):
+                    raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
         clocks = []
-        for scene in self._scenes:
-            spec = component.clock_of(scene.blocks[name].parameters)
-            if spec is None:
-                return None
+        for scene, spec in zip(self._scenes, specs, strict=True):
             draw = Streams(scene.seed).scan_normals(name, "clock jitter")
             clocks.append(ScanClock(spec, self.ticks_per_s, draw))
         assert self.replicas is not None
@@ -187,21 +237,16 @@ class LockStep(Simulation):
         try:
             outcome = super().run(progress)
         except BlockFailure as failure:
-            if isinstance(failure.__cause__, NotInLockStep):
-                raise failure.__cause__ from None
-            raise
-        for component in self.components.values():
-            if isinstance(component, SplitBlock):
-                component.close()
-        return outcome
+            raise _unwrapped(failure) from None
+        for block in self.split.values():
+            block.close()
+        # Nobody speaks for all replicas: a shared block has seen the rows of every one.
+        return replace(outcome, components={})
 
 
-def _without_clock(parameters: Parameters) -> dict[str, Any]:
-    return {
-        name: getattr(parameters, name)
-        for name in type(parameters).model_fields
-        if name not in _OF_THE_CLOCK
-    }
+def _unwrapped(failure: BlockFailure) -> Exception:
+    cause = failure.__cause__
+    return cause if isinstance(cause, NotInLockStep) else failure
 
 
 def _check_alike(scenes: Sequence[Scene]) -> None:

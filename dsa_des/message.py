@@ -20,11 +20,18 @@ STATIC = "static"  # the same for all rows
 
 #: Row and entry fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
+#: Fields that hold instants beside `Message.tick`.
+_TICK_FIELDS: dict[type, tuple[str, ...]] = {}
 
 
 def per_row(**kwargs: Any) -> Any:
     """Declare a field whose first axis is the rows (also the default for plain fields)."""
     return field(metadata={"per": PER_ROW}, **kwargs)
+
+
+def per_row_tick(**kwargs: Any) -> Any:
+    """Declare a field with an instant per row, in ticks, beside `Message.tick`."""
+    return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
 
 
 def per_entry(**kwargs: Any) -> Any:
@@ -51,6 +58,13 @@ def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
             entries.append(item.name)
     _LAYOUTS[message_type] = tuple(rows), tuple(entries)
     return _LAYOUTS[message_type]
+
+
+def _tick_fields(message_type: type) -> tuple[str, ...]:
+    if message_type not in _TICK_FIELDS:
+        names = (item.name for item in fields(message_type) if item.metadata.get("is_tick"))
+        _TICK_FIELDS[message_type] = tuple(names)
+    return _TICK_FIELDS[message_type]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +105,8 @@ class Message:
     Parameters
     ----------
     tick : ndarray of int64, shape (rows,)
-        The instant each row speaks of, in order.
+        The instant at which its block made each row, in order: one of those at which the block
+        ran. It may arrive later, and speak of what was there earlier.
     """
 
     tick: IntArray
@@ -129,6 +144,9 @@ class Message:
         """Return the message with its ticks, and its scan numbers if it has any, moved."""
         result = copy(self)
         result.tick = self.tick + ticks
+        for name in _tick_fields(type(self)):
+            if (values := getattr(self, name)) is not None:
+                setattr(result, name, values + ticks)
         if hasattr(self, "scan"):
             result.scan = self.scan + scans  # type: ignore[attr-defined]
         return result
@@ -175,6 +193,26 @@ class Message:
             If this message type cannot be written in a scene (the default).
         """
         raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
+
+
+def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
+    """Return what a block returned as messages by output name; a lone one goes to the only output.
+
+    Raises
+    ------
+    TypeError
+        If a lone message could go to several outputs.
+    """
+    if result is None:
+        return {}
+    if not isinstance(result, Message):
+        return result
+    if len(outputs) != 1:
+        raise TypeError(
+            f"returned one message but has {len(outputs)} outputs; return a dict of "
+            f"{', '.join(sorted(outputs)) or 'nothing'}"
+        )
+    return {outputs[0]: result}
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 from dsa_des.block_options import BlockOptions
 from dsa_des.component import SourcedText
 from dsa_des.errors import Problem, did_you_mean
-from dsa_des.registry import UnknownType, find
+from dsa_des.registry import NotImported, UnknownType, find
 from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, dotted
 from dsa_des.toml_input import DEEPEST, NotToml, TomlError, parse_toml
 
@@ -114,7 +114,11 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
         return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
     try:
-        cls = find(type_name)
+        cls = find(type_name, dotted(_type_key(name)))
+    except NotImported:  # what it would drop is not known: nothing is dropped
+        blocks[name]["type"] = _sourced(type_name)
+        scene.sources[_type_key(name)] = COMMAND_LINE
+        return [], []
     except UnknownType as error:
         return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
     block = blocks[name]

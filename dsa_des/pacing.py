@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dsa_des.errors import UsageError, shortened
+from dsa_des.errors import UsageError
+from dsa_des.safe_text import shortened
 
 #: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
 LONGEST_WAIT_S = 0.1

@@ -1,13 +1,18 @@
 """One message and an exit code for every error that a user can cause."""
 
 import functools
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
-import click
+from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
+from dsa_des.strangers import raised_in, told
+from dsa_des.terminal import say, say_lines
 
-from dsa_des.errors import BlockFailure, SceneError, UsageError
+# Who may end a command; whoever else does is a stranger's code in a place not foreseen.
+_OURS = ("dsa_des", "components", "click")
 
 
 def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
@@ -18,13 +23,40 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*args, **kwargs)
         except (SceneError, UsageError) as error:
-            click.echo(f"error: {error}", err=True)
+            say_lines(f"error: {error}", err=True)
             sys.exit(2)
-        except BlockFailure as error:
-            click.echo(f"error: {error}", err=True)
-            sys.exit(1)
+        except (BlockFailure, OutputError) as error:
+            say_lines(f"error: {error}", err=True)
+            sys.exit(getattr(error, "exit_code", 1))
+        except SystemExit as error:
+            module = raised_in(error.__traceback__)
+            if module.partition(".")[0] in _OURS:
+                raise
+            say(f"error: the module {module!r} left with {told(error)}", err=True)
+            sys.exit(2)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()
             sys.exit(1)
 
     return guarded
+
+
+@contextmanager
+def plain_output() -> Iterator[None]:
+    """Say in one line that a file or our own output cannot be written, and end with exit code 1."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()  # now, where it can be said, and not when Python ends
+    except OSError as error:
+        # What is left in the buffer is written when Python ends, and must not fail again.
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+        if not isinstance(error, BrokenPipeError):
+            what = error.filename or "the output cannot be written"
+            with suppress(OSError, ValueError):
+                say(f"error: {what}: {error.strerror or error}", err=True)
+        sys.exit(1)

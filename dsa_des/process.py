@@ -14,13 +14,14 @@ import simpy
 
 from dsa_des.block_environment import BlockEnvironment
 from dsa_des.channel import Channel
-from dsa_des.clock import ScanClock
+from dsa_des.clock import MAX_TICK, ScanClock
 from dsa_des.component import Component
 from dsa_des.events import Bell, WakeUp
-from dsa_des.message import Message
+from dsa_des.message import Message, by_output
 from dsa_des.processors import Processor
 from dsa_des.replica_time import ReplicaTime
 from dsa_des.sorted_union import last_at_or_before, sorted_union
+from dsa_des.strangers import is_ours_to_obey
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
 
@@ -48,12 +49,15 @@ class Demand:
     clock: ScanClock
     lead_ticks: int = 0
     replicas: ReplicaTime | None = None
+    end_tick: int = MAX_TICK
 
     def between(self, start: int, end: int) -> IntArray:
         """Return the ticks in [start, end) at which this block needs a row."""
-        _, ticks = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
         if not self.lead_ticks:
-            return ticks
+            return self.clock.between(start, end)[1]
+        # A row that would arrive after the end of the run is not needed.
+        last = min(end + self.lead_ticks, self.end_tick)
+        _, ticks = self.clock.between(start + self.lead_ticks, last)
         if self.replicas is not None:  # rows from before a replica's start do not exist
             ticks = ticks[ticks % self.replicas.span_ticks >= self.lead_ticks]
         return ticks - self.lead_ticks
@@ -78,9 +82,12 @@ class Node:
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
+    #: What handles the wakes: the block itself, or its instances, one per replica.
+    runner: Any = None
 
     def __post_init__(self) -> None:
         self.name = self.component.name
+        self.runner = self.component
         self._scheduled: set[int] = set()
         self._scan_at: dict[int, int] = {}
         self._missed = False
@@ -116,7 +123,9 @@ class Node:
             yield from own(env)
         except Abort:
             raise
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
 
@@ -236,11 +245,12 @@ class Node:
         if self.simulation.trace is not None:
             self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
-            result = self.component.run(wake)
-            self.send(result, int(ticks[0]), end)
+            self.send(self.runner.run(wake), ticks)
         except Abort:
             raise
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             self.simulation.fail(self, ticks, error, int(scans[0]))
 
     def _collect(self, port: str, end: int) -> list[Arrivals]:
@@ -280,19 +290,10 @@ class Node:
 
     # -- sending -------------------------------------------------------------------------------
 
-    def send(self, result: Any, start: int, end: int) -> None:
-        """Send what a block returned: a message, or messages by output name."""
-        if result is None:
-            return
+    def send(self, result: Any, ticks: IntArray) -> None:
+        """Send what a block returned when it ran at `ticks`: a message, or messages by output."""
         outputs = self.component.outputs
-        if isinstance(result, Message):
-            if len(outputs) != 1:
-                raise TypeError(
-                    f"returned one message but has {len(outputs)} outputs; return a dict of "
-                    f"{', '.join(sorted(outputs)) or 'nothing'}"
-                )
-            result = {next(iter(outputs)): result}
-        for port, message in result.items():
+        for port, message in by_output(result, tuple(outputs)).items():
             declared = outputs.get(port)
             if declared is None:
                 raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
@@ -303,12 +304,7 @@ class Node:
                 )
             if len(message) == 0:
                 continue
-            tick = message.tick
-            if tick.dtype != np.int64 or tick[0] < start or tick[-1] >= end:
-                raise ValueError(
-                    f"output {port!r} has ticks [{tick[0]} ... {tick[-1]}] of type {tick.dtype}; "
-                    f"they must be int64 and lie in the instants it ran at, [{start}, {end})"
-                )
+            _check_ticks(port, message.tick, ticks)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
             if self.processor is None:
@@ -324,3 +320,22 @@ class Node:
             if not node.windowed and target_port in node._trigger_ports:
                 for arrival in arrivals.tolist():
                     node.wake_at(arrival)
+
+
+def _check_ticks(port: str, sent: IntArray, ran: IntArray) -> None:
+    """Refuse rows that are not of instants at which the block ran, in order.
+
+    What a row is dated with is when it was made: that decides when it arrives, and where it stands
+    in the recording.
+    """
+    if sent is ran:
+        return
+    if sent.dtype == np.int64:
+        place = last_at_or_before(ran, sent)
+        if place[0] >= 0 and bool((ran[place] == sent).all() and (place[1:] >= place[:-1]).all()):
+            return
+    raise ValueError(
+        f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "
+        f"they must be int64 and lie in the instants it ran at, in order: those of the wake "
+        f"[{ran[0]} ... {ran[-1]}], also where an input speaks of an earlier one"
+    )

@@ -81,7 +81,10 @@ def key_of(*parts: object) -> int:
 
 def target_keys(names: tuple[str, ...]) -> UInt64Array:
     """Return the 64-bit draw keys of named targets, shape (targets,)."""
-    return np.array([key_of("target", name) for name in names], dtype=np.uint64)
+    # As `key_of("target", name)`, which takes three times as long for each of a million names.
+    texts = ("str:target\x1fstr:" + name for name in names)
+    digests = b"".join(blake2b(text.encode(), digest_size=8).digest() for text in texts)
+    return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
 
 
 class Stream:

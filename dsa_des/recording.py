@@ -5,11 +5,12 @@ before they reach a sink, so a run in look-ahead windows and one that goes scan 
 the same rows in the same order.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from dsa_des.attempts import attempt
 from dsa_des.message import Columns, Message, Schema, Text, rows_of
 from dsa_des.replica_time import own_scans
 from dsa_des.types import AnyArray, IntArray
@@ -281,19 +282,28 @@ class Observer(Protocol):
 
 
 class ObserverSink:
-    """Passes rows on to observers."""
+    """Passes rows on to observers.
 
-    def __init__(self, observers: Iterable[Observer]) -> None:
+    Parameters
+    ----------
+    observers : iterable of Observer
+    notes : list of str, optional
+        An observer that raises is left out from then on, and a note of it added here, so that the
+        run goes on. Without a list the run ends.
+    """
+
+    def __init__(self, observers: Iterable[Observer], notes: list[str] | None = None) -> None:
         self.observers = list(observers)
+        self._notes = notes
 
     def open(self, schemas: Mapping[str, Schema]) -> None:
         """Nothing to do."""
 
     def write(self, table: str, columns: Columns) -> None:
         """Pass rows to every observer of this table."""
-        for observer in self.observers:
+        for observer in list(self.observers):
             if table in observer.tables:
-                observer.update(table, columns)
+                self._ask(observer, observer.update, table, columns)
 
     def close(self) -> None:
         """Nothing to do."""
@@ -301,6 +311,15 @@ class ObserverSink:
     def result(self) -> dict[str, Any]:
         """Return the sections of all observers."""
         sections: dict[str, Any] = {}
-        for observer in self.observers:
-            sections.update(observer.result())
+        for observer in list(self.observers):
+            sections.update(self._ask(observer, observer.result) or {})
         return sections
+
+    def _ask(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
+        if self._notes is None:
+            return call(*arguments)
+        count = len(self._notes)
+        answer = attempt(f"the summary {type(observer).__name__}", self._notes, call, *arguments)
+        if len(self._notes) > count:
+            self.observers.remove(observer)
+        return answer

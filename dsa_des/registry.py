@@ -3,72 +3,83 @@
 Our own blocks are registered in the same way as a stranger's.
 """
 
-import importlib
-import sys
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-from dsa_des.component import Component
+from dsa_des.component import Component, Parameters
 from dsa_des.entry_points import registered
 from dsa_des.errors import did_you_mean
+from dsa_des.foreign import NotAllowed, NotImportable, is_ours, load_named, load_point
+from dsa_des.message import Message
+from dsa_des.ports import Input, Output
+from dsa_des.strangers import Left, strangers_code
 
 
 class UnknownType(Exception):
     """A block type cannot be found or is not a component; the message says what is allowed."""
 
 
-def find(type_name: str) -> type[Component]:
+class NotImported(UnknownType):
+    """A block type is foreign, and nothing foreign may be imported (`dsa_des.foreign.Imports`)."""
+
+
+def find(type_name: str, key: str = "") -> type[Component]:
     """Return the class of a registered block type or of ``module:Class``.
+
+    Parameters
+    ----------
+    type_name : str
+    key : str
+        Who names it, for those who want to know what is imported.
 
     Raises
     ------
+    NotImported
+        If it may not be imported.
     UnknownType
         If it cannot be imported or is not a `Component`.
     """
-    if ":" in type_name:
-        found = import_named(type_name)
-    else:
-        point = registered().get(type_name)
-        if point is None:
-            hint = did_you_mean(type_name, registered())
-            raise UnknownType(f"unknown block type{hint} (or module:Class)")
-        try:
-            found = point.load()
-        except Exception as error:
-            raise UnknownType(f"cannot be imported from {point.value}: {error}") from error
+    point = registered().get(type_name)
+    if point is None and ":" not in type_name:
+        hint = did_you_mean(type_name, registered())
+        raise UnknownType(f"unknown block type{hint} (or module:Class)")
+    try:
+        found = load_named(type_name, key) if point is None else load_point(point, key)
+    except NotAllowed as error:
+        raise NotImported(str(error)) from None
+    except NotImportable as error:
+        raise UnknownType(str(error)) from error.__cause__
+    if point is not None and is_ours(point):
+        return _component(found)
+    try:
+        with strangers_code(UnknownType):
+            return _component(found)
+    except Left as error:
+        raise UnknownType(f"{type_name} cannot be looked at: {error}") from error.__cause__
+
+
+def _component(found: Any) -> type[Component]:
+    """Return a class if it declares what the engine reads of every block."""
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise UnknownType("is not a dsa_des.Component")
+    for name, kind in (("inputs", Input), ("outputs", Output)):
+        ports = getattr(found, name)
+        fine = isinstance(ports, Mapping) and all(
+            isinstance(port, str) and isinstance(declared, kind) and _is_message(declared.message)
+            for port, declared in ports.items()
+        )
+        if not fine:
+            raise UnknownType(
+                f"{found.path()} declares {name} wrongly: they must be a table of names and "
+                f"dsa_des.{kind.__name__} of a dsa_des.Message"
+            )
+    if not (isinstance(found.Parameters, type) and issubclass(found.Parameters, Parameters)):
+        raise UnknownType(
+            f"{found.path()} declares Parameters wrongly: they must be a subclass of "
+            "dsa_des.Parameters"
+        )
     return found
 
 
-def import_named(type_name: str) -> Any:
-    """Return what ``module:Class`` names, also beside the working directory.
-
-    Raises
-    ------
-    UnknownType
-        If it cannot be imported.
-    """
-    module_name, _, class_name = type_name.partition(":")
-    # `module:Class` beside the user's scene is the common case; a console script, unlike
-    # `python -m`, does not put the working directory on the path.
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        if error.name and (module_name == error.name or module_name.startswith(error.name + ".")):
-            raise UnknownType(
-                f"there is no module {module_name!r} in the working directory or on the Python path"
-            ) from error
-        raise UnknownType(f"module {module_name!r} cannot be imported: {error}") from error
-    except Exception as error:
-        raise UnknownType(
-            f"module {module_name!r} cannot be imported: {type(error).__name__}: {error}"
-        ) from error
-    try:
-        return getattr(module, class_name)
-    except AttributeError:
-        hint = did_you_mean(class_name, [n for n in vars(module) if not n.startswith("_")])
-        raise UnknownType(f"module {module_name!r} has no {class_name!r}{hint}") from None
+def _is_message(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Message)

@@ -4,11 +4,13 @@ They are found by the entry-point group ``dsa_des.reports``; each is a class wit
 `Report`, called without arguments.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dsa_des.attempts import attempt
 from dsa_des.entry_points import registered
+from dsa_des.foreign import installed
 from dsa_des.recording import Observer
 
 if TYPE_CHECKING:
@@ -24,15 +26,36 @@ class Report(Protocol):
         """Return running summaries over the recorded rows of this run."""
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
-        """Print the summary on a ``rich.console.Console``."""
+        """Print the summary on a ``rich.console.Console`` that reads no markup."""
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
-        """Draw figures from the Parquet tables in `folder` into it and return their paths."""
+        """Draw figures from the Parquet tables in `folder` into it and return their paths.
+
+        The run is complete when this is called, and may be large: tables are read in pieces.
+        """
 
 
 def load_reports() -> list[Report]:
     """Return one instance of every registered report, in the order of their names."""
-    return [point.load()() for point in registered(REPORTS).values()]
+    return [installed(point)() for point in registered(REPORTS).values()]
+
+
+def draw_all(
+    reports: Iterable[Report], simulation: "Simulation", folder: Path, summary: dict[str, Any]
+) -> list[str]:
+    """Let every report draw its figures of a finished run, and return what went wrong.
+
+    A figure that fails takes nothing with it: the run is complete without.
+
+    Raises
+    ------
+    OSError
+        If a figure cannot be written.
+    """
+    notes: list[str] = []
+    for report in reports:
+        attempt("drawing", notes, report.draw, simulation, folder, summary, unless=OSError)
+    return notes

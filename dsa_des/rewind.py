@@ -16,7 +16,7 @@ import numpy as np
 
 from dsa_des.channel import Channel
 from dsa_des.component import Component
-from dsa_des.graph import in_cycles
+from dsa_des.graph import in_cycles, window_order
 
 if TYPE_CHECKING:
     from dsa_des.process import Node
@@ -49,18 +49,40 @@ def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[
     kept = nx.DiGraph()
     kept.add_nodes_from(looped)
     kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
-
-    def optional(edge: tuple[str, str]) -> bool:
-        inputs = classes[edge[1]].inputs
-        return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
-
     cut = set()
-    for edge in sorted((e for e in inside if graph.edges[e]["delayed"]), key=optional):
+    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
+    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
         kept.add_edge(*edge)
         if not nx.is_directed_acyclic_graph(kept):
             kept.remove_edge(*edge)
             cut.add(edge)
     return cut
+
+
+def _optional(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
+) -> bool:
+    """Whether the receiving block can do without what comes over an edge."""
+    inputs = classes[edge[1]].inputs
+    return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
+
+
+def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
+    """Return the place of each block in the order in which blocks tell each other what they offer.
+
+    Requests go the other way. Both pass over wires with and without delay; loops are opened where
+    an input can be done without, and else at a delay.
+    """
+    looped = in_cycles(graph)
+    opened = nx.DiGraph(graph)
+    opened.remove_edges_from(
+        edge
+        for edge in graph.edges
+        if edge[0] in looped
+        and looped[edge[0]] == looped.get(edge[1])
+        and _optional(graph, classes, edge)
+    )
+    return window_order(opened, set(graph), cut_loops(opened, classes))
 
 
 def may_rewind(graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: bool) -> bool:
@@ -147,8 +169,7 @@ class Checkpoint:
 
     def earliest_since(self, channels: Iterable[Channel], end: int) -> int:
         """Return the first arrival over some wires of what was sent since, or `end`."""
-        before = dict(self._channels)
-        ticks = [channel.earliest_since(before[channel]) for channel in channels]
+        ticks = [channel.earliest_pushed() for channel in channels]
         return min((tick for tick in ticks if tick is not None), default=end)
 
     def restore(self) -> None:

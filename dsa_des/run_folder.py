@@ -1,4 +1,4 @@
-"""The folder of a run: written under a temporary name, renamed when complete, read as Arrow.
+"""The folder of a run, read as Arrow tables.
 
 A run folder holds ``scene.toml`` (resolved), one Parquet file per table (``detections``,
 ``scans``, ``tracks``, ...), ``run.json`` and the figures.
@@ -6,77 +6,32 @@ A run folder holds ``scene.toml`` (resolved), one Parquet file per table (``dete
 
 import json
 import os
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dsa_des.errors import UsageError
+from dsa_des.manifest import RUN_JSON, with_files
+from dsa_des.output_file import write_file
+from dsa_des.output_names import new_folder_name
 from dsa_des.plain_json import json_text
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-RUN_JSON = "run.json"
-
-
-def new_folder_name(parent: Path, stem: str) -> Path:
-    """Return the first of ``parent/stem-001``, ``-002``, ... that does not exist."""
-    number = 1
-    while (parent / f"{stem}-{number:03d}").exists():
-        number += 1
-    return parent / f"{stem}-{number:03d}"
-
-
-def check_target(folder: Path) -> None:
-    """Raise UsageError unless `folder` is free, empty, or an earlier run that may be replaced."""
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise UsageError(f"--out {folder}: is a file; a folder name is needed")
-    if any(folder.iterdir()) and not (folder / RUN_JSON).exists():
-        raise UsageError(
-            f"--out {folder}: is a folder that holds something other than a run; "
-            "choose a new name, or an earlier run to replace"
-        )
-
-
-@contextmanager
-def writing(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder beside `folder`; it takes that name when the block succeeds.
-
-    When the block raises, nothing is left behind.
-    """
-    check_target(folder)
-    made = [parent for parent in folder.parents if not parent.exists()]
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    except OSError as error:
-        raise UsageError(f"--out {folder}: cannot be written: {error.strerror}") from error
-    try:
-        # mkdtemp makes private folders; a result is as readable as any file of its maker.
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o777 & ~umask)
-        yield temporary
-        if folder.exists():
-            shutil.rmtree(folder)
-        temporary.rename(folder)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        for parent in made:
-            if parent.exists() and not any(parent.iterdir()):
-                parent.rmdir()
-        raise
+__all__ = ["RUN_JSON", "Run", "new_folder_name", "read_run", "write_json", "write_run_json"]
 
 
 def write_json(path: Path, content: Any) -> None:
     """Write JSON with sorted keys, so that equal contents are equal bytes."""
-    path.write_text(json_text(content, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    write_file(path, (json_text(content, indent=2, sort_keys=True) + "\n").encode())
+
+
+def write_run_json(folder: Path, content: dict[str, Any]) -> None:
+    """Write ``run.json``, which lists the files of the folder: the last one to be written.
+
+    A folder whose files are not listed is not replaced by later results.
+    """
+    write_json(folder / RUN_JSON, with_files(folder, content))
 
 
 @dataclass(frozen=True)
@@ -89,7 +44,8 @@ class Run:
     ----------
     path : Path
     info : dict
-        The content of ``run.json``: seed, versions, resolution, scene hash, counts, summary.
+        The content of ``run.json``: seed, versions, resolution, scene hash, counts, summary, and
+        ``files``, every file of the folder with a digest.
     tables : dict
         Table name → ``pyarrow.Table``.
     """

@@ -17,10 +17,11 @@ from dsa_des.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.overrides import apply_set, apply_swap
 from dsa_des.parameter_errors import explain
 from dsa_des.processors import ProcessorParameters
-from dsa_des.registry import UnknownType, find
+from dsa_des.registry import NotImported, UnknownType, find
 from dsa_des.scene_checks import check_activity, check_lookalikes, check_times
 from dsa_des.scene_file import COMMAND_LINE, Key, SceneFile, dotted, read_scene_file
 from dsa_des.sections import section_models
+from dsa_des.strangers import Left, strangers_code
 from dsa_des.wiring import Wire, read_wires
 
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
@@ -329,17 +330,24 @@ def _blocks(
             problems.append(scene_file.problem((*key, "type"), message))
             continue
         try:
-            cls = find(type_name)
+            cls = find(type_name, dotted((*key, "type")))
+        except NotImported:
+            continue
         except UnknownType as error:
             problems.append(scene_file.problem((*key, "type"), str(error), str(type_name)))
             continue
         classes[name] = cls
         extra, given = split_options(table, cls.Parameters)
         try:
-            parameters = cls.Parameters.model_validate(given)
+            with strangers_code(ValidationError):
+                parameters = cls.Parameters.model_validate(given)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
             problems += explain(scene_file, key, str(type_name), cls.Parameters, error)
+            continue
+        except Left as error:
+            message = f"{cls.path()} cannot take its parameters: {error}"
+            problems.append(scene_file.problem(key, message))
             continue
         check_lookalikes(scene_file, key, given, cls.Parameters, problems)
         blocks[name] = Block(name, str(type_name), cls, parameters, options)

@@ -10,8 +10,10 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 from dsa_des.clock import MAX_TICK, ClockSpec, resolution
-from dsa_des.errors import Problem, shortened
+from dsa_des.errors import Problem
+from dsa_des.safe_text import shortened
 from dsa_des.scene_file import Key, SceneFile
+from dsa_des.strangers import Left, strangers_code
 from dsa_des.wiring import Wire
 
 if TYPE_CHECKING:
@@ -52,8 +54,7 @@ def check_times(
     processors: "Mapping[str, ProcessorParameters] | None" = None,
 ) -> int:
     """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
-    specs = {name: block.cls.clock_of(block.parameters) for name, block in blocks.items()}
-    clocks = {name: spec for name, spec in specs.items() if spec is not None}
+    clocks = _clocks(scene, blocks, problems)
     late = [wire for wire in wires if wire.total_delay_s or wire.jitter_s]
     times = [wire.total_delay_s for wire in late]
     for spec in clocks.values():
@@ -88,6 +89,27 @@ def check_times(
     return ticks_per_s
 
 
+def _clocks(
+    scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]
+) -> dict[str, ClockSpec]:
+    """Return the scan clock of every block that has one; a class that cannot say is a problem."""
+    clocks: dict[str, ClockSpec] = {}
+    for name, block in blocks.items():
+        try:
+            with strangers_code():
+                spec = block.cls.clock_of(block.parameters)
+        except Left as error:
+            message = f"{block.cls.path()} cannot say its clock (clock_of): {error}"
+            problems.append(scene.problem(("blocks", name), message))
+            continue
+        if isinstance(spec, ClockSpec):
+            clocks[name] = spec
+        elif spec is not None:
+            message = f"{block.cls.path()} gives no clock: clock_of must return a ClockSpec or None"
+            problems.append(scene.problem(("blocks", name), message))
+    return clocks
+
+
 def _check_clock(
     scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int, problems: list[Problem]
 ) -> None:
@@ -114,6 +136,10 @@ def check_activity(
     problems: list[Problem],
 ) -> None:
     """Add blocks that would never run, and wires that hold a message for a queued input."""
+    faults: list[Problem] = []
+    clocks = _clocks(scene, blocks, faults)
+    if faults:  # said before
+        return
     woken = {
         wire.target
         for wire in wires
@@ -121,7 +147,7 @@ def check_activity(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
-        if not alive and block.cls.clock_of(block.parameters) is None:
+        if not alive and name not in clocks:
             message = (
                 "would never run: it has no scan clock, no process of its own, and no wire into "
                 "a trigger input"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.component import SourcedText
-from dsa_des.errors import Problem, SceneError, shortened
+from dsa_des.errors import Problem, SceneError
 from dsa_des.input_files import (
     LARGEST_TOML_BYTES,
     InputFileError,
@@ -21,6 +21,7 @@ from dsa_des.input_files import (
     is_regular_file,
     read_input_text,
 )
+from dsa_des.safe_text import shortened
 from dsa_des.toml_input import DEEPEST, TomlError, parse_toml
 
 Key = tuple[str | int, ...]
@@ -29,9 +30,9 @@ COMMAND_LINE = "command line"
 _LONGEST_CHAIN = 32
 # Values taken from files, counted each time that a file is extended: files that extend the next
 # one twice would double them at every step.
-_MOST_VALUES = 2_000_000
+_MOST_VALUES = 20_000_000
 # What a file counts for, however short it is.
-_VALUES_PER_FILE = 20
+_VALUES_PER_FILE = 200
 
 
 def dotted(key: Key) -> str:

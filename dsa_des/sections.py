@@ -9,6 +9,7 @@ from functools import lru_cache
 
 from dsa_des.component import Parameters
 from dsa_des.entry_points import registered
+from dsa_des.foreign import installed
 
 SECTIONS = "dsa_des.sections"
 
@@ -16,4 +17,4 @@ SECTIONS = "dsa_des.sections"
 @lru_cache(maxsize=1)
 def section_models() -> dict[str, type[Parameters]]:
     """Return the registered section models by table name, sorted."""
-    return {name: point.load() for name, point in registered(SECTIONS).items()}
+    return {name: installed(point) for name, point in registered(SECTIONS).items()}

@@ -8,6 +8,7 @@ nothing that is recorded.
 import random
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,7 +22,7 @@ from dsa_des.clock import MAX_TICK, ScanClock
 from dsa_des.component import Component, Consumer, Context, Producer
 from dsa_des.connections import check_reach, connect
 from dsa_des.effects import Planned, plan, unspent
-from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.errors import BlockFailure, Problem, SceneError, SetupFailure
 from dsa_des.graph import depths, window_order
 from dsa_des.message import Message
 from dsa_des.pinpoint import pinpoint
@@ -30,8 +31,9 @@ from dsa_des.processors import Processing, Processor
 from dsa_des.randomness import Streams
 from dsa_des.recording import Recorder
 from dsa_des.replica_time import ReplicaTime
-from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows
+from dsa_des.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
 from dsa_des.scene import Scene
+from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.types import IntArray
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
@@ -68,9 +70,14 @@ class Outcome:
     def report(self) -> dict[str, Any]:
         """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
         sections: dict[str, Any] = {}
-        for component in self.components.values():
-            for section, content in component.report().items():
-                sections.setdefault(section, {}).update(content)
+        for name, component in self.components.items():
+            try:
+                for section, content in component.report().items():
+                    sections.setdefault(section, {}).update(content)
+            except BaseException as error:
+                if is_ours_to_obey(error):
+                    raise
+                raise _failure(name, type(component), self.duration_s, error) from error
         return sections
 
 
@@ -131,6 +138,7 @@ class Simulation:
         queued = any(block.options.processor for block in scene.blocks.values())
         self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
         self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
+        self._place = telling_order(scene.graph, scene.classes)
         self.streams = self._make_streams()
         self.components = self._build_components(simulate_everything)
         self.duration_s = self._duration()
@@ -169,15 +177,39 @@ class Simulation:
                 sections=self.scene.sections,
                 simulate_everything=simulate_everything,
             )
-            try:
-                components[name] = block.cls(name, block.parameters, context)
-            except _REFUSALS as error:
-                problems.append(self._problem(f"blocks.{name}", reason_of(error)))
-            except Exception as error:
-                raise _failure(name, block.cls, 0.0, error) from error
+            with self._preparing(name, problems):
+                components[name] = block.cls(name, self._parameters(name), context)
         if problems:
             raise SceneError(problems)
         return components
+
+    @contextmanager
+    def _preparing(self, name: str, problems: list[Problem]) -> Iterator[None]:
+        """Make what a block raises before the run an error that names it."""
+        try:
+            yield
+        except (SceneError, BlockFailure):
+            raise
+        except _REFUSALS as error:
+            problems.append(self._problem(f"blocks.{name}", reason_of(error)))
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            path = self.scene.blocks[name].cls.path()
+            raise SetupFailure(name, path, 0.0, None, told(error)) from error
+
+    def _asked(self, name: str, what: str, *arguments: Any) -> Any:
+        """Return what a method of a block returns before the run."""
+        problems: list[Problem] = []
+        answer = None
+        with self._preparing(name, problems):
+            answer = getattr(self.components[name], what)(*arguments)
+        if problems:
+            raise SceneError(problems)
+        return answer
+
+    def _parameters(self, name: str) -> Any:
+        return self.scene.blocks[name].parameters
 
     def _problem(self, key: str, what: object) -> Problem:
         return Problem(str(self.scene.path), key, str(what))
@@ -185,7 +217,7 @@ class Simulation:
     def _duration(self) -> Fraction:
         if self.scene.duration_s is not None:
             return self.scene.duration_s
-        lengths = [component.natural_duration_s() for component in self.components.values()]
+        lengths = [self._asked(name, "natural_duration_s") for name in self.components]
         known = [length for length in lengths if length is not None]
         if not known:
             message = "is required: no block of this scene has a length of its own"
@@ -201,9 +233,9 @@ class Simulation:
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
-        for name in sorted(self.components, key=lambda name: (self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (self._place[name], name)):
             self.components[name].context.producers = [
-                Producer(wire.source, wire.input, self.components[wire.source].offer(wire.output))
+                Producer(wire.source, wire.input, self._asked(wire.source, "offer", wire.output))
                 for wire in self.scene.wires
                 if wire.target == name
             ]
@@ -216,11 +248,11 @@ class Simulation:
         problems: list[Problem] = []
         for name, component in self.components.items():
             component.context.duration_s = self.duration_s
-            try:
+            known = len(problems)
+            with self._preparing(name, problems):
                 found = plan(component, self.scene.tolerance, everything=everything)
                 built = {i: i.effect.build(component) for i in found if i.built}
-            except _REFUSALS as error:
-                problems.append(self._problem(f"blocks.{name}", reason_of(error)))
+            if len(problems) > known:
                 continue
             planned += found
             if not everything:
@@ -235,19 +267,15 @@ class Simulation:
 
     def _set_up_components(self) -> None:
         problems: list[Problem] = []
-        for name in sorted(self.components, key=lambda name: (-self._depth[name], name)):
+        for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             component = self.components[name]
             component.context.consumers = [
-                Consumer(wire.target, wire.input, self.components[wire.target].request(wire.input))
+                Consumer(wire.target, wire.input, self._asked(wire.target, "request", wire.input))
                 for wire in self.scene.wires
                 if wire.source == name
             ]
-            try:
+            with self._preparing(name, problems):
                 component.setup()
-            except _REFUSALS as error:
-                problems.append(self._problem(f"blocks.{name}", reason_of(error)))
-            except Exception as error:
-                raise _failure(name, type(component), 0.0, error) from error
         if problems:
             raise SceneError(problems)
 
@@ -441,8 +469,7 @@ def reason_of(error: BaseException) -> str:
 def _failure(
     name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
 ) -> BlockFailure:
-    reason = f"{type(error).__name__}: {error}"
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, reason)
+    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, told(error))
 
 
 def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Callable[[], float]:

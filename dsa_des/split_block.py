@@ -1,13 +1,18 @@
-"""A block that cannot be shared by replicas: one instance each, behind the face of one block."""
+"""A block that cannot be shared by replicas: one instance each, run as if they were one block.
 
-from collections.abc import Callable, Mapping
+The engine asks the block itself, as the first replica has it, for everything but `run`: its clock,
+ports, requests, offers, width and grain. What stands in for it here has nothing else that could
+differ from it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from dsa_des.component import Component
-from dsa_des.message import STATIC, Message
+from dsa_des.message import STATIC, Message, by_output
 from dsa_des.replica_time import first_scan
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals, Wake
@@ -17,16 +22,16 @@ class NotInLockStep(Exception):
     """These replicas cannot run in lock step; the message says why. They can run one by one."""
 
 
-class SplitBlock(Component):
+class SplitBlock:
     """One instance per replica, made when its replica begins and let go when it has ended.
 
     Each instance sees only its own replica's rows, with its own ticks and scan numbers, as in a
-    run of its own.
+    run of its own. It is no block and has no face of its own: only `run` is called on it.
 
     Parameters
     ----------
-    face : Component
-        The block as the first replica has it; its ports, requests and offers stand for all.
+    outputs : sequence of str
+        Names of the block's outputs.
     make : callable
         Makes the instance of a replica.
     finished : callable
@@ -35,21 +40,13 @@ class SplitBlock(Component):
 
     def __init__(
         self,
-        face: Component,
+        outputs: Sequence[str],
         make: Callable[[int], Component],
         finished: Callable[[int, Component], None],
     ) -> None:
-        super().__init__(face.name, face.p, face.context)
-        self.face = face
-        self.inputs, self.outputs = face.inputs, face.outputs  # type: ignore[misc]
-        self.windowed, self.clocked = True, face.clocked  # type: ignore[misc]
+        self._outputs = tuple(outputs)
         self.make, self._finished = make, finished
         self._instances: dict[int, Component] = {}
-
-    @property
-    def width(self) -> int:
-        """Number of targets per row."""
-        return self.face.width
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Let every replica's instance handle its rows."""
@@ -62,9 +59,7 @@ class SplitBlock(Component):
                 self._let_go(number)
                 self._instances[number] = self.make(number)
             result = self._instances[number].run(_part(wake, slice(first, end), number))
-            if isinstance(result, Message):
-                result = {next(iter(self.outputs)): result}
-            for port, message in (result or {}).items():
+            for port, message in by_output(result, self._outputs).items():
                 shift = number * wake.span_ticks
                 sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
         return {port: _joined(parts) for port, parts in sent.items()} or None
@@ -86,9 +81,12 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
     held = {}
     for port, (message, place) in wake._held.items():
         mine = place[rows]
-        low = int(mine.min())
-        part = message.take(slice(low, int(mine.max()) + 1)).shifted(-begin, -scan)
-        held[port] = part, mine - low
+        there = mine[mine >= 0]
+        if len(there) == 0:
+            continue  # nothing has arrived in this replica yet
+        low = int(there.min())
+        part = message.take(slice(low, int(there.max()) + 1)).shifted(-begin, -scan)
+        held[port] = part, np.where(mine < 0, -1, mine - low)
     arrived = {
         port: [part for new in arrivals if (part := _arrivals(new, begin, scan, wake.span_ticks))]
         for port, arrivals in wake._arrived.items()

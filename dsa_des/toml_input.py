@@ -3,6 +3,8 @@
 import tomllib
 from typing import Any
 
+from dsa_des.toml_reason import toml_reason
+
 #: Tables and lists inside each other; scenes need about six.
 DEEPEST = 64
 #: Whole numbers have at most this many digits; clocks and seeds need twenty.
@@ -29,7 +31,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise NotToml(f"is not valid TOML: {_short(str(error))}") from None
+        raise NotToml(f"is not valid TOML: {toml_reason(error)}") from None
     except RecursionError:
         raise TomlError(_too_deep()) from None
     except ValueError:  # Python's own limit on the digits of an integer
@@ -61,7 +63,3 @@ def _too_deep() -> str:
 
 def _too_long() -> str:
     return f"a whole number has too many digits: at most {MOST_DIGITS} are allowed"
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 200 else text[:200] + "..."

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from components.benchmark.cases import Case, chosen
-from dsa_des.errors import UsageError
+from dsa_des import terminal
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.output_file import check_file
+from dsa_des.output_names import named
 from dsa_des.run_folder import write_json
 
 # The thesis's run time for its scene, 3 s for 21,600 target-scans (errata 24).
@@ -23,16 +26,14 @@ def run_benchmark(
     embed: bool,
 ) -> None:
     """Measure the cases; without names, all of them."""
-    from rich.console import Console
-
     if embed and (scenes or compare):
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
     cases = [] if embed else chosen(scenes)
     before = {} if compare is None else _read(Path(compare))
-    target = None if json_file is None else Path(json_file)
-    if target is not None and not target.parent.is_dir():
-        raise UsageError(f"--json {target}: the folder {target.parent} does not exist")
-    console = Console()
+    target = None if json_file is None else named(json_file, "--json")
+    if target is not None:
+        check_file(target, "--json")
+    console = terminal.console()
     rows: list[dict[str, Any]] = []
     if embed:
         rows.append(_measured_calls(quick, repeats or (2 if quick else 5)))
@@ -45,7 +46,10 @@ def run_benchmark(
     else:
         rows += _measured_cases(console, cases, quick, repeats, before)
     if target is not None:
-        write_json(target, rows)
+        try:
+            write_json(target, rows)
+        except OSError as error:
+            raise OutputError(f"--json {target}: cannot be written: {error.strerror}") from error
         console.print(f"rows written to {target}")
 
 
@@ -85,10 +89,11 @@ def _measured_calls(quick: bool, repeats: int) -> dict[str, Any]:
 
 def _fresh(module: str, arguments: list[str]) -> dict[str, Any]:
     """Return what a measuring module prints in a process of its own."""
-    command = [sys.executable, "-m", f"components.benchmark.{module}", *arguments]
+    # -P: no file of the working directory is imported.
+    command = [sys.executable, "-P", "-m", f"components.benchmark.{module}", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise UsageError(f"{' '.join(arguments)} failed:\n{done.stderr.strip()}")
+        raise UsageError(f"{' '.join(arguments)} failed:", *done.stderr.strip().splitlines())
     row: dict[str, Any] = json.loads(done.stdout)
     return row
 

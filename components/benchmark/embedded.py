@@ -5,7 +5,6 @@ starts it anew, so that nothing is warm from elsewhere.
 """
 
 import argparse
-import json
 import sys
 import time
 from typing import Any
@@ -16,6 +15,7 @@ from components.benchmark.cases import SCENES
 from dsa_des.embed import Simulator
 from dsa_des.scene import load_scene
 from dsa_des.simulation import Simulation
+from dsa_des.terminal import say_json
 
 #: What a call may take at its 99th percentile, us.
 WANTED_US = 1000.0
@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--calls", type=int, default=1800)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args(arguments)
-    print(json.dumps(measured(options.calls, options.repeats)))
+    say_json(measured(options.calls, options.repeats))
     return 0
 
 

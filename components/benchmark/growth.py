@@ -14,8 +14,10 @@ from typing import Any
 
 from components.benchmark.cases import CASES, replicas_of, scene_of
 from components.benchmark.measure import engine_run, peak_mb, pin
+from dsa_des.interruption import plain_ending
 from dsa_des.recording import MemorySink
 from dsa_des.scene import Scene
+from dsa_des.terminal import say, say_json
 
 #: What grows, its values, and the overrides of the scene that a value stands for.
 AXES: dict[str, tuple[float, ...]] = {
@@ -34,18 +36,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--point", nargs=2, metavar=("AXIS", "VALUE"), help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.point:
-        print(json.dumps(point(options.point[0], float(options.point[1]), options.folder)))
+        say_json(point(options.point[0], float(options.point[1]), options.folder))
         return 0
     options.folder.mkdir(parents=True, exist_ok=True)
     rows = []
     for axis, values in AXES.items():
         for value in values:
-            command = [sys.executable, "-m", "components.benchmark.growth", str(options.folder)]
+            command = [
+                sys.executable,
+                "-P",
+                "-m",
+                "components.benchmark.growth",
+                str(options.folder),
+            ]
             command += ["--point", axis, str(value)]
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             rows.append(json.loads(done.stdout))
-            print(f"{axis} {value:g}: {rows[-1]['ns_per_target_scan']:.0f} ns, "
-                  f"{rows[-1]['peak_memory_mb']:.0f} MB")  # fmt: skip
+            say(f"{axis} {value:g}: {rows[-1]['ns_per_target_scan']:.0f} ns, "
+                f"{rows[-1]['peak_memory_mb']:.0f} MB")  # fmt: skip
     draw(rows, options.folder / "performance_growth.png")
     return 0
 
@@ -119,4 +127,5 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

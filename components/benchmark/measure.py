@@ -5,7 +5,6 @@ anew for every scene, so that peak memory is that scene's own and nothing is war
 """
 
 import argparse
-import json
 import os
 import resource
 import sys
@@ -22,6 +21,7 @@ from dsa_des.lockstep import LockStep
 from dsa_des.recording import MemorySink, Recorder, Sink
 from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
+from dsa_des.terminal import say_json
 
 # The yardstick samples this many replicas of many.
 _SAMPLED_REPLICAS = 5
@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     (case,) = chosen([options.scene])
     scene = scene_of(case, quick=options.quick)
     scenes = replicas_of(scene, _replicas(case, options.quick)) if case.replicas else []
-    print(json.dumps(measured(case, scene, scenes, options.repeats)))
+    say_json(measured(case, scene, scenes, options.repeats))
     return 0
 
 

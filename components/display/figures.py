@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dsa_des.drawing import DPI, drawing
+from dsa_des.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
     from dsa_des.simulation import Simulation
@@ -68,9 +68,4 @@ def mark_of(style: tuple[str, str, float]) -> dict[str, Any]:
     }
 
 
-def plain(label: str) -> str:
-    """Return a label that Matplotlib shows: it leaves those that begin with ``_`` out."""
-    return f" {label}" if label.startswith("_") else label
-
-
-__all__ = ["DPI", "STYLES", "draw", "drawing", "mark_of", "plain", "style_of"]
+__all__ = ["DPI", "STYLES", "draw", "drawing", "figure_text", "mark_of", "style_of"]

@@ -1,6 +1,7 @@
 """The flights of a run on a map: east and north of where the ownship starts."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 30_000
 """Points of all tracks together."""
+MOST_TRACKS = 1000
+"""Of more targets than this, those that come nearest are drawn."""
 
 
 @dataclass
@@ -53,13 +56,22 @@ class Flights:
     duration_s : float
     closest_s : dict
         Target → time of closest approach, which becomes a point of its track.
+    nearest_m : dict, optional
+        Target → range at closest approach. Of very many targets only the nearest have tracks.
     """
 
     def __init__(
-        self, source: TrafficSource, duration_s: float, closest_s: dict[str, float]
+        self,
+        source: TrafficSource,
+        duration_s: float,
+        closest_s: dict[str, float],
+        nearest_m: dict[str, float] | None = None,
     ) -> None:
         self._source = source
-        self._targets = {target.name: target for target in source.targets}
+        chosen = _nearest(source.targets, nearest_m or {})
+        self._targets = {target.name: target for target in chosen}
+        #: How many targets there are, with a track or without.
+        self.all_targets = len(source.targets)
         self._closest_s = closest_s
         self.duration_s = duration_s
         count = int(np.clip(MOST_POINTS // (len(self._targets) + 1), 60, 600))
@@ -74,7 +86,7 @@ class Flights:
         self.start_yaw_rad = float(own.yaw_rad[start])
         east, north = self._map(own)
         self.own = Track("ownship", times, east, north, np.zeros(len(times)))
-        self.targets = [self._track(target, count) for target in source.targets]
+        self.targets = [self._track(target, count) for target in chosen]
 
     @property
     def origin(self) -> tuple[float, float, float]:
@@ -84,14 +96,16 @@ class Flights:
     @classmethod
     def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
         """Return the flights of a run, or None if it has no `TrafficSource`."""
-        closest_s = {
-            name: entry["closest_approach"]["time_s"]
+        met = {
+            name: entry["closest_approach"]
             for name, entry in summary.get("targets", {}).items()
             if entry.get("closest_approach")
         }
+        closest_s = {name: approach["time_s"] for name, approach in met.items()}
+        nearest_m = {name: approach["range_m"] for name, approach in met.items()}
         for _, component in sorted(simulation.components.items()):
             if isinstance(component, TrafficSource):
-                return cls(component, float(simulation.duration_s), closest_s)
+                return cls(component, float(simulation.duration_s), closest_s, nearest_m)
         return None
 
     def at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -134,6 +148,14 @@ class Flights:
         )
         there = state.present
         return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)
+
+
+def _nearest(targets: Sequence[Any], nearest_m: dict[str, float]) -> list[Any]:
+    """Return the targets that get a track, in their order."""
+    if len(targets) <= MOST_TRACKS:
+        return list(targets)
+    range_m = np.array([nearest_m.get(target.name, math.inf) for target in targets])
+    return [targets[i] for i in np.sort(np.argsort(range_m, kind="stable")[:MOST_TRACKS]).tolist()]
 
 
 def _times(flight: Any, duration_s: float, count: int) -> FloatArray:

@@ -3,14 +3,17 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from dsa_des.types import AnyArray, FloatArray, IntArray
+from components.display.row_groups import each_row_group
+from components.display.thinned_stream import ThinnedStream
+from dsa_des.types import FloatArray, IntArray
 
-MOST_ROWS = 200_000
-"""More detections than this are thinned, sensor by sensor, when they are read."""
+MOST_ROWS = 400_000
+"""More detections than this are thinned when they are read, those of long series first."""
+
+_DETECTION_COLUMNS = ("block", "target", "time_s", "true_range_m")
 
 
 @dataclass
@@ -38,74 +41,48 @@ class Detected:
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
         """Read the table ``detections`` of a run folder, if there is one."""
-        parts: dict[str, list[Any]] = {name: [] for name in sensors}
+        rows = ThinnedStream(MOST_ROWS, 2)
         known: dict[str, int] = {}
-        columns = ("block", "target", "time_s", "true_range_m")
-        for rows, most in _row_groups(folder / "detections.parquet", columns):
-            code, names = rows["target"]
+        series: dict[tuple[str, int], int] = {}
+        for group in each_row_group(folder / "detections.parquet", _DETECTION_COLUMNS):
+            code, names = group["target"]
             # Codes of a row group speak of that row group's names only.
             lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
-            for name, index in _by_name(rows["block"]):
-                index = index[code[index] >= 0]  # a false alarm has no place to be marked at
-                index = index[:: max(1, len(index) // most)]
-                part = (rows["time_s"][index], rows["true_range_m"][index], lookup[code[index]])
-                parts.setdefault(name, []).append(part)
-        joined = {name: [_join(part, i) for i in (0, 1, 2)] for name, part in parts.items()}
+            index = np.flatnonzero(code >= 0)  # a false alarm has no place to be marked at
+            block, blocks = group["block"]
+            pair, which = np.unique(block[index] * len(lookup) + code[index], return_inverse=True)
+            ids = [
+                series.setdefault((blocks[a], int(lookup[b])), len(series))
+                for a, b in zip(*(part.tolist() for part in divmod(pair, len(lookup))), strict=True)
+            ]
+            number = np.array(ids, dtype=np.int64)[which]
+            rows.add(number, group["time_s"][index], group["true_range_m"][index])
+        return cls._of_series(sensors, list(series), list(known), rows)
+
+    @classmethod
+    def _of_series(
+        cls,
+        sensors: Sequence[str],
+        series: list[tuple[str, int]],
+        names: list[str],
+        rows: ThinnedStream,
+    ) -> "Detected":
+        number, (time_s, range_m) = rows.rows()
+        everyone = sorted({*sensors, *(name for name, _ in series)})
+        sensor = np.array([everyone.index(name) for name, _ in series], dtype=np.int64)[number]
+        target = np.array([target for _, target in series], dtype=np.int64)[number]
+        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(everyone)}
         return cls(
-            sorted(parts),
-            {name: values[0] for name, values in joined.items()},
-            {name: values[1] for name, values in joined.items()},
-            {name: values[2].astype(np.int64) for name, values in joined.items()},
-            list(known),
+            everyone,
+            {name: time_s[index] for name, index in chosen.items()},
+            {name: range_m[index] for name, index in chosen.items()},
+            {name: target[index] for name, index in chosen.items()},
+            names,
         )
-
-
-def read_scans(folder: Path) -> dict[str, tuple[FloatArray, AnyArray]]:
-    """Return for each sensor the times of its scans and the number of detections in each."""
-    parts: dict[str, list[Any]] = {}
-    for rows, _ in _row_groups(folder / "scans.parquet", ("block", "time_s", "detected")):
-        for name, index in _by_name(rows["block"]):
-            parts.setdefault(name, []).append((rows["time_s"][index], rows["detected"][index]))
-    return {name: (_join(part, 0), _join(part, 1)) for name, part in sorted(parts.items())}
 
 
 def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, list[str]]]:
     """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
-    for rows, _ in _row_groups(folder / "fused.parquet", ("time_s", "sensors")):
+    for rows in each_row_group(folder / "fused.parquet", ("time_s", "sensors")):
         code, names = rows["sensors"]
         yield rows["time_s"], code, names
-
-
-def _row_groups(path: Path, columns: Sequence[str]) -> Iterator[tuple[dict[str, Any], int]]:
-    """Give each row group as arrays, with the number of rows per sensor to keep of it."""
-    if not path.is_file():
-        return
-    import pyarrow.parquet as pq
-
-    text = [name for name in columns if name in ("block", "target", "sensors")]
-    file = pq.ParquetFile(path, read_dictionary=text)
-    groups = file.num_row_groups
-    for number in range(groups):
-        table = file.read_row_group(number, columns=list(columns))
-        if table.num_rows:
-            rows = {name: _array(table[name], name in text) for name in columns}
-            yield rows, max(500, MOST_ROWS // groups)
-
-
-def _array(column: Any, text: bool) -> Any:
-    if not text:
-        return column.combine_chunks().to_numpy(zero_copy_only=False)
-    if column.num_chunks > 1:
-        column = column.unify_dictionaries()
-    chunks = column.chunks
-    codes = [chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False) for chunk in chunks]
-    return np.concatenate(codes).astype(np.int64), chunks[0].dictionary.to_pylist()
-
-
-def _by_name(column: tuple[IntArray, list[str]]) -> list[tuple[str, IntArray]]:
-    code, names = column
-    return [(name, np.flatnonzero(code == i)) for i, name in enumerate(names)]
-
-
-def _join(parts: list[Any], item: int) -> Any:
-    return np.concatenate([part[item] for part in parts]) if parts else np.empty(0)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.display.fields_of_view import draw_outline, outline_of, reach_text
-from components.display.figures import drawing, mark_of, plain, style_of
+from components.display.figures import drawing, figure_text, mark_of, style_of
 from components.display.flights import Flights, Track
 from components.display.labels import Labels
 from components.display.map_view import MAP_WIDTH_IN, MapView
@@ -83,12 +83,14 @@ def draw_plan(
             for name in detected.sensors
         }
         named = _draw_closest(axes, view, flights)
-        title = f"{simulation.scene.title}: plan view"
-        if named < len(flights.targets):
-            title += f" ({named} nearest of {len(flights.targets):,} targets named)"
+        title = f"{figure_text(simulation.scene.title, 60)}: plan view"
+        if named < flights.all_targets:
+            title += f" ({named} nearest of {flights.all_targets:,} targets named"
+            drawn_tracks = len(flights.targets)
+            title += f", {drawn_tracks:,} drawn)" if drawn_tracks < flights.all_targets else ")"
         if view.cropped:
             title += "; flights go on outside"
-        axes.set_title(plain(title), loc="left")
+        axes.set_title(title, loc="left")
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         handles = _legend(texts, detected, drawn, summary)
         figure.legend(
@@ -193,7 +195,11 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
     for track in flights.targets:
         seen = np.flatnonzero(np.isfinite(track.east_km))
         if track.name in named and len(seen):
-            labels.add(track.name, float(track.east_km[seen[0]]), float(track.north_km[seen[0]]))
+            labels.add(
+                figure_text(track.name, 24),
+                float(track.east_km[seen[0]]),
+                float(track.north_km[seen[0]]),
+            )
     if len(flights.targets) <= MOST_NAMED:
         for range_m, _, time_s, east, north in met:
             text = f"{distance_text(range_m)} at {time_s:.6g} s"
@@ -228,12 +234,11 @@ def _legend(
     for name in detected.sensors:
         count = summary.get("sensors", {}).get(name, {}).get("detections")
         count = len(detected.time_s[name]) if count is None else count
-        text = f"{name}: {count:,} detections" if count else f"{name}: no detections"
+        who = figure_text(name, 24)
+        text = f"{who}: {count:,} detections" if count else f"{who}: no detections"
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
             text += f"\n{reaches[name]}"
-        handles.append(
-            Line2D([], [], **mark_of(style_of(detected.sensors, name)), label=plain(text))
-        )
+        handles.append(Line2D([], [], **mark_of(style_of(detected.sensors, name)), label=text))
     return handles

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from typing import Any
 
+from dsa_des.safe_text import printable, shortened
+
 MOST_TARGETS = 10
 
 
@@ -124,7 +126,7 @@ def _print_table(
             overflow="fold",
         )
     for row in rows:
-        table.add_row(*(Text(text) for text in row))
+        table.add_row(*(Text(shortened(text)) for text in row))
     console.print(Text(title, style="bold"))
     console.print(table)
     console.print()
@@ -132,4 +134,4 @@ def _print_table(
 
 def _print_line(console: Any, text: str) -> None:
     # Never wrapped: a path is there to be copied.
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    console.print(printable(text), markup=False, highlight=False, soft_wrap=True)

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.figures import DPI, drawing, mark_of, plain, style_of
+from components.display.figures import DPI, drawing, figure_text, mark_of, style_of
 from components.display.flights import Flights
-from components.display.marks import Detected, read_fused, read_scans
+from components.display.marks import Detected, read_fused
+from components.display.scan_times import ScansShown, SensorScans, read_scans, scans_between
 from components.display.thinning import by_target, evenly, staggered
-from dsa_des.types import AnyArray, FloatArray
 
 if TYPE_CHECKING:
     from dsa_des.simulation import Simulation
 
-Scans = dict[str, tuple[FloatArray, AnyArray]]
+Scans = dict[str, SensorScans]
 
 MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
@@ -68,12 +68,14 @@ def draw_timeline(
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
     close_up = find_close_up(scans, folder, duration_s)
+    shown = scans_between(folder, close_up.start_s, close_up.end_s, scans)
     rows = max(1, len(detected.sensors))
     share = min(0.42, 0.14 + 0.07 * rows)
     with drawing(*_SIZE_IN, path) as figure:
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
-        _draw_scans(above, scans, detected.sensors, close_up)
-        above.set_title(plain(f"{simulation.scene.title}: {close_up.what}"), loc="left")
+        _draw_scans(above, scans, shown, detected.sensors, close_up)
+        title = figure_text(simulation.scene.title, 60)
+        above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
@@ -90,16 +92,12 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     detection, else at the start. It is four periods of the slowest sensor long, but has at most
     `MOST_SCANS_SHOWN` scans of the fastest.
     """
-    periods = [
-        (float(time_s[-1]) - float(time_s[0])) / (len(time_s) - 1)
-        for time_s, _ in scans.values()
-        if len(time_s) > 1
-    ]
+    periods = [one.period_s for one in scans.values() if one.period_s is not None]
     length_s = duration_s
     if periods:
         length_s = min(4.2 * max(periods), MOST_SCANS_SHOWN * min(periods), duration_s)
     anchor_s, what = 0.0, "scans at the start"
-    first = [float(time_s[np.argmax(n > 0)]) for time_s, n in scans.values() if (n > 0).any()]
+    first = [one.first_hit_s for one in scans.values() if one.first_hit_s is not None]
     if first:
         anchor_s, what = min(first), "scans around the first detection"
     together = _first_joined(folder, len(scans))
@@ -137,38 +135,43 @@ def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, lis
     return [(time_s, name.split("+")) for time_s, name in sorted(found)]
 
 
-def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) -> None:
+def _draw_scans(
+    axes: Any,
+    scans: Scans,
+    shown: dict[str, ScansShown],
+    sensors: list[str],
+    close_up: CloseUp,
+) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
     # The first sensor on top, as in the legend of the plan.
     height = {name: len(sensors) - 1 - i for i, name in enumerate(sensors)}
     names = []
-    hits: dict[str, FloatArray] = {}
+    nothing = ScansShown(np.empty(0), np.empty(0))
     for name in sensors:
-        time_s, count = scans.get(name, (np.empty(0), np.empty(0)))
+        here = shown.get(name, nothing)
         style = style_of(sensors, name)
-        hits[name] = time_s[count > 0]
-        rate = (len(time_s) - 1) / (time_s[-1] - time_s[0]) if len(time_s) > 1 else 0.0
-        names.append(f"{name}\n{rate:.4g} Hz" if rate else name)
-        seen = (time_s >= close_up.start_s) & (time_s <= close_up.end_s)
-        size = min(7.0, _mark_size(int(np.count_nonzero(seen))))
-        shown = time_s[seen]
+        rate_hz = scans[name].rate_hz if name in scans else None
+        who = figure_text(name, 16)
+        names.append(f"{who}\n{rate_hz:.4g} Hz" if rate_hz else who)
+        size = min(7.0, _mark_size(len(here.time_s)))
         axes.plot(
-            shown, np.full(len(shown), height[name]), linestyle="none", marker="|", markersize=20,
-            markeredgewidth=1.0, color=style[0], clip_on=False,
+            here.time_s, np.full(len(here.time_s), height[name]), linestyle="none", marker="|",
+            markersize=20, markeredgewidth=1.0, color=style[0], clip_on=False,
         )  # fmt: skip
-        shown = time_s[seen & (count > 0)]
+        hit_s = here.hit_s[here.hit_s >= close_up.start_s]
         mark = mark_of(style) | {"markersize": size, "markerfacecolor": style[0]}
-        axes.plot(shown, np.full(len(shown), height[name]), **mark, zorder=3.0, clip_on=False)
+        axes.plot(hit_s, np.full(len(hit_s), height[name]), **mark, zorder=3.0, clip_on=False)
     segments: list[Any] = []
     dots: list[tuple[float, float]] = []
     for fused_s, together in close_up.joined:
         points = []
         for name in sorted((n for n in together if n in height), key=lambda n: height[n]):
             # Fused within a gate: the scan meant is the latest one with a detection.
-            at = int(np.searchsorted(hits[name], fused_s, side="right")) - 1
-            points.append((float(hits[name][at]) if at >= 0 else fused_s, float(height[name])))
+            hit_s = shown.get(name, nothing).hit_s
+            at = int(np.searchsorted(hit_s, fused_s, side="right")) - 1
+            points.append((float(hit_s[at]) if at >= 0 else fused_s, float(height[name])))
         segments += pairwise(points)
         dots += points
     if segments:
@@ -180,7 +183,7 @@ def _draw_scans(axes: Any, scans: Scans, sensors: list[str], close_up: CloseUp) 
             markeredgecolor="#000000", markerfacecolor="none", markeredgewidth=1.4, zorder=4.0,
             clip_on=False,
         )  # fmt: skip
-    axes.set_yticks([height[name] for name in sensors], [plain(name) for name in names])
+    axes.set_yticks([height[name] for name in sensors], names)
     axes.tick_params(axis="y", length=0, pad=9)
     axes.spines["left"].set_visible(False)
     axes.set_ylim(-0.6, max(1, len(sensors)) - 0.4)
@@ -228,7 +231,7 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     for name in detected.sensors:
         style = style_of(detected.sensors, name)
         _draw_detections(axes, style, detected, name, width_px / duration_s)
-        handles.append(Line2D([], [], **mark_of(style), label=plain(name)))
+        handles.append(Line2D([], [], **mark_of(style), label=figure_text(name, 16)))
     axes.set_ylim(0.0, top_km)
     axes.set_ylabel("true slant range [km]")
     axes.grid(color="#DDDDDD", linewidth=0.5)

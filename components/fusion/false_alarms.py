@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.false_detections import FALSE_TARGET
-from components.messages import FusedDetections
+from components.messages import FusedDetections, mask_type
 from dsa_des.types import IntArray
 from dsa_des.wake import Arrivals
 
@@ -61,7 +61,8 @@ def pass_false_alarms(
             ("angle_source", index),
             ("range_source", index if name in ranging else -1),
         ):
-            columns[column].append(np.full(len(false), value))
+            kind = mask_type(len(fused.sensors)) if column == "contributors" else np.int64
+            columns[column].append(np.full(len(false), value, dtype=kind))
     if len(rows) == 1:
         return fused
     joined = np.concatenate(rows)

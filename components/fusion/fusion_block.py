@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.messages import Detections, FusedDetections, SensorOffer
+from components.messages import Detections, FusedDetections, SensorOffer, mask_type
 from dsa_des.component import Component
 from dsa_des.message import offsets_of
 from dsa_des.ports import Input, Output
@@ -97,7 +97,7 @@ class Fusion(Component):
             By sensor: which of its detections belongs to each, -1 for none.
         """
         count = len(row)
-        contributors = np.zeros(count, dtype=np.int64)
+        contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
         values = dict(zip(_VALUES, np.full((len(_VALUES), count), np.nan), strict=True))

@@ -24,11 +24,11 @@ from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_of
 from components.geometry.true_reach import true_reach_m
 from components.navigation import NavigationErrors
 from components.reach import FarthestLook, farthest_look
-from components.target_messages import Flights, RelativeTargets, Revisit, TrafficStates
+from components.target_messages import RelativeTargets, TrafficStates
 from dsa_des.component import Component, Parameters
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
-from dsa_des.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.types import AnyArray, BoolArray, FloatArray
 from dsa_des.wake import Wake
 
 LINES_OF_SIGHT: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
@@ -126,13 +126,14 @@ class Transform(Component):
             return None
         own = _beside_targets(states)
         return RelativeTargets(
-            tick=states.tick,
+            tick=wake.ticks,
+            state_tick=states.tick,
             own_alt_m=states.own_alt_m,
             roster=states.roster,
             columns=states.columns,
             culled=states.culled,
             believed=self._believed(states),
-            revisit=self._revisit(states.flights),
+            revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
         )
 
@@ -177,16 +178,9 @@ class Transform(Component):
             "present": present,
         }
 
-    def _revisit(self, flights: Flights | None) -> Revisit | None:
-        """Return what transforms the flights at other instants."""
-        if flights is None:
-            return None
-
-        def revisit(columns: IntArray, time_s: FloatArray) -> dict[str, AnyArray]:
-            own, other = flights(columns, time_s)
-            return self._as_seen(own, other, own.present & other.present)
-
-        return revisit
+    def _revisited(self, own: Any, other: Any) -> dict[str, AnyArray]:
+        """Return the fields of the rows at other instants."""
+        return self._as_seen(own, other, own.present & other.present)
 
     def _believed(self, states: TrafficStates) -> dict[str, FloatArray] | None:
         """Return what the ownship believes of itself, if that is not the truth."""

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from components.metrics.declaration import ANY, DeclarationParameters, declarations
 from components.metrics.rows import TargetMetric, sensors_of
-from components.separation import Separation, first_inside, separations, traffic_block
+from components.separation import Flight, closest, first_inside, separations, traffic_block
 from dsa_des.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 from dsa_des.types import FloatArray
@@ -41,7 +41,7 @@ class _Encounter(TargetMetric):
         self.sensors = sensors_of(scene, parameters.sensors)
 
     def of_flights(
-        self, group: Group, read: Callable[[list[Separation]], tuple[float, ...]], width: int
+        self, group: Group, read: Callable[[list[Flight]], tuple[float, ...]], width: int
     ) -> FloatArray:
         """Return what `read` makes of every replica's flights, shape (width, replicas).
 
@@ -124,20 +124,18 @@ class WellClear(_Encounter):
         return found
 
 
-def _closest(flights: list[Separation]) -> tuple[float, ...]:
+def _closest(flights: list[Flight]) -> tuple[float, ...]:
     """Return smallest range (m) and its time (s)."""
     best = (float("inf"), float("nan"))
     for flight in flights:
-        place = int(np.argmin(flight.range_m))
-        best = min(best, (float(flight.range_m[place]), float(flight.time_s[place])))
+        best = min(best, closest(flight))
     return best if np.isfinite(best[0]) else (float("nan"), float("nan"))
 
 
-def _losses(flights: list[Separation]) -> tuple[float, ...]:
+def _losses(flights: list[Flight]) -> tuple[float, ...]:
     """Return when well clear is first lost and when a collision first threatens, s."""
     if not flights:
         return float("nan"), float("nan")
-    return (
-        float(np.fmin.reduce([first_inside(flight, *WELL_CLEAR_M) for flight in flights])),
-        float(np.fmin.reduce([first_inside(flight, *NMAC_M) for flight in flights])),
-    )
+    first = np.array([first_inside(flight, WELL_CLEAR_M, NMAC_M) for flight in flights])
+    lost_s, collision_s = np.fmin.reduce(first).tolist()
+    return lost_s, collision_s

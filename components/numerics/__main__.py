@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 
 from components.numerics.document import PAGE, differences, markdown
+from dsa_des.interruption import plain_ending
+from dsa_des.terminal import say, say_lines
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -22,16 +24,17 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         if not options.check:
-            sys.stdout.write(markdown())
+            say_lines(markdown().removesuffix("\n"))
             return 0
         found = differences(options.page.read_text(encoding="utf-8"))
     except (ImportError, OSError) as error:
-        print(error, file=sys.stderr)
+        say(error, err=True)
         return 2
     for line in found:
-        print(line)
+        say(line)
     return 1 if found else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

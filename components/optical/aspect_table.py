@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from components.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
 from components.table_rows import row_values, table_rows
-from dsa_des.errors import shortened
 
 _SQUARE_FOOT_M2 = 0.3048**2
 
@@ -237,11 +236,12 @@ def _find_columns(
     for name in ("az_deg", "el_deg"):
         if name not in header:
             raise ValueError(
-                f"{path} has the columns {shortened(', '.join(header), 200)}: {name} is missing"
+                f"{path}: none of its {len(header)} columns is {name}; it must have az_deg, el_deg "
+                "and an area"
             )
     if area_name is None:
         raise ValueError(
-            f"{path} has the columns {shortened(', '.join(header), 200)}: an area is missing "
+            f"{path}: none of its {len(header)} columns is an area "
             f"(one of {', '.join(AREA_COLUMNS)})"
         )
     columns = (header.index("az_deg"), header.index("el_deg"), header.index(area_name))

@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from components.checks import FloatArray
+from dsa_des.drawing import drawing, figure_text
 
 # Called with relative heading, pitch, roll and elevation in radians (flat arrays), gives m²:
 # `visible_area` with its areas, table or mesh filled in.
@@ -208,24 +210,31 @@ def draw_comparison(
     comparisons : sequence of RotationComparison
         Of one aircraft.
     path : path
-        File to write; its ending says the format (png, svg, pdf).
+        PNG to write.
     title : str
         The aircraft's name, for example.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    with drawing(7.0, 9.0, Path(path), dpi=150) as figure:
+        figure.set_layout_engine("constrained")
+        panels = figure.subplots(3, 1, sharex=True, sharey=True)
+        _draw_panels(panels, comparisons)
+        if title:
+            figure.suptitle(figure_text(title, 80))
 
-    figure = Figure(figsize=(7.0, 9.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+
+def _draw_panels(panels: Any, comparisons: Sequence[RotationComparison]) -> None:
     for panel, axis in zip(panels, AXES, strict=True):
         shown = [one for one in comparisons if one.axis == axis]
         curves = {one.reference: (one.angle_deg, one.reference_share) for one in shown}
         for name, (angle_deg, share) in curves.items():
-            panel.plot(angle_deg, share, "o-", label=name, markersize=3.5, linewidth=1.2)
+            panel.plot(
+                angle_deg, share, "o-", label=figure_text(name), markersize=3.5, linewidth=1.2
+            )
         curves = {f"{one.model} model": (one.angle_deg, one.model_share) for one in shown}
         for (name, (angle_deg, share)), style in zip(curves.items(), cycle(_STYLES)):
-            panel.plot(angle_deg, share, label=name, fillstyle="none", linewidth=1.2, **style)
+            panel.plot(
+                angle_deg, share, label=figure_text(name), fillstyle="none", linewidth=1.2, **style
+            )
         panel.set_title(f"Rotation about {axis}: {_STARTS[axis]}", fontsize=9)
         panel.set_ylabel("Signature\n[share of maximum]")
         panel.grid(True, alpha=0.3)
@@ -233,6 +242,3 @@ def draw_comparison(
     panels[0].legend(fontsize=8)
     panels[-1].set_xlabel("Camera angle about the axis [deg]")
     panels[-1].set_xticks(np.arange(0.0, 181.0, 30.0))
-    if title:
-        figure.suptitle(title)
-    figure.savefig(path, dpi=150)

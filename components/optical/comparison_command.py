@@ -20,7 +20,13 @@ from components.optical.comparison import (
     draw_comparison,
 )
 from components.optical.silhouette import visible_area
-from dsa_des.input_files import LARGEST_TOML_BYTES, read_input_text
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.input_files import LARGEST_TOML_BYTES, InputFileError, read_input_text
+from dsa_des.interruption import plain_ending
+from dsa_des.output_folder import OutputFolder
+from dsa_des.output_names import named
+from dsa_des.run_folder import write_run_json
+from dsa_des.terminal import say, say_lines
 from dsa_des.toml_input import parse_toml
 
 _AREAS = ("front_m2", "side_m2", "horizontal_m2")
@@ -31,17 +37,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code: 0, or 2 when it cannot use what it was given."""
     options = _parser().parse_args(arguments)
     try:
-        comparisons = _compare(options)
-        print(comparison_table(comparisons))
-        out: Path = options.out
-        out.mkdir(parents=True, exist_ok=True)
-        _write_errors(comparisons, out / "errors.csv")
-        _write_curves(comparisons, out / "curves.csv")
-        draw_comparison(comparisons, out / "silhouettes.png", title=options.title or "")
-    except (ImportError, OSError, ValueError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        out = OutputFolder(named(options.out))
+        with out.writing() as folder:
+            try:
+                comparisons = _compare(options)
+            except OSError as error:  # of what is read, not of what is written
+                raise ValueError(str(error)) from error
+            say_lines(comparison_table(comparisons))
+            _write_errors(comparisons, folder / "errors.csv")
+            _write_curves(comparisons, folder / "curves.csv")
+            draw_comparison(comparisons, folder / "silhouettes.png", title=options.title or "")
+            write_run_json(folder, {"title": options.title or "", "models": options.models})
+    except (ImportError, UsageError, ValueError) as error:
+        say(f"error: {error}", err=True)
         return 2
-    print(f"\n{out}: errors.csv, curves.csv, silhouettes.png")
+    except OutputError as error:
+        say(f"error: {error}", err=True)
+        return 1
+    say()
+    say(f"{out.path}: errors.csv, curves.csv, silhouettes.png")
     return 0
 
 
@@ -80,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
         help="own_maximum compares shapes, as the thesis does; reference_maximum sizes as well",
     )
     parser.add_argument("--title", help="name of the aircraft, above the figure")
-    parser.add_argument("--out", type=Path, required=True, help="folder for tables and figure")
+    parser.add_argument("--out", required=True, help="folder for tables and figure")
     return parser
 
 
@@ -95,7 +109,10 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
     if options.reference is not None:
         from components.optical.aspect_table import read_aspect_table
 
-        table = read_aspect_table(options.reference)
+        try:
+            table = read_aspect_table(options.reference)
+        except InputFileError as error:
+            raise ValueError(f"--reference {options.reference}: {error}") from None
         references["table"] = _silhouette(model="aspect_table", table=table)
     if options.mesh is not None:
         from components.optical.mesh import load_mesh
@@ -126,10 +143,9 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
     table: dict[str, Any] = eo if isinstance(eo, dict) else {}
     for name in _AREAS:
         value = table.get(name)
-        if name not in table:
-            raise ValueError(f"{options.aircraft} has no eo.{name}: --aircraft needs it")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{options.aircraft}: eo.{name} is no number: --aircraft needs one")
+            raise ValueError(f"{options.aircraft} has no number eo.{name}: --aircraft needs it")
+    assert isinstance(table, dict)
     return {name: float(table[name]) for name in _AREAS}
 
 
@@ -165,4 +181,5 @@ def _write(rows: Sequence[Sequence[str]], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with plain_ending():
+        sys.exit(main())

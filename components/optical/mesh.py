@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from components.checks import FloatArray, finite
 from components.optical.aspect_table import AspectTable
-from dsa_des.errors import shortened
 from dsa_des.input_files import InputFileError, status_of
+from dsa_des.safe_text import shortened
 
 DEFAULT_ROWS = 1024
 

@@ -72,15 +72,18 @@ class Sweep:
         ValueError
             If the targets can be known only at the instants of the rows.
         """
-        revisit = targets.revisit
-        if revisit is None:
+        if targets.revisit is None:
             raise ValueError(
                 "beam_sweep needs to know the targets at instants of its own; the traffic, or a "
                 "block on the way, passes no flights on: set beam_sweep to false"
             )
         block, columns = self._block, targets.columns
         at_start = targets.take(rows)
-        start_s = (at_start.tick / self._ticks_per_s)[:, np.newaxis]
+        revisit = at_start.revisit
+        assert revisit is not None
+        # A picture that came late goes on from the instant it is of.
+        start = at_start.tick if at_start.state_tick is None else at_start.state_tick
+        start_s = (start / self._ticks_per_s)[:, np.newaxis]
         found: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:

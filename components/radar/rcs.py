@@ -20,7 +20,6 @@ from components.checks import (
 )
 from components.radar.inputs import checked_model
 from components.table_rows import row_values, table_rows
-from dsa_des.errors import shortened
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9
@@ -274,8 +273,8 @@ class AspectTable:
                 for name in wanted:
                     if name not in header:
                         raise ValueError(
-                            f"{path} has the columns {shortened(', '.join(header), 200)}: it must "
-                            f"have {name}"
+                            f"{path}: none of its {len(header)} columns is {name}; it must have "
+                            f"{', '.join(wanted)}"
                         )
                 continue
             columns = [header.index(name) for name in wanted]

@@ -93,7 +93,7 @@ def chosen(names: Iterable[str]) -> list[Item]:
             hint = did_you_mean(name.lower(), [item.name for item in ITEMS])
             problems.append(f"ITEM {name!r}: there is no such item{hint}")
     if problems:
-        raise UsageError("\n  ".join(problems))
+        raise UsageError(problems[0], *(f"  {problem}" for problem in problems[1:]))
     return [item for item in ITEMS if not wanted or item.name in wanted]
 
 

@@ -1,21 +1,21 @@
 """``dsa-des reproduce``: make items, write figures and data, compare with the thesis."""
 
-import json
-import os
-import shutil
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
-import click
-
 from components.thesis.document import markdown, short
 from components.thesis.files import write_csv, write_rows
 from components.thesis.made import Made
 from components.thesis.registry import ITEMS, Item, chosen
-from dsa_des.errors import BlockFailure, SceneError, UsageError
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des import terminal
+from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
+from dsa_des.output_file import check_file, write_file
+from dsa_des.output_folder import OutputFolder
+from dsa_des.output_names import named
+from dsa_des.run_folder import write_run_json
+from dsa_des.terminal import say, say_json
 
 Results = list[tuple[Item, Made]]
 
@@ -29,23 +29,26 @@ def reproduce_items(
     wanted = chosen(items)
     if page is not None and len(wanted) < len(ITEMS):
         raise UsageError("--page shows all items: leave the ITEMs out")
-    if page is not None and not Path(page).parent.is_dir():
-        raise UsageError(f"--page {page}: there is no folder {Path(page).parent}")
-    target = Path(out) if out else new_folder_name(Path("runs"), "thesis")
-    check_target(target)
+    shown_on = None if page is None else named(page, "--page")
+    if shown_on is not None:
+        check_file(shown_on, "--page")
+    target = OutputFolder.chosen(out, Path("runs"), "thesis")
     started = time.perf_counter()
-    results, failures = make(wanted)
-    with writing(target) as folder:
+    with target.writing() as folder:
+        results, failures = make(wanted)
         write(folder, results, failures, time.perf_counter() - started)
-    if page is not None and not failures:
-        _write_page(Path(page), results, target)
+    if shown_on is not None and not failures:
+        try:
+            _write_page(shown_on, results, target.path)
+        except OSError as error:
+            raise OutputError(f"--page {page}: cannot be written: {error.strerror}") from error
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
     if as_json:
-        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        say_json(rows)
     else:
-        _show(results, target)
+        _show(results, target.path)
     for failure in failures:
-        click.echo(f"error: {failure}", err=True)
+        say(f"error: {failure}", err=True)
     if failures:
         sys.exit(1)
 
@@ -87,7 +90,7 @@ def write(folder: Path, results: Results, failures: list[str], wall_s: float) ->
         "failures": failures,
         "timings": {"wall_s": wall_s},
     }
-    write_json(folder / RUN_JSON, content)
+    write_run_json(folder, content)
 
 
 def _write_page(page: Path, results: Results, source: Path) -> None:
@@ -96,23 +99,15 @@ def _write_page(page: Path, results: Results, source: Path) -> None:
     images.mkdir(parents=True, exist_ok=True)
     for _, made in results:
         for picture in made.pictures:
-            _replace(source / "figures" / f"{picture.name}.png", images)
-    temporary = page.with_name(f".{page.name}.new")
-    temporary.write_text(markdown(results, f"images/{page.stem}"), encoding="utf-8")
-    os.replace(temporary, page)
-
-
-def _replace(file: Path, folder: Path) -> None:
-    temporary = folder / f".{file.name}.new"
-    shutil.copyfile(file, temporary)
-    os.replace(temporary, folder / file.name)
+            figure = source / "figures" / f"{picture.name}.png"
+            write_file(images / figure.name, figure.read_bytes())
+    write_file(page, markdown(results, f"images/{page.stem}").encode())
 
 
 def _show(results: Results, target: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if Console().is_terminal else 160)
+    console = terminal.console(160)
     shown = Table("item", "quantity", box=None, pad_edge=False)
     for name in ("printed", "ours", "difference"):
         shown.add_column(name, justify="right", no_wrap=True)
@@ -132,5 +127,6 @@ def _show(results: Results, target: Path) -> None:
     console.print(shown)
     statuses = [row.status.partition(",")[0] for _, made in results for row in made.rows]
     counts = ", ".join(f"{statuses.count(name)} {name}" for name in dict.fromkeys(statuses))
-    console.print(f"\n{len(statuses)} rows: {counts}", highlight=False)
+    console.print()
+    console.print(f"{len(statuses)} rows: {counts}", highlight=False)
     console.print(f"{target}: figures, data, rows.csv, thesis.md", highlight=False, soft_wrap=True)

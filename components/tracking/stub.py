@@ -27,8 +27,9 @@ class StubParameters(Parameters):
 class TrackerStub(Component):
     """Holds the last fused measurement of each target, its age, and which sensors gave it.
 
-    Tracks are sent at every instant at which at least one target was updated. A false alarm belongs
-    to no target and is left out: a stub does not start tracks.
+    Tracks are sent at every instant at which at least one target was updated: that is when the
+    measurement has come, whenever the fusion sent it, and ages count from then on. A false alarm
+    belongs to no target and is left out: a stub does not start tracks.
     """
 
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
@@ -59,7 +60,7 @@ class TrackerStub(Component):
             self._targets = self._targets[:0]
         self._replica = int(replica[-1])
         targets = _present(self._targets, fused.target, len(fused.roster))
-        pool, start = self._pool(fused, counts)
+        pool, start = self._pool(fused, wake.ticks, counts)
         last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
         last[0, targets.searchsorted(self._targets)] = np.arange(start)
         rows: Any = 1
@@ -73,13 +74,15 @@ class TrackerStub(Component):
         self._targets = targets[at_end]
         held_at_end = last[-1][at_end]
         self._held = {name: values[held_at_end] for name, values in pool.items()}
-        return self._tracks(fused, fused.tick[updated], targets, last[1:], pool)
+        return self._tracks(fused, wake.ticks[updated], targets, last[1:], pool)
 
-    def _pool(self, fused: FusedDetections, counts: IntArray) -> tuple[dict[str, Any], int]:
+    def _pool(
+        self, fused: FusedDetections, ticks: IntArray, counts: IntArray
+    ) -> tuple[dict[str, Any], int]:
         """Return everything that may be held: what was, then the new entries."""
         start = len(self._targets)
         new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD if name != "tick"}
-        new["tick"] = np.repeat(fused.tick, counts)
+        new["tick"] = np.repeat(ticks, counts)
         if start == 0:
             return new, 0
         return {name: np.concatenate([self._held[name], new[name]]) for name in _HELD}, start

@@ -12,7 +12,13 @@ from pathlib import Path
 from components.traffic.normals import FloatArray
 from components.traffic.sample_table import UNITS, Column, SampleTable, enu_velocity, unit_factor
 from components.traffic.text_rows import read_lines
-from components.traffic.traffic_file import Problems, TrafficFile, TrafficFileError, did_you_mean
+from components.traffic.traffic_file import (
+    Problems,
+    TrafficFile,
+    TrafficFileError,
+    did_you_mean,
+    shown_columns,
+)
 from components.traffic.units import ALL_TOKENS, clean_token
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
@@ -126,14 +132,16 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
     parsed = [_name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
     found: dict[str, Column] = {}
+    ours = {alias for aliases in _HEADERS.values() for alias in aliases}
+    shown = shown_columns(headers, not ours.isdisjoint(names))
     for quantity, aliases in _HEADERS.items():
         index = next((names.index(alias) for alias in aliases if alias in names), None)
         if index is None:
             if quantity in _REQUIRED:
                 hint = did_you_mean(quantity, names).replace("did you mean", "is it")
                 problems.add(
-                    f"there is no column {quantity!r} among {', '.join(headers)}{hint}; accepted "
-                    f"names are {', '.join(aliases)}",
+                    f"there is no column {quantity!r} among {shown}{hint}; accepted names are "
+                    f" {', '.join(aliases)}",
                     line=line,
                 )
             continue

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
 from components.traffic.near_intervals import NearIntervals, near_intervals
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
@@ -39,13 +40,12 @@ class Culling:
     ) -> None:
         self._fleet, self.lasts_s = fleet, lasts_s
         self.reach_m = reach_m
-        there = np.array([target.interval_present() for target in targets]).reshape(-1, 2)
+        there = intervals_present_s(targets)
         first, last = own.interval_present()
-        speeds = np.array([target.max_speed_mps for target in targets])
         self.intervals: NearIntervals = near_intervals(
             own.at,
             fleet.each,
-            closing_speed_mps=speeds + own.max_speed_mps,
+            closing_speed_mps=max_speeds_mps(targets) + own.max_speed_mps,
             present_s=(np.maximum(there[:, 0], first), np.minimum(there[:, 1], last)),
             reach_m=reach_m,
             end_s=end_s + lasts_s,

@@ -17,7 +17,13 @@ from components.traffic.sample_table import (
     unit_factor,
 )
 from components.traffic.text_rows import cell_count, cells, read_lines, tokens
-from components.traffic.traffic_file import Problems, TrafficFile, TrafficFileError, did_you_mean
+from components.traffic.traffic_file import (
+    Problems,
+    TrafficFile,
+    TrafficFileError,
+    did_you_mean,
+    shown_columns,
+)
 from components.traffic.units import ALL_TOKENS, clean_token
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa"]
@@ -147,7 +153,9 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
         if quantity not in places:
             hint = did_you_mean(quantity, unused).replace("did you mean", "is it")
             problems.add(
-                f"there is no column {quantity!r} among {', '.join(headers)}{hint}", line=line
+                f"there is no column {quantity!r} among {shown_columns(headers, bool(places))}"
+                f"{hint}",
+                line=line,
             )
     problems.raise_if_any()
     for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):

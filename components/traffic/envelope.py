@@ -16,6 +16,7 @@ from components.geometry.ellipsoid import (
     line_of_sight,
 )
 from components.reach import REACH_MARGIN
+from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.trajectory import SampledTrajectory
 
@@ -74,7 +75,7 @@ def traffic_envelope(
     times = (np.arange(intervals) + 0.5) * (2.0 * half_s)
     own_state, states = own.at(times), fleet.at(times)
     own_moves = _moves_m(own.max_speed_mps, half_s)
-    moves = np.array([_moves_m(target.max_speed_mps, half_s) for target in targets])
+    moves = _moves_m(max_speeds_mps(targets), half_s)
     _, elevation, range_m = line_of_sight(
         own_state.lat_deg[:, np.newaxis],
         own_state.lon_deg[:, np.newaxis],
@@ -127,5 +128,5 @@ def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
     return 0.5 * math.pi, math.pi
 
 
-def _moves_m(speed_mps: float, half_s: float) -> float:
+def _moves_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M

@@ -12,6 +12,7 @@ from components.aircraft import Aircraft
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
+from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
 from components.traffic.traffic_file import TrafficFile
 from dsa_des.component import ScenePath
@@ -85,6 +86,13 @@ class RecordedTraffic(TrafficSource):
         own: FloatArray = self.content.ownship.sample_times_s
         other: FloatArray = target.sample_times_s  # type: ignore[attr-defined]
         return np.union1d(own, other)
+
+    def sample_times(self) -> list[SampleTimes]:
+        """Return the sample times of the ownship, and those of each target."""
+        if not self.targets:
+            return [SharedTimes(self.content.ownship.sample_times_s)]
+        each = OwnTimes([target.sample_times_s for target in self.content.intruders])
+        return [SharedTimes(self.content.ownship.sample_times_s), each]
 
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and what the file's own clock said at time 0."""

@@ -14,6 +14,7 @@ from components.traffic.leg_table import LegTable
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
 from components.traffic.piece_search import PieceSearch
+from components.traffic.straight_flights import StraightFlights
 from components.traffic.trajectory import (
     CELLS_AT_ONCE,
     SampledTrajectory,
@@ -22,6 +23,7 @@ from components.traffic.trajectory import (
     locate,
 )
 
+BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 
 
@@ -38,19 +40,25 @@ class ScriptedFleet:
     """
 
     def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
-        self._everyone = list(trajectories)
+        straight = isinstance(trajectories, StraightFlights)
+        self._everyone = trajectories if straight else list(trajectories)
         self._columns = np.arange(len(self._everyone))
+        self._others = np.empty(0, dtype=np.int64)
+        self._legs: LegTable | None = None
+        self._place_in_legs = np.arange(len(self._everyone))
+        if isinstance(trajectories, StraightFlights):
+            self._groups = [_Group.of_straight(trajectories)] if len(trajectories) else []
+            self._legs = LegTable.of_straight(trajectories)
+            return
         kinds = [t.segments[0].kind if len(t.segments) == 1 else "" for t in self.trajectories]
         self._groups = [
-            _Group([i for i, k in enumerate(kinds) if k == kind], self.trajectories, formula)
+            _Group.of([i for i, k in enumerate(kinds) if k == kind], self.trajectories, formula)
             for kind, formula in (("geodesic", geodesic_state), ("hold", hold_state))
             if kind in kinds
         ]
         self._others = np.array(
             [i for i, k in enumerate(kinds) if k not in ("geodesic", "hold")], dtype=np.int64
         )
-        self._legs: LegTable | None = None
-        self._place_in_legs = np.arange(len(self.trajectories))
 
     @property
     def trajectories(self) -> list[ScriptedTrajectory]:
@@ -108,7 +116,7 @@ class ScriptedFleet:
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         if self._legs is None:
             self._legs = LegTable(self.trajectories)
-            self._place_in_legs = np.arange(len(self.trajectories))
+            self._place_in_legs = np.arange(len(self._columns))
         return _in_blocks(self._legs.state, self._place_in_legs[aircraft], time_s)
 
 
@@ -117,27 +125,65 @@ class _Group:
 
     def __init__(
         self,
+        members: IntArray,
+        everyone: bool,
+        formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]],
+        table: FloatArray,
+        times_s: tuple[FloatArray, FloatArray, FloatArray],
+        attitude: FloatArray,
+        yaw_is_fixed: BoolArray,
+    ) -> None:
+        self._formula = formula
+        self._members = members
+        self._columns: slice | IntArray = slice(None) if everyone else members
+        self._table = table[:, np.newaxis]
+        self._start, self._end, self._until = times_s
+        self._attitude, self._yaw_is_fixed = attitude, yaw_is_fixed
+
+    @classmethod
+    def of(
+        cls,
         members: list[int],
         trajectories: list[ScriptedTrajectory],
         formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]],
-    ) -> None:
+    ) -> _Group:
+        """Return the group of some of many flights."""
         chosen = [trajectories[i] for i in members]
-        self._formula = formula
-        self._members = np.array(members)
-        everyone = len(members) == len(trajectories)
-        self._columns: slice | IntArray = slice(None) if everyone else self._members
-        self._table = np.stack([t.segments[0].parameters for t in chosen], axis=-1)[:, np.newaxis]
-        self._start = np.array([t.start_time_s for t in chosen])
-        self._end = np.array([t.end_time_s for t in chosen])
-        self._until = np.array([t.evaluated_until_s for t in chosen])
         derived = [(np.nan, t.segments[0].pitch_rad, t.segments[0].roll_rad) for t in chosen]
-        self._attitude = np.array(
-            [
-                [d if f is None else f for f, d in zip(t.fixed_attitude_rad, angles, strict=True)]
-                for t, angles in zip(chosen, derived, strict=True)
-            ]
-        ).T
-        self._yaw_is_fixed = np.array([t.fixed_attitude_rad[0] is not None for t in chosen])
+        attitude = [
+            [d if f is None else f for f, d in zip(t.fixed_attitude_rad, angles, strict=True)]
+            for t, angles in zip(chosen, derived, strict=True)
+        ]
+        return cls(
+            np.array(members),
+            len(members) == len(trajectories),
+            formula,
+            np.stack([t.segments[0].parameters for t in chosen], axis=-1),
+            (
+                np.array([t.start_time_s for t in chosen]),
+                np.array([t.end_time_s for t in chosen]),
+                np.array([t.evaluated_until_s for t in chosen]),
+            ),
+            np.array(attitude).T,
+            np.array([t.fixed_attitude_rad[0] is not None for t in chosen]),
+        )
+
+    @classmethod
+    def of_straight(cls, flights: StraightFlights) -> _Group:
+        """Return the group of flights that are all straight."""
+        derived = np.stack(
+            (np.full(len(flights), np.nan), flights.pitch_rad, np.zeros(len(flights)))
+        )
+        fixed = flights.fixed_rad
+        return cls(
+            np.arange(len(flights)),
+            True,
+            geodesic_state,
+            flights.table,
+            (flights.start_s, flights.end_s, flights.until_s),
+            np.where(np.isnan(fixed), derived, fixed),
+            ~np.isnan(fixed[0]),
+        )
 
     def subset(self, columns: IntArray) -> _Group | None:
         """Return the group of those of its members that are among some aircraft."""

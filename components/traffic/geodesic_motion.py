@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
@@ -83,9 +86,9 @@ def geodesic_parameters(
     eps = k2 / (2.0 * (1.0 + math.sqrt(1.0 + k2)) + k2)
     a1, c1, c1_inverse = _distance_series(eps)
     a3, c3 = _longitude_series(eps, n)
-    tau1 = sigma1 + sum(c * math.sin(2 * (j + 1) * sigma1) for j, c in enumerate(c1))
+    tau1 = sigma1 + _sines_added(c1, sigma1)
     lon_slope = FLATTENING * sin_az0 * a3
-    i3 = sigma1 + sum(c * math.sin(2 * (j + 1) * sigma1) for j, c in enumerate(c3))
+    i3 = sigma1 + _sines_added(c3, sigma1)
     # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
     meridian, prime_vertical = (float(r) for r in radii_of_curvature(lat_deg))
     radius = 1.0 / (cos_az * cos_az / meridian + sin_az * sin_az / prime_vertical)
@@ -102,6 +105,95 @@ def geodesic_parameters(
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
     return table
+
+
+def geodesic_parameter_table(
+    lat_deg: npt.ArrayLike,
+    lon_deg: npt.ArrayLike,
+    alt_m: npt.ArrayLike,
+    azimuth_rad: npt.ArrayLike,
+    speed_mps: npt.ArrayLike,
+    climb_mps: npt.ArrayLike,
+) -> FloatArray:
+    """Prepare many straight legs, bit for bit as `geodesic_parameters` prepares each.
+
+    Sums and products are taken over arrays. Functions whose last bit may differ between libraries
+    are those of `math`, one value at a time.
+
+    Parameters
+    ----------
+    lat_deg, lon_deg, alt_m, azimuth_rad, speed_mps, climb_mps : (n,)
+        As for `geodesic_parameters`.
+
+    Returns
+    -------
+    ndarray, shape (20, n)
+    """
+    n = FLATTENING / (2.0 - FLATTENING)
+    semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
+    lat, alt = np.array(lat_deg, dtype=np.float64), np.array(alt_m, dtype=np.float64)
+    speed = np.array(speed_mps, dtype=np.float64)
+    sin_beta = (1.0 - FLATTENING) * _each(math.sin, _each(math.radians, lat))
+    cos_beta = _each(math.sin, _each(math.radians, 90.0 - np.abs(lat)))
+    length = _each(math.hypot, sin_beta, cos_beta)
+    sin_beta, cos_beta = sin_beta / length, np.maximum(cos_beta / length, 1e-100)
+    azimuth = np.array(azimuth_rad, dtype=np.float64)
+    sin_az, cos_az = _each(math.sin, azimuth), _each(math.cos, azimuth)
+    sin_az0 = sin_az * cos_beta
+    cos_az0 = _each(math.hypot, cos_az, sin_az * sin_beta)
+    somewhere = (sin_beta != 0.0) | (cos_az != 0.0)
+    along = cos_az * cos_beta
+    sigma1 = np.where(somewhere, _each(math.atan2, sin_beta, along), 0.0)
+    omega1 = np.where(somewhere, _each(math.atan2, sin_az0 * sin_beta, along), 0.0)
+    k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
+    eps = k2 / (2.0 * (1.0 + np.sqrt(1.0 + k2)) + k2)
+    a1, c1, c1_inverse = _distance_series(eps)
+    a3, c3 = _longitude_series(eps, n)
+    sines = [_each(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
+    lon_slope = FLATTENING * sin_az0 * a3
+    meridian, prime_vertical = radii_of_curvature(lat)
+    radius = 1.0 / (cos_az * cos_az / meridian + sin_az * sin_az / prime_vertical)
+    table = np.zeros((GEODESIC_ROWS, len(lat)))
+    table[_SPEED_RADIUS] = speed * radius
+    table[_CENTRE_DISTANCE] = radius + alt
+    table[_CLIMB], table[_ALT] = climb_mps, alt
+    table[_TAU], table[_PER_METRE] = sigma1 + _added(c1, sines), 1.0 / (semi_minor * a1)
+    table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
+    i3 = sigma1 + _added(c3, sines)
+    table[_LON_RAD] = (
+        _each(math.radians, np.array(lon_deg, dtype=np.float64)) - omega1 + lon_slope * i3
+    )
+    table[_LON_SLOPE] = lon_slope
+    table[_SIGMA] = sigma1
+    table[_RADIUS] = radius
+    table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
+    table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
+    return table
+
+
+def _each(function: Callable[..., float], *values: FloatArray) -> FloatArray:
+    columns = (value.tolist() for value in values)
+    return np.fromiter(map(function, *columns), dtype=np.float64, count=len(values[0]))
+
+
+def _power(base: Any, exponent: int) -> Any:
+    """Return a power as Python takes it, also of each value of an array: NumPy's differs."""
+    if isinstance(base, np.ndarray):
+        return _each(lambda value: value**exponent, base)
+    return base**exponent
+
+
+def _sines_added(factors: Sequence[float], angle: float) -> float:
+    """Return the sum of c_j sin(2 j x)."""
+    return _added(factors, [math.sin(2 * (j + 1) * angle) for j in range(len(factors))])
+
+
+def _added(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
+    """Return the sum of products, from the first to the last (`sum` rounds in ways of its own)."""
+    total = factors[0] * sines[0]
+    for factor, sine in zip(factors[1:], sines[1:], strict=False):
+        total = total + factor * sine
+    return total
 
 
 def flight_time_s(
@@ -236,7 +328,7 @@ def _sine_series(
     return later
 
 
-def _distance_series(eps: float) -> tuple[float, list[float], list[float]]:
+def _distance_series(eps: Any) -> tuple[Any, list[Any], list[Any]]:
     """A1, C1 and C1' of Karney (2013), eqs 17, 18 and 21."""
     e2 = eps * eps
     a1 = (1.0 + e2 * (1 / 4 + e2 * (1 / 64 + e2 / 256))) / (1.0 - eps)
@@ -257,7 +349,7 @@ def _distance_series(eps: float) -> tuple[float, list[float], list[float]]:
     return a1, c1, inverse
 
 
-def _longitude_series(eps: float, n: float) -> tuple[float, list[float]]:
+def _longitude_series(eps: Any, n: float) -> tuple[Any, list[Any]]:
     """A3 and C3 of Karney (2013), eqs 24 and 25."""
     a3 = 1.0 - eps * (
         1 / 2
@@ -281,13 +373,13 @@ def _longitude_series(eps: float, n: float) -> tuple[float, list[float]]:
                 + eps * (3 / 64 + n * (3 / 64 - n / 64) + eps * (5 / 128 + n / 64 + eps * 3 / 128))
             )
         ),
-        eps**2
+        _power(eps, 2)
         * (
             1 / 16
             - n * (3 / 32 - n / 32)
             + eps * (3 / 64 - n * (1 / 32 + n * 3 / 64) + eps * (3 / 128 + n / 128 + eps * 5 / 256))
         ),
-        eps**3
+        _power(eps, 3)
         * (5 / 192 - n * (3 / 64 - n * 5 / 192) + eps * (3 / 128 - n * 5 / 192 + eps * 7 / 512)),
     ]
     return a3, c3

@@ -11,6 +11,7 @@ from components.traffic.leg_builder import FORMULAS
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.normals import FloatArray
 from components.traffic.piece_search import PieceSearch
+from components.traffic.straight_flights import StraightFlights
 from components.traffic.trajectory import TrajectoryState
 
 IntArray = npt.NDArray[np.int64]
@@ -43,6 +44,21 @@ class LegTable:
             members = np.flatnonzero(self._kind == kind)
             self._slot[members] = np.arange(len(members))
             self._tables[kind] = np.stack([segments[i].parameters for i in members], axis=-1)
+
+    @classmethod
+    def of_straight(cls, flights: StraightFlights) -> LegTable:
+        """Return the table of flights that have one leg each, and straight ones."""
+        count = len(flights)
+        table = cls.__new__(cls)
+        table._find = PieceSearch.of_one_each(count)
+        table._start, table._end, table._until = flights.start_s, flights.end_s, flights.until_s
+        table._pitch, table._roll = flights.pitch_rad, np.zeros(count)
+        table._fixed = flights.fixed_rad
+        straight = list(FORMULAS).index("geodesic")
+        table._kind = np.full(count, straight, dtype=np.int64)
+        table._slot = np.arange(count)
+        table._tables = {straight: flights.table} if count else {}
+        return table
 
     def state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states of flights (n,), each at a time (n,) of its own, in s."""

@@ -38,6 +38,8 @@ __all__ = [
 
 LONGEST_FLIGHT_S = 1e12
 """Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
+MOST_ALT_M = 1e6
+"""No flight starts farther above or below the ellipsoid."""
 
 
 class ScriptedTrajectory:
@@ -111,7 +113,7 @@ class ScriptedTrajectory:
             if value is not None:
                 require(math.isfinite(value), f"{name}: {key}", value, "be finite")
         require(abs(lat_deg) <= 90.0, f"{name}: lat_deg", lat_deg, "lie in [-90, 90] degrees")
-        require(abs(alt_m) <= 1e6, f"{name}: alt_m", alt_m, "lie within ±1e6 metres")
+        require(abs(alt_m) <= MOST_ALT_M, f"{name}: alt_m", alt_m, "lie within ±1e6 metres")
         require(speed_mps >= 0.0, f"{name}: speed_mps", speed_mps, "be 0 or more")
         end = math.inf if end_time_s is None else float(end_time_s)
         require(end >= start_time_s, f"{name}: end_time_s", end, f"be {start_time_s} or more")
@@ -134,6 +136,37 @@ class ScriptedTrajectory:
             reference=start if reference is None else reference,
         ).build(legs)
         self._segment_starts_s = np.array([segment.start_s for segment in self.segments])
+
+    @classmethod
+    def of_segments(
+        cls,
+        name: str,
+        segments: list[Segment],
+        *,
+        fixed_attitude_rad: tuple[float | None, float | None, float | None],
+        start_time_s: float,
+        end_time_s: float,
+    ) -> ScriptedTrajectory:
+        """Return a flight whose segments are known already.
+
+        Parameters
+        ----------
+        name : str
+        segments : list of Segment
+            At least one.
+        fixed_attitude_rad : tuple of three float or None
+            Yaw in [0, 2 pi), pitch and roll; None follows the path.
+        start_time_s, end_time_s : float
+            The end may be infinite.
+        """
+        flight = cls.__new__(cls)
+        flight.name = name
+        flight.start_time_s, flight.end_time_s = start_time_s, end_time_s
+        flight.evaluated_until_s = min(end_time_s, start_time_s + LONGEST_FLIGHT_S)
+        flight.fixed_attitude_rad = fixed_attitude_rad
+        flight.segments = segments
+        flight._segment_starts_s = np.array([segment.start_s for segment in segments])
+        return flight
 
     @classmethod
     def from_offset(

@@ -23,6 +23,14 @@ class PieceSearch:
         self.first, self.last = ends - lengths, ends - 1
         self._steps = int(lengths.max(initial=1) - 1).bit_length()
 
+    @classmethod
+    def of_one_each(cls, aircraft: int) -> "PieceSearch":
+        """Return the search for paths of one piece, which starts at 0."""
+        search = cls([])
+        search.starts_s = np.zeros(aircraft)
+        search.first = search.last = np.arange(aircraft)
+        return search
+
     def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
         """Return the last piece that starts at or before a time, the first piece before them all.
 

@@ -14,8 +14,15 @@ from components.aircraft import Aircraft, Roster
 from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
+from components.traffic.sample_times import (
+    RegularTimes,
+    SampleTimes,
+    regular_count,
+    regular_times_s,
+)
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from components.traffic.straight_flights import Starts, flights_of
 from dsa_des.randomness import target_keys
 from dsa_des.types import FloatArray
 
@@ -80,22 +87,16 @@ class RandomTraffic(TrafficSource):
         )
         altitude = own.alt_m + p.altitude_spread_m * (2.0 * height - 1.0)
         speed = p.speed_min_mps + (p.speed_max_mps - p.speed_min_mps) * speed
-        flights = [
-            ScriptedTrajectory(
-                names[i],
-                lat_deg=float(lat[i]),
-                lon_deg=float(lon[i]),
-                alt_m=float(altitude[i]),
-                heading_deg=float(360.0 * heading[i]),
-                speed_mps=float(speed[i]),
-            )
-            for i in range(p.intruders)
-        ]
+        flights = flights_of(Starts(names, lat, lon, altitude, 360.0 * heading, speed))
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(name, p.aircraft) for name in names])
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""
-        step = self.p.sample_interval_s
-        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
+        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
+        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+
+    def sample_times(self) -> list[SampleTimes]:
+        """Return a regular grid over the run."""
+        return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]

@@ -9,9 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from components.traffic.normals import FloatArray
-from components.traffic.traffic_file import Problems, TrafficFile
+from components.traffic.traffic_file import (
+    MOST_OF_A_CELL,
+    MOST_PROBLEMS,
+    Problems,
+    TrafficFile,
+)
 from components.traffic.trajectory import SampledTrajectory
 from components.traffic.units import ANGLE_DEG, LENGTH_M, NO_UNIT, SPEED_MPS, TIME_S, clean_token
+from dsa_des.safe_text import shortened
 
 UNITS = {
     "time": TIME_S,
@@ -77,7 +83,11 @@ def unit_factor(
     plain = clean_token(token)
     if plain in known:
         return known[plain]
-    what = "has no unit" if plain in NO_UNIT else f"unit {token!r} is unknown here"
+    what = (
+        "has no unit"
+        if plain in NO_UNIT
+        else f"unit {shortened(token, MOST_OF_A_CELL)!r} is unknown here"
+    )
     problems.add(f"{what}: it must be one of {', '.join(known)}", line=line, column=header)
     return 1.0
 
@@ -151,13 +161,15 @@ class SampleTable:
             self._problems.fail("there are no samples: at least two aircraft are needed")
         if len(names) == 1:
             self._problems.add(
-                f"there is one aircraft only, {names[0]!r}: an ownship and at least one intruder "
-                "are needed"
+                f"there is one aircraft only, {shortened(names[0])!r}: an ownship and at least "
+                "one intruder are needed"
             )
         own = names[0] if ownship is None else ownship
         if own not in self._aircraft:
             self._problems.add(
-                f"there is no aircraft {own!r}: it must be one of {', '.join(names)}"
+                f"there is no aircraft {own!r}: it must be one of "
+                f"{', '.join(shortened(name) for name in names[:MOST_PROBLEMS])}"
+                f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
         samples = {name: self._sorted(name, rows) for name, rows in self._aircraft.items()}
         self._refuse_long_silence()
@@ -187,15 +199,16 @@ class SampleTable:
                 if "_" in cell:
                     raise ValueError(cell)
         except ValueError:
+            shown = shortened(cell, MOST_OF_A_CELL)
             hint = "; use a decimal point" if cell.replace(",", ".", 1) != cell else ""
-            what = f"{cell!r} is not a number" if cell else "the cell is empty"
+            what = f"{shown!r} is not a number" if cell else "the cell is empty"
             self._problems.add(
                 f"{what}: a finite number is needed{hint}", line=line, column=column.header
             )
             return None
         if not math.isfinite(value):
             self._problems.add(
-                f"{cell!r} is not finite: a finite number is needed",
+                f"{shortened(cell, MOST_OF_A_CELL)!r} is not finite: a finite number is needed",
                 line=line,
                 column=column.header,
             )
@@ -203,7 +216,9 @@ class SampleTable:
         low, high, allowed = _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
         if not low <= value <= high:
             self._problems.add(
-                f"{cell} is out of range: it must {allowed}", line=line, column=column.header
+                f"{shortened(cell, MOST_OF_A_CELL)} is out of range: it must {allowed}",
+                line=line,
+                column=column.header,
             )
             return None
         return value

@@ -12,7 +12,14 @@ from components.traffic import leg_types
 from components.traffic.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
+from components.traffic.sample_times import (
+    RegularTimes,
+    SampleTimes,
+    regular_count,
+    regular_times_s,
+)
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from components.traffic.straight_flights import Starts, flights_of
 from dsa_des.component import Parameters
 from dsa_des.types import FloatArray
 
@@ -155,9 +162,12 @@ class ScriptedTraffic(TrafficSource):
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""
-        step = self.p.sample_interval_s
-        # Rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
-        return np.round(np.arange(int(float(self.context.duration_s) / step) + 1) * step, 9)
+        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
+        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+
+    def sample_times(self) -> list[SampleTimes]:
+        """Return a regular grid over the run."""
+        return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]
 
 
 def flight_arguments(flight: Flight) -> dict[str, Any]:
@@ -184,7 +194,7 @@ def _leg(leg: Any) -> Any:
 
 def _intruders(
     crafts: Sequence[Intruder], reference: tuple[float, float, float]
-) -> list[ScriptedTrajectory]:
+) -> Sequence[ScriptedTrajectory]:
     """Return the flights of all intruders; starts given as offsets are converted together."""
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []
@@ -202,10 +212,26 @@ def _intruders(
                 "or as east_m, north_m and up_m from the ownship's start"
             )
     converted = iter(_geodetic(offsets, reference))
-    return [
-        _intruder(craft, next(converted) if start is None else start, reference)
-        for craft, start in zip(crafts, starts, strict=True)
-    ]
+    known = [next(converted) if start is None else start for start in starts]
+    if crafts and not any(craft.legs for craft in crafts):
+        return flights_of(_starts(crafts, known))
+    return [_intruder(craft, at, reference) for craft, at in zip(crafts, known, strict=True)]
+
+
+def _starts(crafts: Sequence[Intruder], known: list[tuple[float, float, float]]) -> Starts:
+    """Return flights without legs as columns."""
+    lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).T.copy()
+
+    def column(name: str, default: float = 0.0) -> FloatArray:
+        values = [getattr(craft, name) for craft in crafts]
+        return np.array([default if v is None else v for v in values], dtype=np.float64)
+
+    return Starts(
+        [craft.name for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
+        column("speed_mps"), column("climb_mps"), column("start_time_s"),
+        column("end_time_s", np.inf),
+        np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
+    )  # fmt: skip
 
 
 def _geodetic(

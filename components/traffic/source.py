@@ -4,19 +4,27 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from pydantic import Field
 
 from components.aircraft import Aircraft, Roster
-from components.geometry.ellipsoid import line_of_sight
+from components.known_flights import Flights, KnownFlights
 from components.known_targets import KnownTraffic
 from components.reach import FarthestLook, farthest_look
 from components.steering import Manoeuvres
 from components.target_messages import TrafficStates
+from components.traffic.closest_approach import (
+    Approaches,
+    closest_approaches,
+    looked_at_one_by_one,
+)
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
+from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
+from components.traffic.sample_times import SampleTimes
 from components.traffic.state import TrajectoryState
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
@@ -27,7 +35,7 @@ from dsa_des.errors import did_you_mean
 from dsa_des.message import Message
 from dsa_des.ports import Input, Output
 from dsa_des.types import FloatArray, IntArray
-from dsa_des.wake import Arrivals, Wake
+from dsa_des.wake import Wake
 
 
 class SourceParameters(Parameters):
@@ -105,6 +113,10 @@ class TrafficSource(Component):
         duration_s = float(self.context.duration_s) + lasts_s
         return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
 
+    def serves_replicas(self) -> bool:
+        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        return super().serves_replicas() and not self.context.producers
+
     def setup(self) -> None:
         """Learn how far anybody looks; what stays beyond it is not moved."""
         terrain = self.context.sections.get("terrain")
@@ -119,6 +131,9 @@ class TrafficSource(Component):
             self._cull(look)
         if self.context.producers:
             self.own = SteeredFlight(self.own)
+        self._flights_now: Flights = partial(self.flights, self.own)
+        #: Manoeuvres (tick, turn and rate) that have come, and are not flown by any row yet.
+        self._told: list[tuple[int, float, float]] = []
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where somebody knows how far anybody looks."""
@@ -152,8 +167,7 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        for new in wake.arrivals("manoeuvres"):
-            self._steer(new)
+        flights = self._steer(wake)
         time_s = wake.time_s
         columns, fleet, near = self._everybody, self.fleet, None
         if self._steered_culling is not None:
@@ -186,16 +200,18 @@ class TrafficSource(Component):
             roster=self.roster,
             columns=columns,
             culled=culled,
-            flights=self.flights if self._flights_asked_for else None,
+            flights=flights,
         )
 
     def flights(
-        self, columns: IntArray, time_s: FloatArray
+        self, own: Trajectory, columns: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
         Parameters
         ----------
+        own : Trajectory
+            The ownship's flight, as far as it is known.
         columns : (targets,) of int
         time_s : (rows, targets)
             With an ``update_rate_hz``, the last publication up to then counts.
@@ -213,44 +229,91 @@ class TrafficSource(Component):
         if self._culling is not None:
             near = self._culling.intervals.holds(everyone, times)
             others = replace(others, present=others.present & near)
-        return self.own.at(time_s), others.reshaped(time_s.shape)
+        return own.at(time_s), others.reshaped(time_s.shape)
 
-    def _steer(self, new: Arrivals) -> None:
-        """Turn the ownship at the times at which manoeuvres have come."""
-        told = zip(new.tick.tolist(), new.message.turn_rad, new.message.rate_rad_s, strict=True)
+    def _steer(self, wake: Wake) -> KnownFlights | None:
+        """Turn the ownship at the times at which manoeuvres have come.
+
+        Returns
+        -------
+        KnownFlights or None
+            The flights as they are known at each row, where somebody asks for them: a row knows
+            the manoeuvres that have come by its own instant, whatever came later in this wake.
+        """
+        for new in wake.arrivals("manoeuvres"):
+            turns = new.message.turn_rad.tolist(), new.message.rate_rad_s.tolist()
+            self._told = [*self._told, *zip(new.tick.tolist(), *turns, strict=True)]
+        last = int(wake.ticks[-1])
+        # What comes after the last row is for the next wake: what is flown at the end of a run
+        # must not depend on how far a window reached beyond it.
+        told = [turn for turn in self._told if turn[0] <= last]
+        self._told = self._told[len(told) :]
+        known = [self._flights_now]
         for tick, turn_rad, rate_rad_s in told:
             assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.turned(
-                tick / self.context.ticks_per_s, float(turn_rad), float(rate_rad_s)
-            )
+            self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
+            known.append(partial(self.flights, self.own))
+        self._flights_now = known[-1]
+        if not self._flights_asked_for:
+            return None
+        # A manoeuvre has come before anything runs at its instant.
+        came = np.array([tick for tick, _, _ in told], dtype=np.int64)
+        return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""
         raise TypeError(f"{type(self).__name__} does not say when its samples are")
 
+    def sample_times(self) -> list[SampleTimes]:
+        """Return the times of `sample_times_s`, for all targets together.
+
+        A source that says it this way is summed up faster, and in little memory however long the
+        run is: a target's times are those of all the items together.
+        """
+        return []
+
     def report(self) -> dict[str, Any]:
         """Return the closest approach of every target over the run."""
         end_s = float(self.context.duration_s)
+        names = self.roster.names
+        best = self._closest_approaches(end_s)
+        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), strict=True)
         return {
             "targets": {
-                target.name: {"closest_approach": self._closest_approach(target, end_s)}
-                for target in self.targets
+                name: {
+                    "closest_approach": {"time_s": time_s, "range_m": range_m}
+                    if math.isfinite(range_m)
+                    else None
+                }
+                for name, time_s, range_m in found
             }
         }
 
-    def _closest_approach(self, target: Trajectory, end_s: float) -> dict[str, float] | None:
-        times = self.sample_times_s(target)
-        times = times[(times >= 0) & (times <= end_s)]
-        own, other = self.own.at(times), target.at(times)
-        both = own.present & other.present
-        if not both.any():
-            return None
-        _, _, range_m = line_of_sight(
-            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
-            validate=False,
-        )  # fmt: skip
-        nearest = int(np.argmin(np.where(both, range_m, np.inf)))
-        return {"time_s": float(times[nearest]), "range_m": float(range_m[nearest])}
+    def _closest_approaches(self, end_s: float) -> Approaches:
+        samples = self.sample_times()
+        if not samples:
+            return looked_at_one_by_one(self.own, self.targets, self.sample_times_s, end_s)
+        best = Approaches.none(len(self.targets))
+        speeds = max_speeds_mps(self.targets)
+        present_s = _present_together_s(self.own, self.targets, end_s)
+        for times in samples:
+            closest_approaches(
+                self.own.at, self.fleet.each, times,
+                closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
+            )  # fmt: skip
+        return best
+
+
+def _present_together_s(
+    own: Any, targets: Sequence[Any], end_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the first and the last time (targets,) of a run at which both may be there, s."""
+    first, last = intervals_present_s([own])[0].tolist()
+    intervals = intervals_present_s(targets)
+    return (
+        np.maximum(intervals[:, 0], max(first, 0.0)),
+        np.minimum(intervals[:, 1], min(last, end_s)),
+    )
 
 
 def roster_of(

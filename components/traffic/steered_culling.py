@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.state import TrajectoryState
 from dsa_des.types import BoolArray, FloatArray, IntArray
 
@@ -43,7 +44,7 @@ class SteeredCulling:
         self, own_speed_mps: float, targets: Sequence[Any], fleet: Any, reach_m: float
     ) -> None:
         self.reach_m, self._fleet = reach_m, fleet
-        speeds = np.array([target.max_speed_mps for target in targets])
+        speeds = max_speeds_mps(targets)
         closing = (speeds + own_speed_mps * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
         fastest = max(float(closing.max(initial=0.0)), 1e-3)
         self.epoch_s = max(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)

@@ -6,10 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from components.traffic.trajectory import SampledTrajectory
-from dsa_des.errors import nearest
+from dsa_des.errors import Lines, nearest
+from dsa_des.safe_text import shortened
 
 MOST_PROBLEMS = 20
 """Problems listed in one error; further ones are only counted."""
+MOST_COLUMNS = 30
+"""Names of columns listed in a message."""
+MOST_OF_A_CELL = 24
+"""Letters of a cell that a message repeats."""
 
 
 class TrafficFileError(ValueError):
@@ -31,9 +36,9 @@ class TrafficFileError(ValueError):
 
     def __str__(self) -> str:
         if len(self.problems) == 1:
-            return f"{self.path}: {self.problems[0]}"
+            return Lines.of([f"{self.path}: {self.problems[0]}"])
         lines = [f"{self.path}: {len(self.problems)} problems"]
-        return "\n".join(lines + [f"  {problem}" for problem in self.problems])
+        return Lines.of(lines + [f"  {problem}" for problem in self.problems])
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,17 @@ class Problems:
         """Note a problem that makes reading on pointless, and raise."""
         self.add(problem, line=line, column=column)
         self.raise_if_any()
+
+
+def shown_columns(headers: Iterable[str], known: bool) -> str:
+    """Return the names of columns for a message; `known` says whether any is one of ours.
+
+    A file without any of our columns is something else, whose content is nobody's business.
+    """
+    names = [shortened(header, MOST_OF_A_CELL) for header in headers]
+    if not known:
+        return f"the {len(names)} columns of the first row"
+    return ", ".join(names[:MOST_COLUMNS]) + (", …" if len(names) > MOST_COLUMNS else "")
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

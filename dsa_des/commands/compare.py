@@ -1,28 +1,42 @@
 """``dsa-des compare``: the same encounters and draws under two or more conditions."""
 
 import hashlib
+import io
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
-from dsa_des.commands.study import finish, known_results, read_study_of, run_into, show_study
+from dsa_des.commands.study import (
+    check_workers,
+    finish,
+    known_results,
+    run_into,
+    show_study,
+    tell_crashed,
+)
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.run_folder import new_folder_name
+from dsa_des.output_folder import new_folder
 from dsa_des.scene import load_scene
 from dsa_des.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.output import Tables
+from dsa_des.studies.output import Tables, safe_name
 from dsa_des.studies.printing import short, times
+from dsa_des.studies.record import StudyRecord, results_of
+from dsa_des.studies.safe_files import write_whole
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
+from dsa_des.terminal import console, say
 
+_HOME = Path("studies")
+#: A comparison is not continued.
+_ANEW = "the same command and another --out: a comparison is begun anew"
 _MOST_SHOWN = 5
 
 
@@ -37,29 +51,33 @@ def compare_command(
     """Compare what the command line names."""
     if replicas < 1:
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
-    home = Path(out) if out else new_folder_name(Path("studies"), "compare")
+    check_workers(workers)
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        _compare_swap(Path(paths[0]), swaps, replicas, results, workers, home)
+        found = _compare_swap(Path(paths[0]), swaps, replicas, results, workers, out)
+        tell_crashed(found, _ANEW)
         return
-    if len(paths) == 1 and (Path(paths[0]) / STUDY_JSON).is_file():
+    if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results)
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    if home.exists() and (not home.is_dir() or any(home.iterdir())):
-        raise UsageError(f"--out {home}: is there already; a new folder is needed")
     studies = [_study_at(Path(path), replicas) for path in paths]
     for study in studies:
-        known_results(study, results)
-    found = [
-        _tables(Path(path), study, workers, home)
-        for path, study in zip(paths, studies, strict=True)
-    ]
-    for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
-        stem = "scatter" if len(found) == 2 else f"scatter-{number}"
-        _compare(found[0], other, (paths[0], path), results, home / stem)
+        record = StudyRecord.of(study) if isinstance(study, Study) else study
+        known_results(record.results_list(), results)
+    by_place: dict[Path, Tables] = {}  # what is named twice is run once
+    with new_folder(out, _HOME, "compare") as home:
+        for path, study in zip(paths, studies, strict=True):
+            place = Path(path).resolve()
+            if place not in by_place:
+                by_place[place] = _tables(Path(path), study, workers, home)
+        found = [by_place[Path(path).resolve()] for path in paths]
+        for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
+            stem = "scatter" if len(found) == 2 else f"scatter-{number}"
+            _compare(found[0], other, (paths[0], path), results, home / stem)
+    tell_crashed(list(by_place.values()), _ANEW)
 
 
 def _compare_swap(
@@ -68,8 +86,8 @@ def _compare_swap(
     replicas: int,
     results: Sequence[str],
     workers: int | None,
-    home: Path,
-) -> None:
+    out: str | None,
+) -> list[Tables]:
     """Run a scene or study with and without swaps, and compare the two."""
     chosen: list[tuple[str, list[str]]] = []
     scene = _base_scene(path)
@@ -85,8 +103,9 @@ def _compare_swap(
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
-    known_results(study, results)
-    folder = run_into(study, home, workers, resume=False)
+    known_results(results_of(study), results)
+    with new_folder(out, _HOME, "compare") as home:
+        folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
     tables = finish(study, folder, only=results)
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
@@ -99,7 +118,8 @@ def _compare_swap(
         names = (chosen[0][1][0], str(at[place]))
         for metric in metrics:
             units = _Units(tables, by_place[base]), _Units(tables, rows)
-            _farthest_apart(metric, units, names, (study, study))
+            _farthest_apart(metric, units, names)
+    return [tables]
 
 
 def _base_scene(path: Path) -> Any:
@@ -137,17 +157,25 @@ def _applicable(path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]
     return found
 
 
-def _study_at(path: Path, replicas: int) -> Study:
-    """Return the study of a folder, a study file or a scene."""
-    return read_study_of(StudyFolder(path)) if path.is_dir() else _read(path, replicas)
+def _study_at(path: Path, replicas: int) -> Study | StudyRecord:
+    """Return the study of a study file or a scene, or what a folder says of its own."""
+    return StudyFolder(path).record if _is_folder(path) else _read(path, replicas)
 
 
-def _tables(path: Path, study: Study, workers: int | None, home: Path) -> Tables:
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # a text that can be no path
+        return False
+
+
+def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: Path) -> Tables:
     """Return the tables of a study's folder, or run the study or scene first."""
-    if path.is_dir():
+    if not isinstance(study, Study):
         return Tables(study, StudyFolder(path))
-    number = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:6]
-    folder = run_into(study, home / f"{path.stem}-{number}", workers, resume=False)
+    number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
+    target = home / f"{path.stem[:100]}-{number}"
+    folder = run_into(study, target, workers, resume=False, again=lambda _: _ANEW)
     return Tables(study, folder)
 
 
@@ -161,12 +189,10 @@ class _Units:
     def __init__(self, tables: Tables, rows: Any) -> None:
         self.rows = rows
         self.tables = tables
-        cells = tables.rows.column("cell")[rows]
         replicas = tables.rows.column("replica")[rows]
         over = tables.rows.over
         labels = [tuple(str(tables.rows.column(n)[r]) for n in over) for r in rows]
         self.keys = [(*at, int(k)) for at, k in zip(labels, replicas, strict=True)]
-        self.runs = list(zip(cells.tolist(), replicas.tolist(), strict=True))
 
     def values(self, metric: str) -> dict[tuple[Any, ...], float]:
         column = self.tables.rows.column(metric)[self.rows].astype(float)
@@ -177,7 +203,6 @@ def _farthest_apart(
     metric: str,
     units: tuple[_Units, _Units],
     names: tuple[str, str],
-    studies: tuple[Study, Study],
 ) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
     first, second = units[0].values(metric), units[1].values(metric)
@@ -186,14 +211,16 @@ def _farthest_apart(
     both = [key for key in both if first[key] != second[key]][:_MOST_SHOWN]
     if not both:
         return
-    click.echo(f"\n{metric}: where {names[1]} differs most from {names[0]}")
-    runs = [dict(zip(side.keys, side.runs, strict=True)) for side in units]
+    say()
+    say(f"{metric}: where {names[1]} differs most from {names[0]}")
+    rows = [dict(zip(side.keys, side.rows.tolist(), strict=True)) for side in units]
     for key in both:
         where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
         change = f"{short(first[key])} -> {short(second[key])}"
-        click.echo(f"  {where}replica {key[-1]}: {change}")
-        for study, run in zip(studies, runs, strict=True):
-            click.echo(f"    {study.command(*run[key])}")
+        say(f"  {where}replica {key[-1]}: {change}")
+        for side, numbers in zip(units, rows, strict=True):
+            row = side.tables.rows.row(numbers[key])
+            say(f"    {side.tables.record.command(row)}")
 
 
 def _compare(
@@ -205,17 +232,17 @@ def _compare(
             f"{names[0]} and {names[1]} have different axes ({one.rows.axes + one.rows.over} and "
             f"{other.rows.axes + other.rows.over}); only studies over the same ones can be paired"
         )
-    if one.study.seed != other.study.seed:
+    if one.record.seed != other.record.seed:
         raise UsageError(
-            f"{names[0]} has the seed {one.study.seed} and {names[1]} {other.study.seed}: their "
+            f"{names[0]} has the seed {one.record.seed} and {names[1]} {other.record.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     known = {result.name for result in other.results}
     metrics = [name for name in _shown(one, only) if name in known]
-    table = Table(title=f"{names[1]} less {names[0]}, pair by pair", box=None, pad_edge=False,
+    table = Table(title=Text(f"{names[1]} less {names[0]}, pair by pair"), box=None, pad_edge=False,
                   title_justify="left")  # fmt: skip
     for heading in (*one.rows.axes, "result", "difference", "paired interval", "pairs",
                     "unpaired interval", "narrower"):  # fmt: skip
@@ -230,21 +257,23 @@ def _compare(
             first, second = sides[0].values(metric), sides[1].values(metric)
             keys = [key for key in first if key in second]
             pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
-            d = difference(*pair, one.study.confidence, one.study.interval)
+            d = difference(*pair, one.record.confidence, one.record.interval)
             table.add_row(
                 *map(short, at), metric, short(d.paired.value),
                 f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),
                 f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", times(d.narrower),
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
-            _farthest_apart(metric, sides, names, (one.study, other.study))
-    Console(width=160).print(table)
+            _farthest_apart(metric, sides, names)
+    console(160).print(table)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
+        for metric, pairs in together.items():
+            path = stem.with_name(f"{safe_name(f'{stem.name}-{metric}')}.png")
+            x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+            drawn = io.BytesIO()
+            draw_scatter(drawn, x, y, names, metric, "compared")
+            write_whole(path, drawn.getvalue())
+            say(f"wrote {path}")
     except OSError as error:
         raise UsageError(f"--out {stem.parent}: cannot be written: {error.strerror}") from error
-    for metric, pairs in together.items():
-        path = stem.with_name(f"{stem.name}-{metric}.png")
-        x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
-        draw_scatter(path, x, y, names, metric, "compared")
-        click.echo(f"wrote {path}")

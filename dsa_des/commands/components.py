@@ -9,14 +9,16 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from dsa_des import terminal
 from dsa_des.component import Component
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError
 from dsa_des.ladder import Ladder
 from dsa_des.registry import UnknownType, find
+from dsa_des.safe_text import printable
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",
@@ -27,7 +29,7 @@ _UNITS = {
 
 def show_components(name: str | None) -> None:
     """Print the list of block types, or the description of one."""
-    console = Console(width=None if Console().is_terminal else 120)
+    console = terminal.console(120)
     if name is None:
         _list(console)
         return
@@ -38,7 +40,7 @@ def show_components(name: str | None) -> None:
     _describe(console, name, cls)
 
 
-def _list(console: Console) -> None:
+def _list(console: Any) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("type", "takes", "sends", "what it is"):
         table.add_column(heading, no_wrap=heading == "type")
@@ -50,7 +52,8 @@ def _list(console: Console) -> None:
             continue
         table.add_row(name, _ports(cls.inputs), _ports(cls.outputs), _summary(cls))
     console.print(table)
-    console.print("\ndsa-des components TYPE describes one; module:Class works as a type too.")
+    console.print()
+    console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
 
 
 def _ports(ports: typing.Mapping[str, Any]) -> str:
@@ -61,17 +64,18 @@ def _summary(cls: type[Component]) -> str:
     return (cls.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
 
 
-def _describe(console: Console, name: str, cls: type[Component]) -> None:
-    console.print(f"[bold]{name}[/bold]  {cls.path()}", highlight=False)
-    text = inspect.cleandoc(cls.__doc__ or "")
-    console.print(text, highlight=False, markup=False)
-    console.print(f"\nlook-ahead windows: {'yes' if cls.windowed else 'no'}", highlight=False)
+def _describe(console: Any, name: str, cls: type[Component]) -> None:
+    console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.path())}"))
+    console.print(Text(inspect.cleandoc(cls.__doc__ or "")))
+    console.print()
+    console.print(f"look-ahead windows: {'yes' if cls.windowed else 'no'}", highlight=False)
     sides: list[tuple[str, typing.Mapping[str, Any]]] = [
         ("inputs", cls.inputs),
         ("outputs", cls.outputs),
     ]
     for title, ports in sides:
-        console.print(f"\n{title}", style="bold")
+        console.print()
+        console.print(title, style="bold")
         if not ports:
             console.print("  none")
         for port, declared in sorted(ports.items()):
@@ -79,21 +83,23 @@ def _describe(console: Console, name: str, cls: type[Component]) -> None:
             many = ", many writers" if getattr(declared, "many", False) else ""
             optional = "" if getattr(declared, "required", True) else ", optional"
             line = f"  {port} ({declared.message.__name__}{mode}{many}{optional}): {declared.doc}"
-            console.print(line, highlight=False, markup=False)
-    console.print("\nparameters", style="bold")
+            console.print(line, highlight=False)
+    console.print()
+    console.print("parameters", style="bold")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  name", "type", "unit", "default", "meaning"):
         table.add_column(heading)
     for row in parameter_rows(cls.Parameters):
         table.add_row(*row)
-    console.print(table, highlight=False, markup=False)
+    console.print(table, highlight=False)
     for ladder in cls.ladders:
         _describe_ladder(console, ladder)
 
 
-def _describe_ladder(console: Console, ladder: Ladder) -> None:
+def _describe_ladder(console: Any, ladder: Ladder) -> None:
     units = ", ".join(f"{quantity.name} ({quantity.unit})" for quantity in ladder.quantities)
-    console.print(f"\nladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
+    console.print()
+    console.print(f"ladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
                   highlight=False)  # fmt: skip
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  rung", "type", "what it is"):
@@ -101,7 +107,7 @@ def _describe_ladder(console: Console, ladder: Ladder) -> None:
     for rung in ladder.rungs:
         reference = " (reference)" if rung.name == ladder.reference else ""
         table.add_row(f"  {rung.name}{reference}", rung.type_name or "as it is", rung.what)
-    console.print(table, highlight=False, markup=False)
+    console.print(table, highlight=False)
 
 
 def parameter_rows(

@@ -1,12 +1,9 @@
 """``dsa-des cost``: what each model of each block costs, gets wrong, and changes."""
 
-import importlib
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import click
 
 from dsa_des.costs.front import parse_budgets
 from dsa_des.costs.output import draw_costs, print_costs, write_table
@@ -14,11 +11,13 @@ from dsa_des.costs.study import Compare, RungCost, applies, climb
 from dsa_des.costs.variants import Variants
 from dsa_des.entry_points import registered
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.foreign import NotImportable, load_named
 from dsa_des.ladder import Ladder, Unavailable
-from dsa_des.plain_json import json_text
+from dsa_des.output_folder import OutputFolder
 from dsa_des.registry import UnknownType, find
 from dsa_des.reports import load_reports
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.run_folder import write_run_json
+from dsa_des.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
 Climbs = list[tuple[str, Ladder]]
@@ -51,22 +50,21 @@ def cost_of_accuracy(
         raise UsageError("SCENE is missing: only --map needs none")
     variants = Variants(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in variants.dropped:
-        click.echo(f"note: the swap dropped {key}", err=True)
+        say(f"note: the swap dropped {key}", err=True)
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
-    target = Path(out) if out else new_folder_name(Path("runs"), f"{variants.scene.path.stem}-cost")
-    check_target(target)
+    target = OutputFolder.chosen(out, Path("runs"), f"{variants.scene.path.stem}-cost")
     compare = comparison()
     costs: list[RungCost] = []
-    for name, ladder in climbs:
-        _say(f"{name}: {ladder.name} ...", as_json)
-        try:
-            costs += climb(variants, name, ladder, against=against, repeats=repeats,
-                           budgets=limits, compare=compare)  # fmt: skip
-        except Unavailable as error:
-            notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
     chain: list[dict[str, Any]] = []
-    with writing(target) as folder:
+    with target.writing() as folder:
+        for name, ladder in climbs:
+            _say(f"{name}: {ladder.name} ...", as_json)
+            try:
+                costs += climb(variants, name, ladder, against=against, repeats=repeats,
+                               budgets=limits, compare=compare)  # fmt: skip
+            except Unavailable as error:
+                notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
         rows = [cost.row() for cost in costs]
         write_table(folder / "cost.parquet", rows)
         draw_costs(folder / "cost.png", variants.scene.title, costs)
@@ -82,17 +80,19 @@ def cost_of_accuracy(
         content: dict[str, Any] = {"rows": rows, "notes": notes}
         if whole_chain:
             content["chain"] = chain
-        write_json(folder / RUN_JSON, {"title": variants.scene.title, "cost": content})
+        write_run_json(folder, {"title": variants.scene.title, "cost": content})
     if as_json:
-        click.echo(json_text(rows + chain, indent=2, ensure_ascii=False))
+        say_json(rows + chain)
     else:
         print_costs(costs, chain, notes)
-        click.echo(f"\n{target}: {', '.join(sorted(path.name for path in target.iterdir()))}")
+        names = sorted(path.name for path in target.path.iterdir())
+        say()
+        say(f"{target.path}: {', '.join(names)}")
 
 
 def _say(text: str, silent: bool) -> None:
     if not silent and sys.stderr.isatty():
-        click.echo(text, err=True)
+        say(text, err=True)
 
 
 def ladders_to_climb(
@@ -152,16 +152,15 @@ def _draw_maps(name: str, out: str | None) -> None:
     functions = _map_functions()
     if name not in functions:
         raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")
-    module_name, _, function_name = functions[name].partition(":")
     try:
-        draw: Any = getattr(importlib.import_module(module_name), function_name)
-    except (ImportError, AttributeError) as error:
+        draw: Any = load_named(functions[name], "--map")
+    except NotImportable as error:
         raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
-    target = Path(out) if out else new_folder_name(Path("runs"), f"map-{name}")
-    with writing(target) as folder:
+    target = OutputFolder.chosen(out, Path("runs"), f"map-{name}")
+    with target.writing() as folder:
         paths = [Path(path).name for path in draw(folder)]
-        write_json(folder / RUN_JSON, {"map": name, "files": paths})
-    click.echo(f"{target}: {', '.join(paths)}")
+        write_run_json(folder, {"map": name})
+    say(f"{target.path}: {', '.join(paths)}")
 
 
 def _map_functions() -> dict[str, str]:

@@ -5,8 +5,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from dsa_des import terminal
 from dsa_des.commands.loading import load
 from dsa_des.effects import Planned
+from dsa_des.safe_text import shortened
 from dsa_des.scene import Scene
 from dsa_des.simulation import Simulation
 
@@ -23,31 +25,26 @@ def explain_scene(
     simulate_everything: bool,
 ) -> None:
     """Print a table of every block's effects; with `measure`, run the scene to time them."""
-    from rich.console import Console
     from rich.table import Table
-    from rich.text import Text
 
     loaded = load(scene, sets, swaps, seed, duration)
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measured_shares(loaded, simulate_everything) if measure else None
-    console = Console()
-    if not console.is_terminal:  # a reader that is no terminal gets every sentence on one line
-        console = Console(width=_WIDE)
+    console = terminal.console(_WIDE)  # no terminal: every sentence on one line
     table = Table(box=None, padding=(0, 2, 0, 0))
     for heading in ("block", "effect", "largest influence"):
         table.add_column(heading, no_wrap=heading == "block")
     if shares is not None:
         table.add_column("share of run time", justify="right")
     for item in simulation.plan:
-        row = [item.block, item.sentence(), _bound(item)]
+        row = [shortened(item.block), item.sentence(), _bound(item)]
         if shares is not None:
             share = shares.get((item.block, item.effect.name))
             row.append("" if share is None else f"{share:.1%}")
-        # Text, because [weather] would be taken for markup.
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*row)
     for name, component in simulation.components.items():
         for sentence in component.left_out():
-            table.add_row(name, Text(sentence))
+            table.add_row(shortened(name), sentence)
     if not table.row_count:
         console.print("No block of this scene declares effects.")
         return

@@ -4,13 +4,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import click
 import networkx as nx
 
 from dsa_des.commands.loading import load
-from dsa_des.errors import UsageError
+from dsa_des.drawing import drawing, figure_text
+from dsa_des.errors import OutputError, UsageError
 from dsa_des.graph import depths
+from dsa_des.output_file import check_file
+from dsa_des.output_names import named
+from dsa_des.safe_text import printable, shortened
 from dsa_des.scene import Scene
+from dsa_des.terminal import console, say, say_lines
 from dsa_des.wiring import Wire
 
 
@@ -29,11 +33,12 @@ def show_graph(
         raise UsageError("give --dot or --png, not both")
     loaded = load(scene, sets, swaps, seed, duration)
     if dot:
-        click.echo(to_dot(loaded))
+        say_lines(to_dot(loaded))
     elif png:
-        path = Path(out) if out else Path(f"{loaded.path.stem}-graph.png")
+        path = Path(f"{loaded.path.stem}-graph.png") if out is None else named(out)
+        check_file(path)
         draw_graph(loaded, path)
-        click.echo(f"wrote {path}")
+        say(f"wrote {path}")
     else:
         _print_table(loaded)
 
@@ -49,12 +54,11 @@ def _delay_label(wire: Wire) -> str:
 
 
 def _print_table(scene: Scene) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     depth = depths(scene.graph)
     windowed = scene.look_ahead_blocks()
-    table = Table(title=f"{scene.title}: blocks in the order they run within an instant")
+    table = Table(title=f"{shortened(scene.title)}: blocks in the order they run within an instant")
     for heading in ("depth", "block", "type", "runs", "fed by"):
         table.add_column(heading)
     for name in sorted(scene.blocks, key=lambda n: (depth[n], n)):
@@ -65,59 +69,62 @@ def _print_table(scene: Scene) -> None:
         )  # fmt: skip
         grain = "look-ahead" if name in windowed else "scan by scan"
         fed = [
-            f"{w.source}.{w.output}" + (f" ({_delay_label(w)})" if w.delayed else "")
+            f"{shortened(w.source)}.{w.output}" + (f" ({_delay_label(w)})" if w.delayed else "")
             for w in _wires(scene)
             if w.target == name
         ]
-        table.add_row(str(depth[name]), name, block.type_name, f"{when}, {grain}", ", ".join(fed))
-    Console().print(table)
+        who = shortened(name), shortened(block.type_name)
+        table.add_row(str(depth[name]), *who, f"{when}, {grain}", ", ".join(fed))
+    console().print(table)
 
 
 def to_dot(scene: Scene) -> str:
     """Return the graph in Graphviz's DOT language, always in the same order."""
     lines = [f'digraph "{_escaped(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
     for name, block in scene.blocks.items():
-        lines.append(f'  "{name}" [label="{name}\\n{_escaped(block.type_name)}"];')
+        shown = f"{_escaped(name)}\\n{_escaped(block.type_name)}"
+        lines.append(f'  "{_escaped(name)}" [label="{shown}"];')
     for wire in _wires(scene):
         message = scene.blocks[wire.source].cls.outputs[wire.output].message.__name__
-        label = message + (f"\\n{_delay_label(wire)}" if wire.delayed else "")
+        sent = message + (f"\\n{_delay_label(wire)}" if wire.delayed else "")
         style = ", style=dashed" if wire.delayed else ""
-        lines.append(f'  "{wire.source}" -> "{wire.target}" [label="{label}"{style}];')
+        ends = f'"{_escaped(wire.source)}" -> "{_escaped(wire.target)}"'
+        lines.append(f'  {ends} [label="{sent}"{style}];')
     return "\n".join([*lines, "}"])
 
 
 def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')
+    return printable(text).replace("\\", "\\\\").replace('"', '\\"')
 
 
 def draw_graph(scene: Scene, path: Path) -> None:
     """Draw the graph from left to right by depth."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     depth = depths(scene.graph)
     place = _layout(scene.graph, depth)
     columns = max(depth.values()) + 1
     rows = max(list(depth.values()).count(d) for d in set(depth.values()))
-    figure = Figure(figsize=(1.2 + 2.1 * columns, 1.2 + 1.1 * rows), dpi=110)
-    FigureCanvasAgg(figure)
-    axes = figure.add_axes((0, 0, 1, 0.9))
-    axes.set_axis_off()
-    axes.set_xlim(-0.6, columns - 0.4)
-    axes.set_ylim(-rows / 2 - 0.2, rows / 2 + 0.2)
-    figure.suptitle(scene.title, fontsize=12)
+    try:
+        with drawing(1.2 + 2.1 * columns, 1.2 + 1.1 * rows, path) as figure:
+            axes = figure.add_axes((0, 0, 1, 0.9))
+            axes.set_axis_off()
+            axes.set_xlim(-0.6, columns - 0.4)
+            axes.set_ylim(-rows / 2 - 0.2, rows / 2 + 0.2)
+            figure.suptitle(figure_text(scene.title, 80), fontsize=12)
+            _draw_blocks(axes, scene, place)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _draw_blocks(axes: Any, scene: Scene, place: Mapping[str, tuple[float, float]]) -> None:
     boxes = {}
     for name, (x, y) in place.items():
+        kind = figure_text(scene.blocks[name].type_name, 24)
         boxes[name] = axes.text(
-            x, y, f"{name}\n{scene.blocks[name].type_name}", ha="center", va="center", fontsize=8,
+            x, y, f"{figure_text(name, 24)}\n{kind}", ha="center", va="center", fontsize=8,
             bbox={"boxstyle": "round,pad=0.5", "facecolor": "#eef3f8", "edgecolor": "#33557a"},
         )  # fmt: skip
     for wire in _wires(scene):
         _draw_wire(axes, wire, place, boxes)
-    try:
-        figure.savefig(path, metadata={"Software": None})
-    except OSError as error:
-        raise UsageError(f"--out {path}: cannot be written: {error.strerror}") from error
 
 
 def _layout(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:

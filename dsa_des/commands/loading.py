@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable
 
-import click
-
 from dsa_des.scene import Scene, load_scene
 from dsa_des.simulation import Simulation
+from dsa_des.terminal import say
 
 # Half a minute of the processor, for most scenes.
 _MANY_SCANS = 1e7
@@ -15,7 +14,7 @@ def say_if_long(simulation: Simulation) -> None:
     """Say on standard error that a run will take long: nobody should wait for it unawares."""
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
-        click.echo(f"{message}{simulation.scans:.2g} scans", err=True)
+        say(f"{message}{simulation.scans:.2g} scans", err=True)
 
 
 def load(
@@ -28,5 +27,5 @@ def load(
     """Load and check a scene; parameters that a swap dropped are listed on standard error."""
     loaded = load_scene(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in loaded.dropped:
-        click.echo(f"note: the swap dropped {key}", err=True)
+        say(f"note: the swap dropped {key}", err=True)
     return loaded

@@ -9,17 +9,20 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import click
-
-from dsa_des import __version__
+from dsa_des import __version__, terminal
+from dsa_des.attempts import attempt
 from dsa_des.commands.loading import load, say_if_long
+from dsa_des.errors import OutputError
+from dsa_des.output_file import write_file
+from dsa_des.output_folder import OutputFolder
 from dsa_des.pacing import Pacer, parse_factor
-from dsa_des.plain_json import json_text
 from dsa_des.recording import ObserverSink, Recorder
-from dsa_des.reports import load_reports
-from dsa_des.run_folder import RUN_JSON, check_target, new_folder_name, write_json, writing
+from dsa_des.reports import draw_all, load_reports
+from dsa_des.run_folder import write_run_json
+from dsa_des.safe_text import shortened
 from dsa_des.scene import Scene
 from dsa_des.simulation import Outcome, Simulation
+from dsa_des.terminal import say, say_json
 from dsa_des.toml_text import to_toml
 
 _VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
@@ -40,7 +43,7 @@ def run_scene(
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
     loaded = load(scene, sets, swaps, seed, duration)
-    target = Path(out) if out else new_folder_name(Path("runs"), loaded.path.stem)
+    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
@@ -49,11 +52,9 @@ def run_scene(
         pacer=pacer,
     )
     if as_json:
-        click.echo(json_text(summary, indent=2))
+        say_json(summary)
     elif not quiet:
-        from rich.console import Console
-
-        console = Console()
+        console = terminal.console()
         for report in load_reports():
             report.show(console, summary)
         if pacer is not None:
@@ -62,7 +63,7 @@ def run_scene(
 
 def record_run(
     loaded: Scene,
-    target: Path,
+    target: Path | OutputFolder,
     *,
     simulate_everything: bool = False,
     silent: bool = True,
@@ -73,43 +74,64 @@ def record_run(
     Raises
     ------
     UsageError
-        If the folder holds something other than a run.
+        If the folder holds something other than a run, or there is no place for it.
+    OutputError
+        If the results cannot be written.
     """
-    check_target(target)
+    if isinstance(target, Path):
+        target = OutputFolder(target)
+    target.check()
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
     say_if_long(simulation)
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
+    notes: list[str] = []
     observers = ObserverSink(
-        observer for report in reports for observer in report.observers(simulation)
+        (observer for report in reports for observer in report.observers(simulation)), notes
     )
-    with writing(target) as folder:
+    with target.writing() as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
         from dsa_des.arrow import ParquetSink
 
-        recorder.sinks += [ParquetSink(folder), observers]
+        tables = ParquetSink(folder)
+        recorder.sinks += [tables, observers]
         started = time.perf_counter()
-        with _progress(simulation, silent=silent) as progress:
-            outcome = simulation.run(_paced(progress, pacer))
-        summary = _summary(observers, outcome, target)
+        try:
+            with _progress(simulation, silent=silent) as progress:
+                outcome = simulation.run(_paced(progress, pacer))
+        finally:
+            tables.release()
+        summary = _summary(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
-        (folder / "scene.toml").write_text(scene_text, encoding="utf-8")
+        write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
-        write_json(folder / RUN_JSON, info)
-        for report in reports:
-            report.draw(simulation, folder, summary)
+        if notes:
+            info["notes"] = list(notes)
+        write_run_json(folder, info)
+    summary["out"] = str(target.path)
+    # The run has its name: whatever happens while figures are drawn, it is not lost.
+    try:
+        notes += draw_all(reports, simulation, target.path, summary)
+        write_run_json(target.path, info)  # with the figures among its files
+    except OSError as error:
+        what = f"figures cannot be written: {error.strerror or error}"
+        raise OutputError(f"{target.path}: {what}; the run itself is complete") from error
+    for note in notes:
+        say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary
 
 
-def _summary(observers: ObserverSink, outcome: Outcome, target: Path) -> dict[str, Any]:
+def _summary(
+    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+) -> dict[str, Any]:
     return {
         **observers.result(),
-        **outcome.report,
+        **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
         "out": str(target),
@@ -170,15 +192,7 @@ def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[flo
     if silent or not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(simulation.scene.title, total=float(simulation.duration_s))
+    with terminal.progress("seconds") as bar:
+        title = shortened(simulation.scene.title)
+        task = bar.add_task(title, total=float(simulation.duration_s))
         yield lambda time_s: bar.update(task, completed=time_s)

@@ -1,24 +1,31 @@
 """``dsa-des study``: run a study, continue it, or show what it came to."""
 
+import os
+import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-import click
-
+from dsa_des import terminal
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.run_folder import new_folder_name
+from dsa_des.output_names import claim_folder, named
+from dsa_des.safe_text import shortened
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.folder import StudyFolder, description
+from dsa_des.studies.folder import STUDY_JSON, StudyFolder
+from dsa_des.studies.folder_names import latest_folder
+from dsa_des.studies.metric import Result
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import show
-from dsa_des.studies.runner import Clock, Stopped, results_of, run_study, why_one_by_one
+from dsa_des.studies.record import StudyRecord
+from dsa_des.studies.runner import Clock, Stopped, run_study, why_one_by_one
 from dsa_des.studies.study import Study
-from dsa_des.studies.study_file import read_study, study_again
+from dsa_des.studies.study_file import read_study
+from dsa_des.terminal import say
 
 _HOME = Path("studies")
+_MOST_WORKERS = 1024
 
 
 def study_command(
@@ -32,59 +39,148 @@ def study_command(
     metrics: bool,
     quiet: bool,
 ) -> None:
-    """Do what the command line asks for."""
+    """Do what the command line asks for; exit code 1 if runs crashed, 130 on ctrl-C."""
     if metrics:
         _list_metrics()
     elif len(words) == 2 and words[0] == "show":
         show_study(Path(words[1]))
     elif len(words) == 1 and words[0] != "show":
         study = read_study(words[0], sets=sets)
-        folder = run_into(study, _target(study, out, resume), workers, resume, executor, scheduler)
-        finish(study, folder, quiet=quiet)
+
+        def again(path: Path) -> str:
+            return _resume_command(words[0], path, sets, workers, executor, scheduler)
+
+        target = _target(study, out, resume)
+        folder = run_into(study, target, workers, resume, executor, scheduler, again)
+        try:
+            tables = finish(study, folder, quiet=quiet)
+        except KeyboardInterrupt:
+            _stopped("interrupted", again(folder.path), 130)
+        tell_crashed([tables], again(folder.path))
     else:
         raise UsageError("give STUDY.toml, or: show FOLDER")
 
 
-def _target(study: Study, out: str | None, resume: bool) -> Path:
+def _target(study: Study, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
+    """Return the study's folder, or how to make a new one when all is well."""
+    stem = study.path.stem
     if out is not None:
-        return Path(out)
+        return named(out)
     if resume:
-        earlier = sorted(_HOME.glob(f"{study.path.stem}-[0-9]*"))
-        if not earlier:
-            raise UsageError(f"--resume: there is no {_HOME / study.path.stem}-NNN to continue")
-        return earlier[-1]
-    return new_folder_name(_HOME, study.path.stem)
+        earlier = latest_folder(_HOME, stem)
+        if earlier is None:
+            raise UsageError(f"--resume: there is no {_HOME / stem}-NNN to continue")
+        return earlier
+    return lambda: claim_folder(_HOME, stem)
+
+
+def _resume_command(
+    study: str,
+    path: Path,
+    sets: Sequence[str],
+    workers: int | None,
+    executor: str,
+    scheduler: str | None,
+) -> str:
+    """Return what continues a study, fit to be pasted into a shell."""
+    words = ["dsa-des", "study", "--resume", "--out", str(path)]
+    for assignment in sets:
+        words += ["--set", assignment]
+    if workers is not None:
+        words += ["--workers", str(workers)]
+    if executor != "local":
+        words += ["--executor", executor]
+    if scheduler is not None:
+        words += ["--scheduler", scheduler]
+    # A name that begins with a dash is no option.
+    return " ".join(map(_quoted, [*words, *(["--"] if study.startswith("-") else []), study]))
+
+
+def _quoted(word: str) -> str:
+    """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
+    if word.isprintable():
+        return shlex.quote(word)
+    plain = word.replace("\\", "\\\\").replace("'", "\\'")
+    shown = "".join(
+        c if c.isprintable() else "".join(f"\\{b:03o}" for b in os.fsencode(c)) for c in plain
+    )
+    return f"$'{shown}'"
+
+
+def _stopped(reason: str, again: str, code: int) -> NoReturn:
+    say(f"stopped: {reason}; what is finished is kept, continue with", err=True)
+    say(f"  {again}", err=True)
+    sys.exit(code)
+
+
+def tell_crashed(found: Sequence[Tables], again: str) -> None:
+    """Say how many runs crashed, and end with exit code 1 if there are any."""
+    crashed = sum(tables.rows.crashed for tables in found)
+    if crashed:
+        runs = sum(_count(tables) for tables in found)
+        say(
+            f"{crashed} of {runs} runs crashed: the process that ran them died each time; "
+            "try them again with",
+            err=True,
+        )
+        say(f"  {again}", err=True)
+        sys.exit(1)
+
+
+def check_workers(workers: int | None) -> None:
+    """Raise UsageError unless so many processes can be had."""
+    if workers is not None and workers < 1:
+        raise UsageError(f"--workers is {workers}: it must be 1 or more")
+    if workers is not None and workers > _MOST_WORKERS:
+        raise UsageError(f"--workers is {workers}: at most {_MOST_WORKERS} are allowed")
 
 
 def run_into(
     study: Study,
-    path: Path,
+    path: "Path | Callable[[], Path]",
     workers: int | None,
     resume: bool,
     kind: str = "local",
     scheduler: str | None = None,
-) -> StudyFolder:
-    """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed."""
-    if workers is not None and workers < 1:
-        raise UsageError(f"--workers is {workers}: it must be 1 or more")
+    again: "Callable[[Path], str]" = lambda path: _resume_command("STUDY.toml", path, (), None,
+                                                                  "local", None),
+) -> StudyFolder:  # fmt: skip
+    """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
+
+    Parameters
+    ----------
+    path : Path or callable
+        The folder, or what makes a new one.
+    again : callable
+        Takes the folder and returns the command that continues the study.
+    """
+    check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)
-    folder = StudyFolder(path)
+    folder: StudyFolder | None = None
     try:
+        folder = StudyFolder(path if isinstance(path, Path) else path())
         folder.open(study, resume=resume)
-        with folder.locked(), _progress(study) as report:
+        with _progress(study) as report:
             run_study(study, folder, executor, report)
     except Stopped as stop:
-        again = f"dsa-des study {study.path} --resume --out {path}"
-        click.echo(f"stopped: {stop}; what is finished is kept, continue with\n  {again}", err=True)
-        sys.exit(130 if str(stop) == "interrupted" else 1)
+        assert folder is not None
+        code = 130 if str(stop) == "interrupted" else 1
+        _stopped(str(stop), again(folder.path), code)
+    except KeyboardInterrupt:
+        if folder is None or not (folder.path / STUDY_JSON).exists():
+            sys.exit(130)
+        _stopped("interrupted", again(folder.path), 130)
     finally:
         executor.close()
+        if folder is not None:
+            folder.close()
     return folder
 
 
 def finish(
-    study: Study, folder: StudyFolder, *, quiet: bool = False, only: Sequence[str] = ()
-) -> Tables:
+    study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
+    only: Sequence[str] = (),
+) -> Tables:  # fmt: skip
     """Write the tables of a finished study, draw its figures and print them.
 
     `only` names the results to print; by default those that the study draws.
@@ -94,17 +190,15 @@ def finish(
         tables.write()
         figures = tables.draw(only)
     except OSError as error:
-        raise UsageError(f"{folder.path}: cannot be written: {error.strerror}") from error
+        raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
     if not quiet:
-        from rich.console import Console
-
-        console = Console() if sys.stdout.isatty() else Console(width=160)
-        show(console, tables, only)
+        show(terminal.console(160), tables, only)
         for path in figures:
-            click.echo(f"wrote {path}")
-        if reason := why_one_by_one(study):
-            click.echo(f"replicas ran one by one where they cannot run in lock step: {reason}")
-        click.echo(f'\npandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
+            say(f"wrote {path}")
+        if isinstance(study, Study) and (reason := why_one_by_one(study)):
+            say(f"replicas ran one by one where they cannot run in lock step: {reason}")
+        say()
+        say(f'pandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
     return tables
 
 
@@ -112,40 +206,25 @@ def _count(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
-def read_study_of(folder: StudyFolder) -> Study:
-    """Return the study that a folder was made of.
-
-    Raises
-    ------
-    UsageError
-        If the folder is no study, or its scene has changed since.
-    """
-    about = folder.about()
-    study = study_again(Path(about["study"]), about["tables"])
-    if description(study)["study_sha256"] != about["study_sha256"]:
-        raise UsageError(
-            f"{folder.path}: the scene {about['scene']}, a file that it names, or dsa_des "
-            "has changed since the study was run; run it again"
-        )
-    return study
-
-
 def show_study(path: Path, only: Sequence[str] = ()) -> None:
-    """Print all tables of a study's folder, or those of some results; draw its figures again."""
+    """Print all tables of a study's folder, or those of some results; draw its figures again.
+
+    The folder's tables are read and nothing else: no scene, and no code that it names.
+    """
     folder = StudyFolder(path)
-    study = read_study_of(folder)
-    finish(study, folder, only=only or known_results(study, only))
+    every = known_results(folder.record.results_list(), only)
+    finish(folder.record, folder, only=only or every)
 
 
-def known_results(study: Study, only: Sequence[str]) -> list[str]:
-    """Return the names of all results of a study.
+def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:
+    """Return the names of results.
 
     Raises
     ------
     UsageError
         If one of `only` is none of them.
     """
-    every = [result.name for result in results_of(study)]
+    every = [result.name for result in results]
     for name in only:
         if name not in every:
             raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")
@@ -157,12 +236,8 @@ def _progress(study: Study) -> Iterator[Any]:
     """Show a progress bar on a terminal, and a line now and then elsewhere."""
     clock = Clock()
     if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"))
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(study.title, total=None, text="")
+        with terminal.progress("text") as bar:
+            task = bar.add_task(shortened(study.title), total=None, text="")
 
             def update(progress: Any) -> None:
                 text = clock.text(progress)
@@ -179,20 +254,19 @@ def _progress(study: Study) -> Iterator[Any]:
         text = clock.text(progress)
         if time.monotonic() - last > 10:
             last = time.monotonic()
-            click.echo(text, err=True)
+            say(text, err=True)
 
     yield note
 
 
 def _list_metrics() -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from dsa_des.commands.components import parameter_rows
     from dsa_des.entry_points import registered
     from dsa_des.studies.metric import METRICS, find_metric
 
-    console = Console() if sys.stdout.isatty() else Console(width=120)
+    console = terminal.console(120)
     table = Table(box=None, pad_edge=False)
     for heading in ("metric", "reads", "keys", "what it is"):
         table.add_column(heading, no_wrap=heading == "metric")

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.costs.front import on_front
-from dsa_des.costs.output import png_figure
 from dsa_des.costs.study import Compare, RungCost
 from dsa_des.costs.variants import Choice, Variants
+from dsa_des.drawing import drawing, figure_text
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.ladder import Unavailable
 from dsa_des.recording import MemorySink, Recorder
@@ -159,7 +159,7 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]]) -> None:
     )
     key_in = 0.2 + 0.13 * len(best)
     height_in = 4.6 + key_in
-    with png_figure(path, 7.5, height_in) as figure:
+    with drawing(7.5, height_in, path) as figure:
         axes = figure.add_subplot()
         errors = [row["error_p95"] for row in rows]
         floor = 0.5 * min([e for e in errors if e > 0.0], default=1e-3)
@@ -178,7 +178,7 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]]) -> None:
         figure.text(0.02, 0.1 / height_in, key, fontsize=6.5, va="bottom")
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_title(f"{title}: the whole chain")
+        axes.set_title(f"{figure_text(title, 80)}: the whole chain")
         axes.set_xlabel("CPU time of the run, µs per target-scan")
         axes.set_ylabel("share of detections gained or lost")
         axes.legend(fontsize=8)

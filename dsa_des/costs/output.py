@@ -1,13 +1,17 @@
 """The results of a cost study as a table on the terminal, a Parquet file and a figure."""
 
+import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from dsa_des import terminal
 from dsa_des.costs.study import RungCost
+from dsa_des.drawing import drawing, figure_text, tight
+from dsa_des.output_file import write_file
+from dsa_des.safe_text import printable, shortened
 
 _EFFECT_COLUMNS = (
     ("first seen, m", "first_detection_range_change_m", "+,.0f"),
@@ -26,7 +30,10 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
     flat = [_flattened(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), path)
+    # To memory first: a Parquet writer on a full disk fails a second time when it is collected.
+    content = io.BytesIO()
+    pq.write_table(pa.table({name: [row.get(name) for row in flat] for name in names}), content)
+    write_file(path, content.getvalue())
 
 
 def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -43,18 +50,16 @@ def print_costs(
     costs: Sequence[RungCost], chain: Sequence[Mapping[str, Any]], notes: Sequence[str]
 ) -> None:
     """Print one table per ladder."""
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    console = Console(width=None if Console().is_terminal else 150)
+    console = terminal.console(150)
     for (block, ladder_name), group in groupby(costs, key=lambda c: (c.block, c.ladder.name)):
         rungs = list(group)
         unit = rungs[0].ladder.quantities[0]
-        console.print(
-            f"\n[bold]{block}[/bold], {ladder_name}: errors in {unit.name}, {unit.unit}, against "
-            f"{rungs[0].reference}",
-            highlight=False,
-        )
+        what = f"{ladder_name}: errors in {unit.name}, {unit.unit}, against {rungs[0].reference}"
+        console.print()
+        console.print(Text.assemble((shortened(block), "bold"), f", {printable(what)}"))
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column("rung", no_wrap=True)
         for heading in ("us/target-scan", "mean", "p95", "max",
@@ -63,11 +68,11 @@ def print_costs(
         table.add_column("")
         for cost in rungs:
             table.add_row(*_cells(cost))
-        console.print(table, highlight=False, markup=False)
+        console.print(table, highlight=False)
     if chain:
         _print_chain(console, chain)
     for note in notes:
-        console.print(f"note: {note}", highlight=False, markup=False)
+        console.print(f"note: {note}", highlight=False)
 
 
 def _cells(cost: RungCost) -> list[str]:
@@ -105,8 +110,10 @@ def _remarks(cost: RungCost) -> list[str]:
 
 def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]]) -> None:
     from rich.table import Table
+    from rich.text import Text
 
-    console.print("\n[bold]whole chain[/bold], the front", highlight=False)
+    console.print()
+    console.print(Text.assemble(("whole chain", "bold"), ", the front"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("us/target-scan", "detections that differ", "first seen, m", "rungs"):
         table.add_column(heading, justify="left" if heading == "rungs" else "right")
@@ -119,7 +126,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]]) -> None:
                 _NO_ERROR if first is None else f"{first:+,.0f}",
                 row["rung"],
             )
-    console.print(table, highlight=False, markup=False)
+    console.print(table, highlight=False)
 
 
 def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
@@ -132,27 +139,15 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     panels = [rungs for rungs in panels if any(cost.error.count for cost in rungs)]
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
-    with png_figure(path, 4.3 * columns, 3.5 * rows + 0.5) as figure:
-        figure.suptitle(f"{title}: what each model costs and what it gets wrong")
+    with drawing(4.3 * columns, 3.5 * rows + 0.5, path) as figure:
+        figure.suptitle(f"{figure_text(title, 80)}: what each model costs and what it gets wrong")
         drawn = []
         for number, rungs in enumerate(panels):
             axes = figure.add_subplot(rows, columns, number + 1)
             drawn.append((axes, _draw_panel(axes, rungs)))
-        figure.tight_layout()
+        tight(figure)
         for axes, labels in drawn:  # where points are is known only now
             _put_labels(axes, labels)
-
-
-@contextmanager
-def png_figure(path: Path, width_in: float, height_in: float) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG when the block is done."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width_in, height_in), dpi=110)
-    FigureCanvasAgg(figure)
-    yield figure
-    figure.savefig(path, metadata={"Software": None})
 
 
 #: What is written, at which point, how far its error bar reaches, in which colour.
@@ -189,7 +184,9 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
     axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))
     axes.set_ylim(*_wide([y for (_, y), _ in points]))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
-    axes.set_title(f"{first.block}: {first.ladder.name}, against {first.reference}", fontsize=9)
+    axes.set_title(
+        f"{figure_text(first.block)}: {first.ladder.name}, against {first.reference}", fontsize=9
+    )
     axes.set_xlabel("CPU time of the block, µs per target-scan", fontsize=8)
     axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
     axes.tick_params(which="both", labelsize=7)

@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +16,10 @@ from dsa_des.scene import Scene
 
 SWAP = "swap."
 _SPEC_KEYS = ("from", "to", "step", "steps", "log", "files", "beat_with", "values", "set")
-_MOST_VALUES = 100_000
+#: Each value is checked before anything runs, some 3 ms each.
+_MOST_VALUES = 10_000
+_MOST_FILES = 100_000
+_LONGEST_FRACTION = 300
 _FRACTION = re.compile(r"\d+/[1-9]\d*")
 
 
@@ -98,6 +102,7 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
             values = _range(spec)
     if not isinstance(values, list) or not values:
         raise ValueError("is empty: an axis needs at least one value")
+    _refuse_many(len(values))
     if key.startswith(SWAP):
         return _swap(key, values, scene)
     labels = tuple(_label(value) for value in values)
@@ -108,15 +113,24 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
 def _label(value: Any) -> Any:
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, str) and _FRACTION.fullmatch(value):
+    if isinstance(value, str) and len(value) < _LONGEST_FRACTION and _FRACTION.fullmatch(value):
         return float(Fraction(value))
+    if isinstance(value, int) and abs(value) >= 2**63:
+        raise ValueError("holds a whole number beyond 2^63")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"holds {value}: must be finite")
     return value if isinstance(value, int | float) else str(value)
 
 
 def _refuse_twice(labels: tuple[Any, ...]) -> None:
-    for label in labels:
-        if labels.count(label) > 1:
-            raise ValueError(f"holds {label!r} more than once")
+    label, count = Counter(labels).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"holds {label!r} more than once")
+
+
+def _refuse_many(count: int, most: int = _MOST_VALUES) -> None:
+    if count > most:
+        raise ValueError(f"has {count:,} values; at most {most:,} are allowed")
 
 
 def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
@@ -137,29 +151,40 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
         raise ValueError('files must be a pattern such as "encounters/*.daa", or a list of names')
     found: list[Path] = []
     for item in patterns:
-        path = Path(item).expanduser()
+        try:
+            path = Path(item).expanduser()
+        except RuntimeError as error:  # the ~ of nobody
+            raise ValueError(f"files: {item!r}: {error}") from None
         folder = getattr(item, "folder", Path.cwd())
         base = path if path.is_absolute() else folder / path
         if any(sign in str(item) for sign in "*?["):
             start = Path(base.anchor) if base.is_absolute() else Path()
-            matches = sorted(start.glob(str(base.relative_to(base.anchor))))
+            try:
+                matches = sorted(start.glob(str(base.relative_to(base.anchor))))
+            except (OSError, NotImplementedError, re.error) as error:
+                raise ValueError(f"files: {item!r} is no pattern of file names: {error}") from None
             if not matches:
                 raise ValueError(f"no file matches {base}")
             found += matches
-        elif base.is_dir():
+        elif _is(base, Path.is_dir):
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
-        elif base.is_file():
+        elif _is(base, Path.is_file):
             found.append(base)
         else:
             raise ValueError(f"there is no file {base}")
-    names = [path.name for path in found]
-    labels = tuple(
-        name if names.count(name) == 1 else str(path)
-        for name, path in zip(names, found, strict=True)
-    )
+    _refuse_many(len(found), _MOST_FILES)
+    names = Counter(path.name for path in found)
+    labels = tuple(path.name if names[path.name] == 1 else str(path) for path in found)
     _refuse_twice(labels)
     sets = tuple(((key, str(path.resolve())),) for path in found)
     return Axis(key, labels, sets, ((),) * len(labels), files=True)
+
+
+def _is(path: Path, what: Callable[[Path], bool]) -> bool:
+    try:
+        return what(path)
+    except (OSError, ValueError):  # a text that can be no path
+        return False
 
 
 def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
@@ -168,6 +193,7 @@ def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
         raise ValueError(
             "linked values need values = [...], and set = {key = [...]} with as many for each key"
         )
+    _refuse_many(len(labels))
     columns = flatten_axes(keys)
     for name, column in columns.items():
         if not isinstance(column, list) or len(column) != len(labels):
@@ -200,8 +226,7 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
             raise ValueError("steps is how many values: a whole number of 1 or more")
         count = steps
         step = (high - low) / (count - 1) if count > 1 else Fraction(0)
-    if count > _MOST_VALUES:
-        raise ValueError(f"has {count} values; at most {_MOST_VALUES} are allowed")
+    _refuse_many(count)
     if not log:
         return [as_written(low + k * step) for k in range(count)]
     if low <= 0:
@@ -235,6 +260,7 @@ def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
     steps = spec.get("steps", 32)
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValueError("steps is how many phases: a whole number of 1 or more")
+    _refuse_many(steps)
     return [as_written(beat_period_s(*periods) * k / steps) for k in range(steps)]
 
 

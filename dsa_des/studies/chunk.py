@@ -4,7 +4,6 @@ It is a pure function of the study and the chunk; whoever runs it, where and whe
 the same.
 """
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,37 +15,62 @@ import pyarrow.parquet as pq
 from dsa_des.errors import SceneError
 from dsa_des.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene import Scene
+from dsa_des.strangers import is_ours_to_obey, told
 from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, wanted_by
-from dsa_des.studies.study import Chunk, Study
+from dsa_des.studies.seal import parquet
+from dsa_des.studies.study import Chunk, Study, set_text
 from dsa_des.types import FloatArray
+
+#: What became of a run: it has results; it failed, and will again; its process died.
+DONE, FAILED, CRASHED = "done", "failed", "crashed"
 
 
 @dataclass(frozen=True)
 class Done:
-    """The result of a chunk: the bytes of its part, how many runs it holds, how many failed."""
+    """The result of a chunk: the bytes of its part, and how many runs it holds.
+
+    `failed` of them gave no result, and of those `crashed` because their process died.
+    """
 
     name: str
     content: bytes
     runs: int
     failed: int
+    crashed: int = 0
 
 
 def schema_of(study: Study) -> pa.Schema:
     """Return the columns of a study's parts."""
     scene = study.scene(0)
     metrics = [spec.build(scene) for spec in study.metrics]
+    return columns_of(
+        [(axis.column, axis.numeric) for axis in study.axes],
+        [(draw_column(draw.key), draw.numeric) for draw in study.draws],
+        [(result.name, result.kind) for metric in metrics for result in metric.results()],
+    )
+
+
+def columns_of(
+    axes: Sequence[tuple[str, bool]],
+    draws: Sequence[tuple[str, bool]],
+    results: Sequence[tuple[str, str]],
+) -> pa.Schema:
+    """Return the columns of a part.
+
+    Parameters
+    ----------
+    axes, draws : sequence of (column, whether it holds numbers)
+    results : sequence of (name, kind)
+    """
     fields = [("cell", pa.int64()), ("replica", pa.int64()), ("seed", pa.int64())]
-    fields += [(a.column, pa.float64() if a.numeric else pa.string()) for a in study.axes]
-    for draw in study.draws:
-        numeric = not any(isinstance(value, str) for value in draw.values)
-        column = draw_column(draw.key)
-        fields.append((column, pa.float64() if numeric else pa.string()))
-    for metric in metrics:
-        for result in metric.results():
-            fields.append((result.name, pa.float64()))
-            if result.kind == SHARE:
-                fields.append((result.name + TRIALS, pa.float64()))
-    fields += [("error", pa.string()), ("command", pa.string())]
+    fields += [
+        (name, pa.float64() if numeric else pa.string()) for name, numeric in [*axes, *draws]
+    ]
+    for name, kind in results:
+        fields.append((name, pa.float64()))
+        if kind == SHARE:
+            fields.append((name + TRIALS, pa.float64()))
+    fields += [("status", pa.string()), ("error", pa.string()), ("command", pa.string())]
     return pa.schema(fields)
 
 
@@ -59,30 +83,34 @@ def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
     tables = [_run_cell(study, schema, *part) for part in chunk.runs]
-    table = pa.concat_tables(tables).combine_chunks()
-    return Done(chunk.name, _parquet(table), table.num_rows, _failed(table))
+    return done_of(chunk.name, pa.concat_tables(tables))
 
 
-def failed_chunk(study: Study, chunk: Chunk, error: str) -> Done:
-    """Return the part of a chunk that nobody could run: every run of it failed with `error`."""
+def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
+    """Return the rows of runs whose process died every time."""
     schema = schema_of(study)
     tables = []
     for cell, start, end in chunk.runs:
         rows = _leading(study, cell, range(start, end))
-        rows["error"] = [error] * (end - start)
+        rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
+        rows["status"] = [CRASHED] * (end - start)
         tables.append(_table(study, schema, cell, rows, {}))
-    table = pa.concat_tables(tables).combine_chunks()
-    return Done(chunk.name, _parquet(table), table.num_rows, table.num_rows)
+    return done_of(chunk.name, pa.concat_tables(tables))
 
 
-def _parquet(table: pa.Table) -> bytes:
-    buffer = io.BytesIO()
-    pq.write_table(table, buffer, compression="zstd")
-    return buffer.getvalue()
+def done_of(name: str, table: pa.Table) -> Done:
+    """Return rows as the result of a chunk."""
+    table = table.combine_chunks()
+    status = table["status"].to_pylist()
+    failed = len(status) - status.count(DONE)
+    return Done(name, parquet(table), table.num_rows, failed, status.count(CRASHED))
 
 
-def _failed(table: pa.Table) -> int:
-    return table.num_rows - int(table["error"].null_count)
+def joined(name: str, parts: Sequence[Done]) -> Done:
+    """Return pieces of a chunk as one, in order of cell and replica."""
+    tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
+    order = [("cell", "ascending"), ("replica", "ascending")]
+    return done_of(name, pa.concat_tables(tables).sort_by(order))
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
@@ -99,8 +127,7 @@ def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[
         rows[axis.column] = [label if axis.numeric else str(label)] * len(numbers)
     for draw in study.draws:
         values = [replica.changes[draw.key] for replica in replicas]
-        text = any(isinstance(value, str) for value in draw.values)
-        rows[draw_column(draw.key)] = [str(v) if text else float(v) for v in values]
+        rows[draw_column(draw.key)] = [float(v) if draw.numeric else set_text(v) for v in values]
     return rows
 
 
@@ -112,6 +139,8 @@ def _table(
     values: Mapping[str, FloatArray],
 ) -> pa.Table:
     count = len(rows["cell"])
+    if "status" not in rows:
+        rows["status"] = [DONE if error is None else FAILED for error in rows["error"]]
     rows["command"] = [
         None if error is None else study.command(cell, number)
         for error, number in zip(rows["error"], rows["replica"], strict=True)
@@ -136,7 +165,7 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number) for number in numbers]
-    outcomes = run_replicas(scene, replicas, wanted=wanted_by(metrics))
+    outcomes = _outcomes(scene, replicas, wanted_by(metrics))
     good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
     for k, outcome in enumerate(outcomes):
         if isinstance(outcome, Failed):
@@ -149,6 +178,18 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
     for k, text in errors.items():
         rows["error"][good[k]] = text
     return _table(study, schema, cell, rows, values)
+
+
+def _outcomes(
+    scene: Scene, replicas: Sequence[Replica], wanted: Mapping[str, Any]
+) -> list[Recorded | Failed]:
+    """Run replicas; whatever one of them raises, memory that is short included, is its error."""
+    try:
+        return run_replicas(scene, replicas, wanted=wanted)
+    except (Exception, SystemExit) as error:  # a block that wants to leave does not end the study
+        if len(replicas) == 1:
+            return [Failed(f"{type(error).__name__}: {error}")]
+    return [_outcomes(scene, [replica], wanted)[0] for replica in replicas]
 
 
 def _measured(
@@ -164,10 +205,11 @@ def _measured(
     for metric in metrics:
         try:
             found.update(metric.measure(group))
-        except Exception as error:
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
             if len(runs) == 1:
-                what = f"metric {type(metric).__name__}: {type(error).__name__}: {error}"
-                return {}, {0: what}
+                return {}, {0: f"metric {type(metric).__name__}: {told(error)}"}
             return _one_by_one(scene, metrics, runs)
     return found, {}
 

@@ -17,6 +17,8 @@ import numpy as np
 from dsa_des.randomness import key_of
 from dsa_des.types import IntArray
 
+#: No normal draw lies farther out: the smallest probability is 2^-54.
+_MOST_SIGMA = 9.0
 KINDS = ("uniform", "normal", "choice", "latin_hypercube")
 
 
@@ -39,6 +41,11 @@ class Draw:
     kind: str
     values: tuple[Any, ...]
     stratified: bool = False
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all that may be drawn are numbers."""
+        return all(isinstance(value, int | float) for value in self.values)
 
     def value(self, seed: int, replica: int, batch: int) -> Any:
         """Return the value of one replica.
@@ -117,15 +124,30 @@ def parse_draw(key: str, table: Any) -> Draw:
     if kind == "choice":
         if not values:
             raise ValueError("choice is empty: give at least one value")
+        if any(isinstance(value, int) and abs(value) >= 2**63 for value in values):
+            raise ValueError("choice holds a whole number beyond 2^63")
         return Draw(key, kind, tuple(values))
     low, high = _two_numbers(kind, values)
     if kind == "normal":
         if high < 0:
             raise ValueError(f"normal: the standard deviation is {high}: it must be 0 or more")
+        _check_size(key, kind, low - _MOST_SIGMA * high, low + _MOST_SIGMA * high)
         return Draw(key, kind, (low, high))
     if high < low:
         raise ValueError(f"{kind}: the range [{low}, {high}] is empty; the lower bound comes first")
+    _check_size(key, kind, low, high)
     return Draw(key, "uniform", (low, high), stratified=kind == "latin_hypercube")
+
+
+def _check_size(key: str, kind: str, low: float, high: float) -> None:
+    """Refuse a range that numbers cannot span."""
+    try:
+        spans = math.isfinite(high - low)
+        exact(key, low), exact(key, high)
+    except (OverflowError, ValueError):
+        spans = False
+    if not spans:
+        raise ValueError(f"{kind}: values from {low:g} to {high:g} are too large for numbers")
 
 
 def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
@@ -133,6 +155,10 @@ def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
         isinstance(value, bool) or not isinstance(value, int | float) for value in values
     ):
         raise ValueError(f"{kind} takes two numbers")
-    if not all(map(math.isfinite, values)):
+    try:
+        low, high = map(float, values)
+    except OverflowError:
+        raise ValueError(f"{kind}: holds a whole number that is too large") from None
+    if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{kind} = {values}: must be finite")
-    return float(values[0]), float(values[1])
+    return low, high

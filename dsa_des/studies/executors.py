@@ -8,18 +8,22 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 from dsa_des.errors import UsageError
-from dsa_des.studies.chunk import Done, failed_chunk, run_chunk
+from dsa_des.studies.attempts import Attempts, Piece
+from dsa_des.studies.chunk import Done, run_chunk
 from dsa_des.studies.study import Chunk, Study
 
-#: How often a chunk may lose its worker before its runs are tried one by one.
-_PATIENCE = 2
+#: How many pieces a worker has at a time: the next one is there when it ends the first.
+_AHEAD = 2
 _CONNECT_TIMEOUT_S = 5
+_SAFE_PATH = "PYTHONSAFEPATH"
 
 
 class Executor(Protocol):
@@ -45,10 +49,10 @@ class Serial:
 
 
 class Local:
-    """Runs chunks in a pool of processes on this machine.
+    """Runs chunks in processes on this machine.
 
-    When a worker dies the pool is made anew and what it was at is run again. A chunk that keeps
-    losing its worker is run by itself, run by run: those that kill it are recorded as failed.
+    Each process is a pool of its own, so that one that dies takes nothing with it but what it was
+    at, and that is known. It is replaced, and `Attempts` says what is run again.
 
     Parameters
     ----------
@@ -56,75 +60,74 @@ class Local:
     """
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
-        self._pool: ProcessPoolExecutor | None = None
+        self._count = workers
+        self._workers: list[_Worker] = []
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks; two per worker are under way at a time."""
-        todo = iter(chunks)
-        again: list[Chunk] = []
-        losses: dict[str, int] = {}
-        running: dict[Future[Done], Chunk] = {}
+        attempts = Attempts(study, chunks)
+        if not self._workers or any(w.study is not study or len(w) for w in self._workers):
+            self.close()
+            self._workers = [_Worker(study) for _ in range(self._count)]
         while True:
-            while len(running) < 2 * self.workers:
-                chunk = again.pop() if again else next(todo, None)
-                if chunk is None:
-                    break
-                try:
-                    running[self._submit(study, chunk)] = chunk
-                except BrokenProcessPool:
-                    again.append(chunk)
-                    if running:
-                        break
-                    self._renew()
+            for depth in range(1, _AHEAD + 1):  # each worker has something before any has more
+                for worker in self._workers:
+                    if len(worker) < depth and (piece := attempts.next()) is not None:
+                        worker.submit(piece)
+            running = [future for worker in self._workers for future in worker.futures()]
             if not running:
                 return
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
-            broken = False
-            for future in finished:
-                chunk = running.pop(future)
-                try:
-                    yield future.result()
-                except BrokenProcessPool:
-                    broken = True
-                    again.append(chunk)
-                    losses[chunk.name] = losses.get(chunk.name, 0) + 1
-            if broken:
-                again += running.values()
-                running.clear()
-                self._renew()
-                for chunk in [c for c in again if losses.get(c.name, 0) > _PATIENCE]:
-                    again.remove(chunk)
-                    yield self._alone(study, chunk)
-
-    def _submit(self, study: Study, chunk: Chunk) -> "Future[Done]":
-        if self._pool is None:
-            self._pool = _new_pool(self.workers)
-        return self._pool.submit(run_chunk, study, chunk)
-
-    def _renew(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = None
-
-    def _alone(self, study: Study, chunk: Chunk) -> Done:
-        """Run a chunk's runs one by one, each in a worker of its own if need be."""
-        parts: list[Done] = []
-        pool = _new_pool(1)
-        for cell, start, end in chunk.runs:
-            for number in range(start, end):
-                single = Chunk(chunk.name, ((cell, number, number + 1),))
-                try:
-                    parts.append(pool.submit(run_chunk, study, single).result())
-                except BrokenProcessPool:
-                    pool.shutdown(wait=False)
-                    pool = _new_pool(1)
-                    parts.append(failed_chunk(study, single, "the process that ran it died"))
-        pool.shutdown()
-        return joined(chunk.name, parts)
+            wait(running, return_when=FIRST_COMPLETED)
+            for worker in self._workers:
+                yield from _finished(worker, attempts)
 
     def close(self) -> None:
         """Stop all workers."""
+        for worker in self._workers:
+            worker.stop()
+        self._workers = []
+
+
+class _Worker:
+    """One process, and the pieces it was given, in order."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self._pool: ProcessPoolExecutor | None = None
+        self._given: deque[tuple[Future[Done], Piece]] = deque()
+
+    def __len__(self) -> int:
+        return len(self._given)
+
+    def futures(self) -> list["Future[Done]"]:
+        """What is under way."""
+        return [future for future, _ in self._given]
+
+    def submit(self, piece: Piece) -> None:
+        """Run a piece after those that were given before."""
+        if self._pool is None:
+            self._pool = _new_pool(self.study)
+        try:
+            with not_from_here():
+                future = self._pool.submit(_work, piece.chunk)
+        except BrokenProcessPool as error:  # it died since we looked
+            future = Future()
+            future.set_exception(error)
+        self._given.append((future, piece))
+
+    def pop(self) -> "tuple[Future[Done], Piece] | None":
+        """Return the first piece if it is finished or lost."""
+        return self._given.popleft() if self._given and self._given[0][0].done() else None
+
+    def renew(self) -> list[Piece]:
+        """Give up a process that died; return what it never came to."""
+        left = [piece for _, piece in self._given]
+        self._given.clear()
+        self.stop()
+        return left
+
+    def stop(self) -> None:
+        """End the process."""
         if self._pool is not None:
             processes = list((getattr(self._pool, "_processes", None) or {}).values())
             self._pool.shutdown(wait=False, cancel_futures=True)
@@ -133,32 +136,53 @@ class Local:
             self._pool = None
 
 
-def joined(name: str, parts: list[Done]) -> Done:
-    """Return parts of a chunk as one."""
-    import io
+def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
+    while (first := worker.pop()) is not None:
+        future, piece = first
+        try:
+            found = attempts.done(piece, future.result())
+        except BrokenProcessPool:
+            for other in worker.renew():
+                attempts.give_back(other)
+            found = attempts.lost(piece)
+        if found is not None:
+            yield found
 
-    import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    table = pa.concat_tables([pq.read_table(io.BytesIO(part.content)) for part in parts])
-    buffer = io.BytesIO()
-    pq.write_table(table.combine_chunks(), buffer, compression="zstd")
-    failed = sum(part.failed for part in parts)
-    return Done(name, buffer.getvalue(), table.num_rows, failed)
+@contextmanager
+def not_from_here() -> Iterator[None]:
+    """Let processes that are started meanwhile import nothing of the working directory.
+
+    Python puts it first on the module path of a process that it starts with ``-c``.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
-def _new_pool(workers: int) -> ProcessPoolExecutor:
+def _new_pool(study: Study) -> ProcessPoolExecutor:
     # A fork of a process with threads (Arrow has some) may hang; workers start afresh instead.
     methods = multiprocessing.get_all_start_methods()
     method = "forkserver" if "forkserver" in methods else "spawn"
     context = multiprocessing.get_context(method)
     if method == "forkserver":  # what all workers need is imported once
         context.set_forkserver_preload(["dsa_des.studies.executors"])
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
+    return ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker, initargs=(study,))
 
 
-def _start_worker() -> None:
+#: What a worker runs chunks of: sent once, when it starts.
+_studied: list[Study] = []
+
+
+def _start_worker(study: Study) -> None:
     """Leave ctrl-C to the parent, and do not outlive it."""
+    _studied[:] = [study]
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -168,6 +192,13 @@ def _start_worker() -> None:
             os._exit(1)
 
         threading.Thread(target=follow, daemon=True).start()
+
+
+def _work(chunk: Chunk) -> Done:
+    try:
+        return run_chunk(_studied[0], chunk)
+    except KeyboardInterrupt:  # raised by a block: ctrl-C does not come here
+        os._exit(1)
 
 
 class Dask:
@@ -210,37 +241,34 @@ class Dask:
             ) from error
 
     def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
-        """Run all chunks; Dask itself runs again what a dead worker was at."""
+        """Run all chunks; Dask itself first runs again what a dead worker was at."""
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
 
-        waiting = iter(chunks)
-        names: dict[Any, Chunk] = {}
+        attempts = Attempts(study, chunks)
+        given: dict[Any, Piece] = {}
         running = as_completed(loop=self._client.loop)
+        most = max(8, 4 * len(self._client.scheduler_info(n_workers=-1)["workers"]))
 
-        def submit() -> bool:
-            chunk = next(waiting, None)
-            if chunk is None:
-                return False
-            future = self._client.submit(run_chunk, study, chunk, pure=False)
-            names[future.key] = chunk
-            running.add(future)
-            return True
+        def submit() -> None:
+            while len(given) < most and (piece := attempts.next()) is not None:
+                future = self._client.submit(run_chunk, study, piece.chunk, pure=False)
+                given[future.key] = piece
+                running.add(future)
 
-        for _ in range(max(8, 4 * len(self._client.scheduler_info(n_workers=-1)["workers"]))):
-            if not submit():
-                break
-        if not names:
+        submit()
+        if not given:
             return
         for future in running:
-            chunk = names.pop(future.key)
+            piece = given.pop(future.key)
             try:
-                done = future.result()
+                found = attempts.done(piece, future.result())
             except KilledWorker:
-                done = failed_chunk(study, chunk, "the process that ran it died")
+                found = attempts.lost(piece)
             submit()
-            yield done
-            if not names:
+            if found is not None:
+                yield found
+            if not given:
                 return
 
     def close(self) -> None:

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
-from dsa_des.drawing import drawing
+from dsa_des.drawing import drawing, figure_text, tight
 from dsa_des.studies.summary import Compared, Line
 
 #: Okabe and Ito's colours and markers, told apart with any kind of colour vision.
@@ -15,13 +15,22 @@ _STYLES = (
     ("#56B4E9", "P"), ("#000000", "X"),
 )  # fmt: skip
 _MOST_LINES = 12
+#: Letters in a title.
+_TITLE = 80
+#: More texts than this below an axis cannot be told apart.
+_MOST_NAMES = 60
+#: Where a figure is drawn to.
+Target = Path | BinaryIO
 
 
 def readable(name: str) -> str:
     """Return ``declaration range (radar), m`` for ``declaration_range_m.radar``."""
     words, _, who = name.partition(".")
     unit = unit_of(words)
-    words, who = words.removesuffix(f"_{unit}").replace("_", " "), who.replace("_", " ")
+    words, who = (
+        words.removesuffix(f"_{unit}").replace("_", " "),
+        figure_text(who.replace("_", " ")),
+    )
     return f"{words}{f' ({who})' if who else ''}{f', {unit}' if unit else ''}"
 
 
@@ -57,18 +66,18 @@ class Places:
             others.sort(key=lambda k: self.axes[k] != by)
         found: dict[str, list[Line]] = {}
         for line in self.of(metric):
-            label = ", ".join(_label(self.axes[k], line.at[k], len(others)) for k in others)
-            found.setdefault(label, []).append(line)
+            named = ", ".join(_label(self.axes[k], line.at[k], len(others)) for k in others)
+            found.setdefault(named, []).append(line)
         return found
 
 
 def _label(axis: str, value: Any, many: int) -> str:
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text if many == 1 and not isinstance(value, float) else f"{axis} = {text}"
+    text = f"{value:g}" if isinstance(value, float) else figure_text(value)
+    return text if many == 1 and not isinstance(value, float) else f"{figure_text(axis)} = {text}"
 
 
 def draw_axis(
-    path: Path,
+    path: Target,
     places: Places,
     metric: str,
     axis: str,
@@ -86,17 +95,17 @@ def draw_axis(
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
         series = list(places.series(metric, axis, by).items())
-        for number, (label, lines) in enumerate(series[:_MOST_LINES]):
+        for number, (who, lines) in enumerate(series[:_MOST_LINES]):
             colour, marker = _STYLES[number % len(_STYLES)]
             shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
             x = np.array([where[line.at[place]] for line in lines]) + shift
             known = any(not np.isnan(line.estimate.half_width) for line in lines)
-            seen = label or "simulated" + f", {100 * confidence:g} % interval" * known
+            seen = who or "simulated" + f", {100 * confidence:g} % interval" * known
             _points(top, x, lines, colour, marker, seen, join=numeric)
             expected = [line.expected for line in lines]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
-                note = f"analytic{', ' + label if label else ''}"
+                note = f"analytic{', ' + who if who else ''}"
                 top.plot(
                     x,
                     y,
@@ -108,14 +117,14 @@ def draw_axis(
                     zorder=1,
                 )
         top.set_ylabel(readable(metric))
-        top.set_title(title, loc="left")
+        top.set_title(figure_text(title, _TITLE), loc="left")
         top.legend()
         if shown:
             _differences(grid[1], shown, where, places.axes, axis, confidence)
         bottom = grid[-1]
-        bottom.set_xlabel(axis)
+        bottom.set_xlabel(figure_text(axis))
         _ticks(bottom, values, where, numeric)
-        figure.tight_layout()
+        tight(figure)
 
 
 def _positions(values: list[Any]) -> tuple[dict[Any, float], bool]:
@@ -127,7 +136,8 @@ def _positions(values: list[Any]) -> tuple[dict[Any, float], bool]:
 
 def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
     if not numeric:
-        axes.set_xticks(list(where.values()), [str(v) for v in values])
+        shown = values[:: -(-len(values) // _MOST_NAMES)]
+        axes.set_xticks([where[v] for v in shown], [str(v) for v in shown])
         axes.set_xlim(-0.5, len(values) - 0.5)
         return
     positive = [v for v in values if v > 0]
@@ -139,7 +149,7 @@ def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool)
 
 
 def _points(
-    axes: Any, x: Any, lines: list[Line], colour: str, marker: str, label: str, *, join: bool
+    axes: Any, x: Any, lines: list[Line], colour: str, marker: str, who: str, *, join: bool
 ) -> None:
     y = np.array([line.estimate.value for line in lines])
     low = np.array([line.estimate.low for line in lines])
@@ -147,7 +157,7 @@ def _points(
     bars = np.nan_to_num(np.abs([y - low, high - y]))
     axes.errorbar(
         x, y, yerr=bars, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
-        ls="-" if join else "none", label=label or None, zorder=2,
+        ls="-" if join else "none", label=who or None, zorder=2,
     )  # fmt: skip
 
 
@@ -160,7 +170,7 @@ def _differences(
     confidence: float,
 ) -> None:
     baseline = shown[0].baseline
-    text = f"{baseline:g}" if isinstance(baseline, float) else str(baseline)
+    text = f"{baseline:g}" if isinstance(baseline, float) else figure_text(baseline)
     axes.axhline(0.0, color="#888888", lw=0.8)
     groups: dict[tuple[Any, ...], list[Compared]] = {}
     for item in shown:
@@ -171,9 +181,9 @@ def _differences(
         x = np.array([where[item.value] for item in items])
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
-        label = ", ".join(_label(n, v, len(others)) for n, v in zip(others, at, strict=True))
+        who = ", ".join(_label(n, v, len(others)) for n, v in zip(others, at, strict=True))
         axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
-                      ls="none", label=label or None)  # fmt: skip
+                      ls="none", label=who or None)  # fmt: skip
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
@@ -196,7 +206,7 @@ def _signed(value: float) -> str:
     return ("+" if value > 0 else "") + _digits(value)
 
 
-def draw_heat(path: Path, places: Places, metric: str, x: str, y: str, title: str) -> None:
+def draw_heat(path: Target, places: Places, metric: str, x: str, y: str, title: str) -> None:
     """Draw a result over two axes; values of further axes are averaged."""
     across, up = places.axes.index(x), places.axes.index(y)
     lines = places.of(metric)
@@ -225,18 +235,18 @@ def draw_heat(path: Path, places: Places, metric: str, x: str, y: str, title: st
                 if not np.isnan(value):
                     ink = "white" if value < middle else "black"
                     axes.text(c, r, _digits(value), ha="center", va="center", color=ink, size=8)
-        axes.set_xlabel(x)
-        axes.set_ylabel(y)
-        axes.set_title(title, loc="left")
+        axes.set_xlabel(figure_text(x))
+        axes.set_ylabel(figure_text(y))
+        axes.set_title(figure_text(title, _TITLE), loc="left")
         figure.colorbar(image, label=readable(metric))
-        figure.tight_layout()
+        tight(figure)
 
 
 def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
-def draw_polar(path: Path, places: Places, metric: str, axis: str, title: str) -> None:
+def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str) -> None:
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     place = places.axes.index(axis)
     with drawing(6.2, 6.0, path) as figure:
@@ -244,7 +254,7 @@ def draw_polar(path: Path, places: Places, metric: str, axis: str, title: str) -
         axes.set_theta_zero_location("N")
         axes.set_theta_direction(-1)
         series = list(places.series(metric, axis, None).items())
-        for number, (label, lines) in enumerate(series[:_MOST_LINES]):
+        for number, (who, lines) in enumerate(series[:_MOST_LINES]):
             colour, marker = _STYLES[number % len(_STYLES)]
             lines = sorted(lines, key=lambda line: line.at[place])
             angle = np.radians([line.at[place] for line in lines])
@@ -255,17 +265,18 @@ def draw_polar(path: Path, places: Places, metric: str, axis: str, title: str) -
             ring = slice(None)
             if len(lines) > 2 and np.ptp(np.degrees(angle)) >= 270:
                 ring = np.append(np.arange(len(lines)), 0)  # type: ignore[assignment]
-            axes.plot(angle[ring], value[ring], color=colour, marker=marker, ms=4, label=label)
+            axes.plot(angle[ring], value[ring], color=colour, marker=marker, ms=4, label=who)
             axes.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         axes.set_ylim(bottom=0.0)
-        axes.set_title(f"{title}\n{readable(metric)} over {axis}", loc="left")
+        over = f"{readable(metric)} over {figure_text(axis)}"
+        axes.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
             axes.legend(loc="lower left", bbox_to_anchor=(-0.12, -0.12))
-        figure.tight_layout()
+        tight(figure)
 
 
 def draw_scatter(
-    path: Path, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
+    path: Target, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
 ) -> None:
     """Draw a result of two conditions against each other, one point per encounter or replica."""
     both = ~np.isnan(first) & ~np.isnan(second)
@@ -279,7 +290,7 @@ def draw_scatter(
             axes.plot(ends, ends, color="#888888", lw=0.8)
         axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color="#0072B2",
                   alpha=0.6, markeredgewidth=0)  # fmt: skip
-        axes.set_xlabel(f"{readable(metric)}: {names[0]}")
-        axes.set_ylabel(f"{readable(metric)}: {names[1]}")
-        axes.set_title(title, loc="left")
-        figure.tight_layout()
+        axes.set_xlabel(f"{readable(metric)}: {figure_text(names[0])}")
+        axes.set_ylabel(f"{readable(metric)}: {figure_text(names[1])}")
+        axes.set_title(figure_text(title, _TITLE), loc="left")
+        tight(figure)

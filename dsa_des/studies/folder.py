@@ -1,16 +1,19 @@
 """The folder of a study: one Parquet part per chunk, each there as a whole or not at all."""
 
-import hashlib
-import json
+import io
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+import re
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
-from dsa_des import __version__
+from pydantic import ValidationError
+
 from dsa_des.errors import UsageError
-from dsa_des.studies.draws import as_text
+from dsa_des.studies.identity import description_text
+from dsa_des.studies.record import StudyHead, StudyRecord
+from dsa_des.studies.safe_files import open_lock, read_regular, write_whole
+from dsa_des.studies.seal import is_sealed, sealed
 from dsa_des.studies.study import Study
 
 if TYPE_CHECKING:
@@ -18,10 +21,19 @@ if TYPE_CHECKING:
 
 STUDY_JSON = "study.json"
 PARTS = "parts"
+LOCK = ".lock"
+#: A part: the number of its round and its own.
+_PART = re.compile(r"part-(\d{3,})-\d{6,}\.parquet")
+_MOST_JSON_BYTES = 256 * 2**20
+
+_Head = TypeVar("_Head", bound=StudyHead)
 
 
 class StudyFolder:
     """Where a study keeps its results.
+
+    It may hold anything: what is not a regular file of this very study is no part of it, and
+    nothing is written through a link.
 
     Parameters
     ----------
@@ -31,205 +43,252 @@ class StudyFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.parts = path / PARTS
+        self._lock: int | None = None
+        self._record: StudyRecord | None = None
 
     def open(self, study: Study, *, resume: bool) -> None:
-        """Make the folder, or take up the one that is there.
+        """Make the folder, or take up the one that is there, and lock it until `close`.
 
         Raises
         ------
         UsageError
-            If it holds something else, another study, or results that were not to be resumed.
+            If it holds something else, another study, or results that were not to be resumed, or
+            if another process runs the study.
         """
-        about = description(study)
-        known = self.about() if (self.path / STUDY_JSON).is_file() else None
-        if known is not None and not resume:
+        text = description_text(study)
+        if self.path.is_symlink() and not self.path.exists():
+            raise UsageError(f"--out {self.path}: is a link to nothing; a folder is needed")
+        if self.path.exists() and not self.path.is_dir():
+            raise UsageError(f"--out {self.path}: is a file; a folder is needed")
+        try:
+            self._refuse_foreign()
+            self.parts.mkdir(parents=True, exist_ok=True)
+            self._take_lock()
+            # Only now is all that is there ours: before, it may have been another process's.
+            self._take_up(study, text, resume=resume)
+        except OSError as error:
+            self.close()
+            raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let other processes write into the folder."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def _refuse_foreign(self) -> None:
+        if self.parts.is_symlink():
+            raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
+        if os.path.lexists(self.path / STUDY_JSON) or not self.path.exists():
+            return
+        own = {LOCK, PARTS}  # a process was killed before it wrote what study it is
+        left = {entry.name for entry in self.path.iterdir()}
+        strange = {name for name in left - own if not name.startswith(f".{STUDY_JSON}.")}
+        if strange or (PARTS in left and any(self.parts.iterdir())):
+            raise UsageError(f"{self.path}: is a folder that holds something other than a study")
+
+    def _take_lock(self) -> None:
+        try:
+            import fcntl
+        except ImportError:  # no such locks on this system
+            return
+        try:
+            self._lock = open_lock(self.path / LOCK)
+        except OSError as error:
+            reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
+            raise UsageError(reason) from None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(f"{self.path}: another process is running this study") from None
+
+    def _take_up(self, study: Study, text: str, *, resume: bool) -> None:
+        known = os.path.lexists(self.path / STUDY_JSON)
+        if known and not resume:
             raise UsageError(
                 f"{self.path}: holds a study already; --resume continues it, --out names another"
             )
-        if known is not None and known["study_sha256"] != about["study_sha256"]:
-            raise UsageError(
-                f"{self.path}: holds another study or another version of it "
-                f"(made of {known['study']}), or an encounter file has changed since; results of "
-                "the two cannot be mixed"
-            )
-        if self.path.exists() and not self.path.is_dir():
-            raise UsageError(f"--out {self.path}: is a file; a folder is needed")
-        if known is None and self.path.exists() and any(self.path.iterdir()):
-            raise UsageError(f"{self.path}: is a folder that holds something other than a study")
-        try:
-            self.parts.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
-        for left in self.parts.glob(".*"):  # of a process that was killed while it wrote
-            left.unlink()
-        if known is None:
-            text = json.dumps(about, indent=2) + "\n"
+        self._record = StudyRecord.model_validate_json(text)
+        if known:
+            head = self._read(StudyHead)
+            if head.study_sha256 != self._record.study_sha256:
+                raise UsageError(
+                    f"{self.path}: holds another study or another version of it "
+                    f"(made of {head.study}), or an encounter file has changed since; results "
+                    "of the two cannot be mixed"
+                )
+        self.part_names()
+        self._clear()
+        path = self.path / STUDY_JSON
+        if not known or read_regular(path) != text.encode():  # as an older version wrote it
             self.write_file(STUDY_JSON, text.encode())
 
-    def about(self) -> dict[str, Any]:
-        """Return what ``study.json`` says.
+    def _clear(self) -> None:
+        """Remove what processes left that were killed while they wrote."""
+        ours = re.compile(r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+")
+        for folder in (self.parts, self.path):
+            for left in folder.iterdir():
+                if ours.fullmatch(left.name):
+                    with suppress(OSError):
+                        left.unlink()
+
+    @property
+    def record(self) -> StudyRecord:
+        """What the folder says of its study.
 
         Raises
         ------
         UsageError
             If the folder is not a study.
         """
-        try:
-            text = (self.path / STUDY_JSON).read_text(encoding="utf-8")
-        except OSError:
-            raise UsageError(
-                f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}"
-            ) from None
-        try:
-            content: Any = json.loads(text)
-        except ValueError:
-            content = None
-        needed = {"study", "scene", "study_sha256", "tables"}
-        if not isinstance(content, dict) or not needed <= set(content):
-            raise UsageError(f"{self.path / STUDY_JSON}: is damaged, or not of a study")
-        return content
+        if self._record is None:
+            self._record = self._read(StudyRecord)
+        return self._record
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other processes from writing into the folder.
+    def _read(self, model: type[_Head]) -> _Head:
+        path = self.path / STUDY_JSON
+        if not os.path.lexists(path):
+            raise UsageError(f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}")
+        try:
+            return model.model_validate_json(read_regular(path, _MOST_JSON_BYTES))
+        except OSError as error:
+            raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+        except ValidationError as error:
+            what = "is damaged, or not of a study"
+            first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+            if first["loc"]:
+                key = ".".join(map(str, first["loc"]))
+                what += f" of this version of dsa_des ({key}: {first['msg']})"
+            raise UsageError(f"{path}: {what}") from None
+        except (RecursionError, MemoryError):
+            raise UsageError(f"{path}: is damaged, or not of a study") from None
+
+    # -- parts -----------------------------------------------------------------------------
+
+    def part_names(self) -> list[str]:
+        """Return the names of the parts that are there, good or not, in order.
 
         Raises
         ------
         UsageError
-            If another process runs this study.
+            If there are files among them that no study writes.
         """
+        if self.parts.is_symlink():
+            raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
         try:
-            import fcntl
-        except ImportError:  # no such locks on this system
-            yield
-            return
-        with (self.path / ".lock").open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise UsageError(f"{self.path}: another process is running this study") from None
-            yield
+            files = sorted(e.name for e in self.parts.iterdir() if e.name.endswith(".parquet"))
+        except OSError:
+            return []
+        for file in files:
+            if _PART.fullmatch(file) is None and not file.startswith("."):
+                raise UsageError(f"{self.parts / file}: is no part of a study; move it away")
+        return [file.removesuffix(".parquet") for file in files if not file.startswith(".")]
 
-    def has(self, name: str) -> bool:
-        """Return whether a part is there and can be read."""
+    def part(self, name: str) -> "pa.Table | None":
+        """Return the rows of a part; None if it is not there, damaged, or of another study."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        path = self.parts / f"{name}.parquet"
-        if not path.exists():
-            return False
         try:
-            pq.read_metadata(path)
-        except (OSError, pa.ArrowInvalid):
-            return False
-        return True
-
-    def failed_in(self, name: str) -> tuple[int, int]:
-        """Return how many runs a part holds and how many of them failed."""
-        import pyarrow.parquet as pq
-
-        column = pq.ParquetFile(self.parts / f"{name}.parquet").read(columns=["error"])["error"]
-        return len(column), len(column) - column.null_count
+            content = read_regular(self.parts / f"{name}.parquet")
+            if not is_sealed(content, self._owner(name)):
+                return None
+            table = pq.read_table(io.BytesIO(content)).replace_schema_metadata(None)
+        except (OSError, MemoryError, pa.ArrowException):
+            return None
+        return table if _fits(table, self.record) else None
 
     def write_part(self, name: str, content: bytes) -> None:
-        """Write a part under a temporary name and rename it.
+        """Write a part as a whole, sealed as one of this study.
 
         Raises
         ------
         OSError
             If it cannot be written; nothing is left behind then.
         """
-        _write(self.parts / f"{name}.parquet", content)
+        write_whole(self.parts / f"{name}.parquet", sealed(content, self._owner(name)))
+
+    def remove_part(self, name: str) -> None:
+        """Remove a part that no longer belongs to the study."""
+        (self.parts / f"{name}.parquet").unlink(missing_ok=True)
+
+    def _owner(self, name: str) -> str:
+        return f"{self.record.study_sha256} {name}"
+
+    def results(self, before_round: int | None = None) -> "pa.Table":
+        """Return the rows of all parts, in order of cell and replica.
+
+        Parameters
+        ----------
+        before_round : int, optional
+            Only those of earlier rounds.
+
+        Raises
+        ------
+        UsageError
+            If there are none, or if one is damaged or of another study.
+        """
+        import pyarrow as pa
+
+        names = self.part_names()
+        if before_round is not None:
+            names = [name for name in names if int(name.split("-")[1]) < before_round]
+        if not names:
+            raise UsageError(f"{self.path}: holds no results yet")
+        tables = {name: self.part(name) for name in names}
+        damaged = [f"{name}.parquet" for name, table in tables.items() if table is None]
+        if damaged:
+            shown = ", ".join(damaged[:_MOST_NAMED])
+            if len(damaged) > _MOST_NAMED:
+                shown += f" and {len(damaged) - _MOST_NAMED} more"
+            raise UsageError(
+                f"{self.parts}: cannot be read: {shown}; --resume writes damaged parts anew, "
+                "those of another study must be moved away"
+            )
+        table = pa.concat_tables([table for table in tables.values() if table is not None])
+        return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
+
+    # -- other files -----------------------------------------------------------------------
 
     def write_file(self, name: str, content: bytes) -> None:
         """Write a file beside the parts as a whole."""
-        _write(self.path / name, content)
+        write_whole(self.path / name, content)
 
-    def results(self) -> "pa.Table":
-        """Return the rows of all parts, in order of cell and replica."""
+    def write_table(self, name: str, content: bytes) -> None:
+        """Write a table beside the parts, sealed as one of this study."""
+        self.write_file(name, sealed(content, self._owner(name)))
+
+    def table(self, name: str) -> "pa.Table | None":
+        """Return a table beside the parts; None if it is not there or not of this study."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        files = sorted(self.parts.glob("*.parquet"))
-        if not files:
-            raise UsageError(f"{self.path}: holds no results yet")
         try:
-            table = pa.concat_tables([pq.ParquetFile(file).read() for file in files])
-        except (OSError, pa.ArrowInvalid):
-            damaged = ", ".join(file.name for file in files if not self.has(file.stem))
-            raise UsageError(
-                f"{self.parts}: cannot be read: {damaged}; --resume writes damaged parts anew"
-            ) from None
-        return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
+            content = read_regular(self.path / name)
+            if not is_sealed(content, self._owner(name)):
+                return None
+            return pq.read_table(io.BytesIO(content))
+        except (OSError, MemoryError, pa.ArrowException):
+            return None
 
 
-def _write(path: Path, content: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
+#: How many damaged parts a message names.
+_MOST_NAMED = 10
 
 
-def description(study: Study) -> dict[str, Any]:
-    """Return the content of ``study.json``: what fixes every result, and how to read them."""
-    identity: dict[str, Any] = {
-        "scene": study.base.data,
-        "seed": study.seed,
-        "replicas": study.replicas,
-        "axes": [[axis.key, axis.labels, axis.sets, axis.swaps] for axis in study.axes],
-        "draws": [[draw.key, draw.kind, draw.values, draw.stratified] for draw in study.draws],
-        "metrics": [[spec.name, spec.keys] for spec in study.metrics],
-        "sets": study.sets,
-        "swaps": study.swaps,
-        "runs_per_chunk": study.runs_per_chunk,
-        "stop_when": None if study.stop_when is None else vars(study.stop_when),
-        "version": __version__,
-    }
-    files = _files_in([study.base.data, study.sets, [axis.sets for axis in study.axes]])
-    identity["files"] = {str(path): _sha256(path) for path in sorted(files)}
-    text = json.dumps(identity, sort_keys=True, default=as_text)
-    return {
-        "study": str(study.path.resolve()),
-        "title": study.title,
-        "scene": str(study.scene_path.resolve()),
-        "study_sha256": hashlib.sha256(text.encode()).hexdigest(),
-        "seed": study.seed,
-        "cells": len(study.cells),
-        "replicas": study.replicas,
-        "axes": [
-            {"column": axis.column, "values": axis.labels, "over": axis.column in study.over}
-            for axis in study.axes
-        ],
-        "version": __version__,
-        "tables": study.tables,
-    }
+def _fits(table: "pa.Table", record: StudyRecord) -> bool:
+    """Return whether rows have the columns of a study, and values where there must be some."""
+    import pyarrow.compute as pc
 
-
-def _files_in(value: Any) -> set[Path]:
-    """Return the files that values name: encounters, terrain, tables.
-
-    Their content fixes results as much as the values do.
-    """
-    if isinstance(value, Mapping):
-        return _files_in(list(value.values()))
-    if isinstance(value, list | tuple):
-        return set().union(*map(_files_in, value))
-    if not isinstance(value, str):
-        return set()
-    path = getattr(value, "folder", Path()) / Path(value)
-    try:
-        return {path.resolve()} if path.is_absolute() and path.is_file() else set()
-    except (OSError, ValueError):  # a text that can be no path
-        return set()
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    if not table.schema.equals(record.schema_of_parts()):
+        return False
+    axes = [axis.column for axis in record.axes]
+    if any(table[name].null_count for name in ("cell", "replica", "seed", "status", *axes)):
+        return False
+    if any(not pc.all(pc.is_finite(table[a.column])).as_py() for a in record.axes if a.numeric):
+        return False
+    cells = pc.min_max(table["cell"]).as_py()
+    return table.num_rows > 0 and cells["min"] >= 0 and cells["max"] < record.cells

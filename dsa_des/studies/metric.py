@@ -15,8 +15,8 @@ import numpy as np
 from dsa_des.component import Component, Parameters
 from dsa_des.entry_points import registered
 from dsa_des.errors import did_you_mean
+from dsa_des.foreign import NotImportable, load_named, load_point
 from dsa_des.message import Columns, Text
-from dsa_des.registry import UnknownType, import_named
 from dsa_des.replicas import Recorded, Replica, scene_of
 from dsa_des.scene import Scene
 from dsa_des.types import FloatArray
@@ -179,20 +179,14 @@ def find_metric(name: str) -> type[Metric]:
     ValueError
         If there is none of this name, or it cannot be loaded.
     """
-    if ":" in name:
-        try:
-            found = import_named(name)
-        except UnknownType as error:
-            raise ValueError(str(error)) from None
-    else:
-        point = registered(METRICS).get(name)
-        if point is None:
-            hint = did_you_mean(name, registered(METRICS))
-            raise ValueError(f"unknown metric{hint} (or module:Class)")
-        try:
-            found = point.load()
-        except Exception as error:
-            raise ValueError(f"cannot be imported from {point.value}: {error}") from error
+    point = registered(METRICS).get(name)
+    if point is None and ":" not in name:
+        hint = did_you_mean(name, registered(METRICS))
+        raise ValueError(f"unknown metric{hint} (or module:Class)")
+    try:
+        found = load_named(name, "metrics") if point is None else load_point(point, "metrics")
+    except NotImportable as error:
+        raise ValueError(str(error)) from error.__cause__
     if not (isinstance(found, type) and issubclass(found, Metric)):
         raise ValueError(f"{name} is not a dsa_des.studies.metric.Metric")
     return found

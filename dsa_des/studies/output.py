@@ -1,22 +1,29 @@
 """What a study leaves beside its parts: ``summary.parquet``, ``differences.parquet``, figures."""
 
+import hashlib
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from dsa_des.errors import SceneError
+from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas import scene_of
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.metric import NUMBER
-from dsa_des.studies.runner import results_of
+from dsa_des.studies.record import FigureRecord, StudyRecord
+from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
 
 #: Replicas whose random draws an analytic answer is averaged over.
 _EXPECTED_OVER = 64
 _MOST_SCATTERS = 6
+#: Bytes of a file's name, with room for what is put around it while it is written.
+_LONGEST_NAME = 200
+#: Letters of a figure's title.
+_LONGEST_TITLE = 200
+SUMMARY, DIFFERENCES = "summary.parquet", "differences.parquet"
 
 
 class Tables:
@@ -24,30 +31,48 @@ class Tables:
 
     Parameters
     ----------
-    study : Study
+    study : Study or StudyRecord
+        A record tells how to read the tables and nothing else: with it no scene is read.
     folder : StudyFolder
         With results.
     """
 
-    def __init__(self, study: Study, folder: StudyFolder) -> None:
-        self.study, self.folder = study, folder
-        self.results = results_of(study)
-        axes = [axis.column for axis in study.axes]
-        self.rows = Rows(folder.results(), axes, study.over)
+    def __init__(self, study: Study | StudyRecord, folder: StudyFolder) -> None:
+        self.folder = folder
+        self.study = study if isinstance(study, Study) else None
+        self.record = StudyRecord.of(study) if isinstance(study, Study) else study
+        record = self.record
+        self.results = record.results_list()
+        axes = [axis.column for axis in record.axes]
+        self.rows = Rows(folder.results(), axes, record.over)
+        expected = self._earlier() if self.study is None else self._expected(self.study)
         self.lines: list[Line] = summarise(
-            self.rows, self.results, study.confidence, study.interval, self._expected()
+            self.rows, self.results, record.confidence, record.interval, expected
         )
         self.compared: list[Compared] = []
-        if study.baseline is not None and study.baseline[0] in self.rows.axes:
-            axis, value = study.baseline
-            value = float(value) if isinstance(value, int) else value
+        #: The axis along which values are compared, and with which.
+        self.baseline: tuple[str, Any] | None = None
+        if record.compare is not None and record.compare[0] in self.rows.axes:
+            axis, value = record.compare
+            self.baseline = axis, float(value) if isinstance(value, int) else value
             self.compared = compare_axis(
-                self.rows, axis, value, self.results, study.confidence, study.interval
+                self.rows, *self.baseline, self.results, record.confidence, record.interval
             )
 
-    def _expected(self) -> dict[tuple[str, tuple[Any, ...]], float]:
+    def _earlier(self) -> dict[tuple[str, tuple[Any, ...]], float]:
+        """Return the analytic answers that the folder's summary holds."""
+        table = self.folder.table(SUMMARY)
+        if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):
+            return {}
+        found = {}
+        for row in table.to_pylist():
+            if isinstance(row["expected"], float):
+                at = tuple(row[name] for name in self.rows.axes)
+                found[str(row["result"]), at] = row["expected"]
+        return found
+
+    def _expected(self, study: Study) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers at every place, averaged over draws and encounters."""
-        study = self.study
         sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
         replicas = [study.replica(k) for k in range(min(study.replicas, _EXPECTED_OVER))]
         for cell in range(len(study.cells)):
@@ -73,16 +98,16 @@ class Tables:
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
         """Return the lines of some results; by default those the study draws or waits for."""
-        wanted = set(only) or {str(f["metric"]) for f in self.study.figures if "metric" in f}
-        if self.study.stop_when is not None and not only:
-            wanted.add(self.study.stop_when.metric)
+        wanted = set(only) or {f.metric for f in self.record.figures if f.metric is not None}
+        if self.record.stop_when is not None and not only:
+            wanted.add(self.record.stop_when.metric)
         return [line for line in self.lines if not wanted or line.result.name in wanted]
 
     def write(self) -> None:
         """Write the summary and the differences."""
-        self.folder.write_file("summary.parquet", _parquet(self._summary_columns()))
+        self.folder.write_table(SUMMARY, _parquet(self._summary_columns()))
         if self.compared:
-            self.folder.write_file("differences.parquet", _parquet(self._difference_columns()))
+            self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
 
     def _summary_columns(self) -> dict[str, list[Any]]:
         columns: dict[str, list[Any]] = {
@@ -101,8 +126,8 @@ class Tables:
         return columns
 
     def _difference_columns(self) -> dict[str, list[Any]]:
-        assert self.study.baseline is not None
-        axis = self.study.baseline[0]
+        assert self.baseline is not None
+        axis = self.baseline[0]
         others = [name for name in self.rows.axes if name != axis]
         items = self.compared
         columns: dict[str, list[Any]] = {
@@ -130,41 +155,47 @@ class Tables:
         swap; by default those that the figures show, or the first ones.
         """
         paths: list[Path] = []
-        for number, figure in enumerate(self.study.figures):
-            path = self.folder.path / f"figure-{number + 1:02d}-{figure['kind']}.png"
-            if figure["kind"] == "run":
-                paths += self._draw_run(int(figure.get("cell", 0)), int(figure.get("replica", 0)))
-            elif self._draw_one(path, figure):
-                paths.append(path)
-        if self.compared and self.study.baseline is not None:
-            paths += self._draw_scatters(*self.study.baseline, only)
+        for number, figure in enumerate(self.record.figures):
+            if figure.kind == "run":
+                paths += self._draw_run(figure.cell, figure.replica)
+                continue
+            drawn = io.BytesIO()
+            if self._draw_one(drawn, figure):
+                paths.append(self._write(f"figure-{number + 1:02d}-{figure.kind}.png", drawn))
+        if self.compared and self.baseline is not None:
+            paths += self._draw_scatters(*self.baseline, only)
         return paths
 
-    def _draw_one(self, path: Path, figure: dict[str, Any]) -> bool:
+    def _write(self, name: str, drawn: io.BytesIO) -> Path:
+        self.folder.write_file(name, drawn.getvalue())
+        return self.folder.path / name
+
+    def _draw_one(self, target: BinaryIO, figure: FigureRecord) -> bool:
         places = Places(self.rows.axes, self.lines)
-        if not places.axes:
+        shown = (figure.axis, figure.x, figure.y)
+        if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False
-        metric = str(figure["metric"])
-        title = str(figure.get("title", self.study.title))
-        axis = str(figure.get("axis", places.axes[0]))
-        if figure["kind"] == "heat":
-            x = str(figure.get("x", places.axes[0]))
-            y = str(figure.get("y", next((a for a in places.axes if a != x), x)))
+        metric = str(figure.metric)
+        title = _shortened(self.record.title if figure.title is None else figure.title)
+        axis = figure.axis or places.axes[0]
+        if figure.kind == "heat":
+            x = figure.x or places.axes[0]
+            y = figure.y or next((a for a in places.axes if a != x), x)
             if x == y:
                 return False
-            draw_heat(path, places, metric, x, y, title)
-        elif figure["kind"] == "polar":
-            draw_polar(path, places, metric, axis, title)
+            draw_heat(target, places, metric, x, y, title)
+        elif figure.kind == "polar":
+            draw_polar(target, places, metric, axis, title)
         else:
-            own = self.study.baseline is not None and self.study.baseline[0] == axis
+            own = self.baseline is not None and self.baseline[0] == axis
             compared = self.compared if own else []
-            by = figure.get("lines")
-            draw_axis(path, places, metric, axis, by, compared, title, self.study.confidence)
+            by = figure.lines
+            draw_axis(target, places, metric, axis, by, compared, title, self.record.confidence)
         return True
 
     def telling(self, only: Sequence[str] = ()) -> list[str]:
         """Return the results worth a closer look: those named, drawn, or else that differ."""
-        drawn = [str(f["metric"]) for f in self.study.figures if "metric" in f]
+        drawn = [f.metric for f in self.record.figures if f.metric is not None]
         if only or drawn:
             return list(dict.fromkeys(only or drawn))
         differing = [c.result for c in self.compared if c.difference.paired.half_width > 0]
@@ -184,32 +215,42 @@ class Tables:
             for metric in self.telling(only):
                 _, first, second = paired(self.rows, metric, by_place[base], chosen)
                 name = "-".join(["scatter", metric, *map(str, at)])
-                path = self.folder.path / f"{_safe(name)}.png"
-                names = (str(baseline), str(at[place]))
-                draw_scatter(path, first, second, names, metric, self.study.title)
-                paths.append(path)
+                names, drawn = (str(baseline), str(at[place])), io.BytesIO()
+                draw_scatter(drawn, first, second, names, metric, _shortened(self.record.title))
+                paths.append(self._write(f"{safe_name(name)}.png", drawn))
         return paths
 
     def _draw_run(self, cell: int, replica: int) -> list[Path]:
         """Run one replica of a cell again and draw it as ``dsa-des run`` does."""
         from dsa_des.commands.run import record_run
 
+        if self.study is None:  # nothing of the folder's is imported, so nothing is run
+            return []
         if cell >= len(self.study.cells) or replica >= self.study.replicas:
             return []
         scene = scene_of(self.study.scene(cell), self.study.replica(replica))
         target = self.folder.path / f"run-cell-{cell}-replica-{replica}"
+        if target.is_symlink():
+            raise UsageError(f"{target}: is a link; the figures of a run are in a folder")
         record_run(scene, target)
         return sorted(target.glob("*.png"))
 
 
-def _safe(name: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+def _shortened(title: str) -> str:
+    return title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
+
+
+def safe_name(name: str) -> str:
+    """Return a text as the name of a file: without signs of a path, and short enough for one."""
+    plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    if len(plain.encode()) <= _LONGEST_NAME:
+        return plain
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    cut = plain.encode()[: _LONGEST_NAME - 9].decode("utf-8", "ignore")
+    return f"{cut}-{digest}"
 
 
 def _parquet(columns: dict[str, list[Any]]) -> bytes:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    buffer = io.BytesIO()
-    pq.write_table(pa.table(columns), buffer, compression="zstd")
-    return buffer.getvalue()
+    return parquet(pa.table(columns))

@@ -3,7 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
+from dsa_des.safe_text import shortened
 from dsa_des.studies.output import Tables
+
+#: Lines of a table that are printed.
+_MOST_SHOWN = 1000
 
 
 def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
@@ -18,16 +22,16 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     """
     from rich.table import Table
 
-    study = tables.study
+    study = tables.record
     lines = tables.shown_lines(only)
     level = f"{100 * study.confidence:g} %"
     unit = "encounters" if study.over else "replicas"
-    table = Table(title=study.title, title_justify="left", box=None, pad_edge=False)
+    table = Table(title=shortened(study.title), title_justify="left", box=None, pad_edge=False)
     expected = any(line.expected is not None for line in lines)
     heads = [*tables.rows.axes, "result", "mean or share", f"{level} interval", unit, "without"]
     for heading in [*heads, *(["analytic"] if expected else [])]:
         table.add_column(heading)
-    for line in lines:
+    for line in lines[:_MOST_SHOWN]:
         e = line.estimate
         row = [*map(short, line.at), line.result.name, short(e.value)]
         row += [f"{short(e.low)} to {short(e.high)}" + (" *" if e.few else "")]
@@ -37,7 +41,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         table.add_row(*row)
     console.print(table)
     if tables.compared:
+        console.print()
         console.print(_difference_table(tables, {line.result.name for line in lines}))
+    longest = max(len(lines), len(tables.compared))
+    if longest > _MOST_SHOWN:
+        console.print(f"... and {longest - _MOST_SHOWN:,} more lines in summary.parquet")
     few = [line for line in lines if line.estimate.few and line.estimate.count]
     if few:
         console.print(
@@ -49,10 +57,15 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         console.print("all results: summary.parquet, or dsa-des study show FOLDER")
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
+    if tables.rows.crashed:
+        console.print(
+            f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "
+            "--resume tries them again"
+        )
 
 
 def _note_unreached(console: Any, tables: Tables) -> None:
-    stop = tables.study.stop_when
+    stop = tables.record.stop_when
     if stop is None:
         return
     wide = [
@@ -62,7 +75,7 @@ def _note_unreached(console: Any, tables: Tables) -> None:
     ]
     if wide:
         console.print(
-            f"warning: after all {tables.study.replicas} replicas the half-width of {stop.metric} "
+            f"warning: after all {tables.record.replicas} replicas the half-width of {stop.metric} "
             f"is still above {stop.half_width:g} in {len(wide)} cells"
         )
 
@@ -70,17 +83,16 @@ def _note_unreached(console: Any, tables: Tables) -> None:
 def _difference_table(tables: Tables, names: set[str]) -> Any:
     from rich.table import Table
 
-    assert tables.study.baseline is not None
-    axis, baseline = tables.study.baseline
-    title = f"\nless the same at {axis} = {short(baseline)}, pair by pair"
+    assert tables.baseline is not None
+    axis, baseline = tables.baseline
+    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     others = [name for name in tables.rows.axes if name != axis]
     for heading in (axis, *others, "result", "difference", "paired interval", "pairs",
                     "only one has it", "unpaired interval", "narrower"):  # fmt: skip
         table.add_column(heading)
-    for item in tables.compared:
-        if item.result.name not in names:
-            continue
+    shown = [item for item in tables.compared if item.result.name in names]
+    for item in shown[:_MOST_SHOWN]:
         d = item.difference
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         table.add_row(
@@ -105,4 +117,4 @@ def short(value: Any) -> str:
     """Return a value for a table: numbers to five digits."""
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
-    return str(value)
+    return shortened(value)

@@ -5,13 +5,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from dsa_des.errors import SceneError
 from dsa_des.replicas import why_apart
+from dsa_des.studies.chunk import CRASHED, Done, done_of, joined
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.metric import Result
-from dsa_des.studies.study import Study
+from dsa_des.studies.record import results_of
+from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.summary import Rows
 
 
@@ -20,18 +23,14 @@ class Progress:
     """How far a study is."""
 
     runs: int = 0
+    #: Without result; of these `crashed` because their process died.
     failed: int = 0
+    crashed: int = 0
     total: int = 0
 
 
 class Stopped(Exception):
     """A study was interrupted, or its results could not be written; it can be resumed."""
-
-
-def results_of(study: Study) -> list[Result]:
-    """Return the results that a study's metrics give."""
-    scene = study.scene(0)
-    return [result for spec in study.metrics for result in spec.build(scene).results()]
 
 
 def why_one_by_one(study: Study) -> str | None:
@@ -74,43 +73,101 @@ def run_study(
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(range(len(study.cells)))
     rounds = -(-study.replicas // study.batch)
-    for number in range(rounds):
-        if number and study.stop_when is not None:
-            satisfied = _satisfied(study, folder)
-            left = [cell for cell in cells if cell not in satisfied]
-            done_with = len(cells) - len(left)
-            progress.total -= done_with * (study.replicas - number * study.batch)
-            cells = left
-        missing = []
-        for chunk in study.chunks(number, cells):
-            if folder.has(chunk.name):
-                runs, failed = folder.failed_in(chunk.name)
-                progress.runs += runs
-                progress.failed += failed
-            else:
-                missing.append(chunk)
-        report(progress)
-        try:
-            for done in executor.run(study, missing):
-                folder.write_part(done.name, done.content)
-                progress.runs += done.runs
-                progress.failed += done.failed
-                report(progress)
-        except KeyboardInterrupt:
-            raise Stopped("interrupted") from None
-        except OSError as error:
-            raise Stopped(f"results cannot be written: {error.strerror or error}") from error
-        if not cells:
-            break
+    try:
+        for number in range(rounds):
+            if number and study.stop_when is not None:
+                satisfied = _satisfied(study, folder, number)
+                left = [cell for cell in cells if cell not in satisfied]
+                done_with = len(cells) - len(left)
+                progress.total -= done_with * (study.replicas - number * study.batch)
+                cells = left
+            _run_round(study, folder, executor, list(study.chunks(number, cells)), number, report,
+                       progress)  # fmt: skip
+        _remove_rounds(folder, rounds)
+    except KeyboardInterrupt:
+        raise Stopped("interrupted") from None
     return progress
 
 
-def _satisfied(study: Study, folder: StudyFolder) -> set[int]:
-    """Return the cells whose interval is narrow enough."""
+def _run_round(
+    study: Study,
+    folder: StudyFolder,
+    executor: Executor,
+    chunks: list[Chunk],
+    number: int,
+    report: Callable[[Progress], None],
+    progress: Progress,
+) -> None:
+    """Run what is missing of a round: parts that are not there, and runs that crashed."""
+    planned = {chunk.name for chunk in chunks}
+    for name in folder.part_names():  # of a round that other cells took part in
+        if _round_of(name) == number and name not in planned and folder.part(name) is not None:
+            folder.remove_part(name)
+    missing: list[Chunk] = []
+    kept: dict[str, Done] = {}
+    for chunk in chunks:
+        rows = folder.part(chunk.name)
+        if rows is None or not _same_runs(rows, chunk):
+            missing.append(chunk)
+            continue
+        there = done_of(chunk.name, rows)
+        progress.failed += there.failed - there.crashed
+        progress.runs += there.runs - there.crashed
+        if there.crashed:
+            crashed = np.asarray(pc.equal(rows["status"], CRASHED))
+            missing.append(_chunk_of(chunk.name, rows.filter(crashed)))
+            if there.crashed < there.runs:
+                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed))
+    report(progress)
+    for done in executor.run(study, missing):
+        whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done
+        try:
+            folder.write_part(whole.name, whole.content)
+        except OSError as error:
+            raise Stopped(f"results cannot be written: {error.strerror or error}") from error
+        progress.runs += done.runs
+        progress.failed += done.failed
+        progress.crashed += done.crashed
+        report(progress)
+
+
+def _round_of(name: str) -> int:
+    return int(name.split("-")[1])
+
+
+def _remove_rounds(folder: StudyFolder, first: int) -> None:
+    """Remove parts of this study that belong to rounds it no longer has."""
+    for name in folder.part_names():
+        if _round_of(name) >= first and folder.part(name) is not None:
+            folder.remove_part(name)
+
+
+def _same_runs(rows: pa.Table, chunk: Chunk) -> bool:
+    wanted = [np.arange(start, end) for _, start, end in chunk.runs]
+    cells = np.repeat([cell for cell, _, _ in chunk.runs], [len(one) for one in wanted])
+    return bool(
+        np.array_equal(rows["cell"].to_numpy(), cells)
+        and np.array_equal(rows["replica"].to_numpy(), np.concatenate(wanted))
+    )
+
+
+def _chunk_of(name: str, rows: pa.Table) -> Chunk:
+    runs: list[tuple[int, int, int]] = []
+    for cell, replica in zip(rows["cell"].to_pylist(), rows["replica"].to_pylist(), strict=True):
+        if runs and runs[-1][0] == cell and runs[-1][2] == replica:
+            runs[-1] = (cell, runs[-1][1], replica + 1)
+        else:
+            runs.append((cell, replica, replica + 1))
+    return Chunk(name, tuple(runs))
+
+
+def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:
+    """Return the cells whose interval is narrow enough after the rounds before `number`."""
     stop = study.stop_when
     assert stop is not None
     result = next(item for item in results_of(study) if item.name == stop.metric)
-    rows = Rows(folder.results(), ["cell"], [])
+    # What a killed attempt left of later rounds must not decide: it would not have been there.
+    rows = Rows(folder.results(before_round=number), ["cell"], [])
     found = set()
     for (cell,), chosen in rows.each_place():
         estimate, _ = rows.estimate(result, chosen, study.confidence, study.interval)
@@ -139,4 +196,6 @@ class Clock:
             words += [f"{rate:.3g}/s", f"{left:.0f} s left"]
         if progress.failed:
             words.append(f"{progress.failed} failed")
+        if progress.crashed:
+            words.append(f"{progress.crashed} of them crashed")
         return ", ".join(words)

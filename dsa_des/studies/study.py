@@ -5,23 +5,24 @@ numbered cell by cell and cut into chunks whose size knows nothing of workers, s
 gives never depends on who ran it.
 """
 
-import itertools
+import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from dsa_des.errors import Problem
 from dsa_des.overrides import apply_swap, set_value
 from dsa_des.replicas import Replica
 from dsa_des.scene import Scene, check_scene
 from dsa_des.scene_file import SceneFile
+from dsa_des.strangers import Left, strangers_code
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
+from dsa_des.studies.study_tables import existing_file
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,12 @@ class MetricSpec:
         from dsa_des.studies.metric import check_tables
 
         cls = find_metric(self.name)
-        check_tables(cls, scene)
-        return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+        try:
+            with strangers_code(ValueError):
+                check_tables(cls, scene)
+                return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+        except Left as error:
+            raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,46 @@ class Chunk:
 
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)
+
+
+class Cells(Sequence[tuple[int, ...]]):
+    """The cells of a study, each made when it is asked for; the last axis runs fastest.
+
+    Parameters
+    ----------
+    sizes : iterable of int
+        How many values each axis has.
+    """
+
+    def __init__(self, sizes: Iterable[int]) -> None:
+        self._sizes = tuple(sizes)
+        self._count = math.prod(self._sizes)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, number: int) -> tuple[int, ...]: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[tuple[int, ...]]: ...
+    def __getitem__(self, number: int | slice) -> tuple[int, ...] | list[tuple[int, ...]]:
+        """Return the index of each axis's value at a cell."""
+        if isinstance(number, slice):
+            return [self[k] for k in range(*number.indices(self._count))]
+        if not -self._count <= number < self._count:
+            raise IndexError(number)
+        rest, places = number % self._count, []
+        for size in reversed(self._sizes):
+            rest, place = divmod(rest, size)
+            places.append(place)
+        return tuple(reversed(places))
+
+    def number(self, places: Iterable[int]) -> int:
+        """Return which cell has these indices."""
+        found = 0
+        for size, place in zip(self._sizes, places, strict=True):
+            found = found * size + place
+        return found
 
 
 @dataclass
@@ -119,10 +164,10 @@ class Study:
     base: SceneFile
     tables: dict[str, Any]
 
-    @cached_property
-    def cells(self) -> list[tuple[int, ...]]:
+    @property
+    def cells(self) -> Cells:
         """Index of each axis's value, cell by cell; the last axis runs fastest."""
-        return list(itertools.product(*(range(len(axis.labels)) for axis in self.axes)))
+        return Cells(len(axis.labels) for axis in self.axes)
 
     @property
     def batch(self) -> int:
@@ -163,12 +208,8 @@ class Study:
         """Return the command that runs one replica of a cell again."""
         swaps, sets = self.changes(cell)
         replica = self.replica(number)
-        words = ["dsa-des", "run", str(self.scene_path), "--seed", str(replica.seed)]
-        for block, name in swaps:
-            words += ["--swap", f"{block}={name}"]
-        for key, value in [*sets, *replica.changes.items()]:
-            words += ["--set", f"{key}={set_text(value)}"]
-        return shlex.join(words)
+        changes = [(key, set_text(value)) for key, value in [*sets, *replica.changes.items()]]
+        return run_command(str(self.scene_path), replica.seed, swaps, changes)
 
     def chunks(self, round_number: int, cells: Sequence[int]) -> Iterator[Chunk]:
         """Return the chunks of one round: a batch of replicas of each of the given cells."""
@@ -190,11 +231,26 @@ class Study:
             yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
 
 
+def run_command(
+    scene: str,
+    seed: int,
+    swaps: Iterable[tuple[str, str]],
+    sets: Iterable[tuple[str, str]],
+) -> str:
+    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
+    words = ["dsa-des", "run", scene, "--seed", str(seed)]
+    for block, name in swaps:
+        words += ["--swap", f"{block}={name}"]
+    for key, value in sets:
+        words += ["--set", f"{key}={value}"]
+    return shlex.join(words)
+
+
 def set_text(value: Any) -> str:
     """Return a value the way ``--set`` takes it; a path of the study's own as it was found."""
     folder = getattr(value, "folder", None)
-    if folder is not None and (folder / value).is_file():
-        return str(folder / value)
+    if folder is not None and (path := existing_file(value, folder)) is not None:
+        return str(path)
     if isinstance(value, list | dict):
         from dsa_des.toml_text import inline
 

@@ -180,8 +180,7 @@ def _one_per_value(study: Study) -> list[int]:
     for place, axis in enumerate(study.axes):
         for index in range(1, len(axis.labels)):
             wanted.append(tuple(index if k == place else 0 for k in range(len(study.axes))))
-    numbers = {cell: number for number, cell in enumerate(study.cells)}
-    return [numbers[cell] for cell in wanted]
+    return [study.cells.number(cell) for cell in wanted]
 
 
 def _different(scenes: list[Scene]) -> list[Scene]:

@@ -1,6 +1,7 @@
 """From a study file to a study that can be run, every problem reported before anything runs."""
 
 import math
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ KEYS = (
     "figures", "stop_when", "compare", "over", "confidence", "interval", "runs_per_chunk",
 )  # fmt: skip
 _MOST_RUNS = 100_000_000
+_MOST_CELLS = 1_000_000
 
 
 def read_study(
@@ -53,17 +55,6 @@ def read_study(
     for assignment in sets:
         reader.problems += apply_set(reader.file, assignment)
     return reader.study(swaps)
-
-
-def study_again(path: Path, tables: dict[str, Any]) -> Study:
-    """Return a study from the tables of one that was read before (`Study.tables`).
-
-    Raises
-    ------
-    SceneError
-        If they no longer fit the scene.
-    """
-    return _Reader(SceneFile(path, tables)).study(())
 
 
 def study_of_scene(
@@ -107,11 +98,14 @@ class _Reader:
         if base is None or scene is None:  # all else is said of this scene
             raise SceneError(self.problems)
         axes = self.axes(scene, swaps)
-        runs = replicas
-        for axis in axes:
-            runs *= len(axis.labels)
+        cells = math.prod(len(axis.labels) for axis in axes)
+        runs = replicas * cells
+        if cells > _MOST_CELLS:
+            self.add(("axes",), f"make {cells:,} cells; at most {_MOST_CELLS:,} are allowed")
+            raise SceneError(self.problems)
         if runs > _MOST_RUNS:
-            self.add(("axes",), f"make {runs:,} runs; at most {_MOST_RUNS:,} are allowed")
+            runs_are = f"{cells:,} cells make {runs:,} runs" if runs < 10**18 else "are too many"
+            self.add(("replicas",), f"{runs_are}; at most {_MOST_RUNS:,} runs are allowed")
             raise SceneError(self.problems)
         study = Study(
             path=Path(self.file.path),
@@ -178,7 +172,11 @@ class _Reader:
         if not isinstance(name, str):
             self.add(("scene",), "is required: the TOML file of the scene that is studied")
             return None, None
-        path = Path(str(name)).expanduser()
+        try:
+            path = Path(str(name)).expanduser()
+        except RuntimeError as error:  # the ~ of nobody
+            self.add(("scene",), str(error), name)
+            return None, None
         if not path.is_absolute():
             path = getattr(name, "folder", Path()) / path
         try:
@@ -290,9 +288,12 @@ class _Reader:
         if not isinstance(table, dict) or not {"metric", "half_width"} <= set(table) <= known:
             self.add(("stop_when",), "must be {metric = RESULT, half_width = NUMBER, batch = N}")
             return None
+        if not isinstance(table["metric"], str):
+            self.add(("stop_when", "metric"), "must be the name of a result", table["metric"])
+            return None
         width, batch = table["half_width"], table.get("batch", max(10, -(-replicas // 20)))
         number = isinstance(width, int | float) and not isinstance(width, bool)
-        if not number or not 0 < width < math.inf:
+        if not number or not 0 < width <= sys.float_info.max:
             self.add(("stop_when", "half_width"), "must be a finite number above 0", width)
             return None
         if isinstance(batch, bool) or not isinstance(batch, int) or batch < 2:

@@ -1,14 +1,17 @@
 """Tables of a study file, flattened to dotted keys or made independent of where they stand."""
 
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from dsa_des.component import SourcedText
-from dsa_des.studies.draws import KINDS
+from dsa_des.studies.draws import KINDS, as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
-_NAMING_RESULTS = ("figures", "compare", "over", "stop_when")
+_NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
+#: The key of an axis whose values are patterns of file names.
+_PATTERNS = "files"
 
 
 def resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) -> dict[str, Any]:
@@ -21,16 +24,50 @@ def resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) ->
     return tables
 
 
-def _absolute(value: Any) -> Any:
+def _absolute(value: Any, key: str = "") -> Any:
     if isinstance(value, Mapping):
-        return {key: _absolute(item) for key, item in value.items()}
+        return {name: _absolute(item, str(name)) for name, item in value.items()}
     if isinstance(value, list):
-        return [_absolute(item) for item in value]
+        return [_absolute(item, key) for item in value]
     if isinstance(value, SourcedText) and hasattr(value, "folder"):
-        path = value.folder / Path(value).expanduser()
-        if any(sign in value for sign in "*?[") or path.is_file():
-            return str(path.resolve())
+        if key == _PATTERNS and any(sign in value for sign in "*?["):
+            try:
+                return str((value.folder / Path(value).expanduser()).resolve())
+            except (OSError, ValueError, RuntimeError):
+                return value
+        path = existing_file(value, value.folder)
+        return value if path is None else str(path.resolve())
     return value
+
+
+def existing_file(text: str, folder: Path) -> Path | None:
+    """Return the file that a text names, seen from a folder; None if it names none.
+
+    Any text may be asked about: one too long for a name, with a NUL, or with the ``~`` of nobody.
+    """
+    try:
+        path = folder / Path(text).expanduser()
+        return path if path.is_file() else None
+    except (OSError, ValueError, RuntimeError):
+        return None
+
+
+def json_safe(value: Any) -> Any:
+    """Return a value that JSON can hold: what it has no form for becomes text."""
+    if isinstance(value, Mapping):
+        return {str(key): json_safe(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_safe(item) for item in value]
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, int):
+        # Digits in base 16 can always be written; those in base 10 only up to some thousand.
+        return value if abs(value) < 2**63 else hex(value)
+    if isinstance(value, float):
+        return value if math.isfinite(value) else repr(value)
+    return as_text(value)
 
 
 def flat_values(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dsa_des.studies.chunk import CRASHED
 from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
 from dsa_des.studies.statistics import Difference, Estimate, difference, mean, share
 from dsa_des.types import AnyArray, FloatArray, IntArray
@@ -45,6 +46,9 @@ class Rows:
     def __init__(self, table: "pa.Table", axes: Sequence[str], over: Sequence[str]) -> None:
         good = np.asarray(table["error"].is_null())
         self.failed = int(len(good) - good.sum())
+        #: Those of the failed whose process died; they are tried again.
+        self.crashed = table["status"].to_pylist().count(CRASHED)
+        self._columns: dict[str, AnyArray] = {}
         self.names = set(table.column_names)
         self._table = table.filter(good) if self.failed else table
         self.axes = [name for name in axes if name not in over]
@@ -55,8 +59,14 @@ class Rows:
 
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN."""
-        values: AnyArray = self._table[name].to_numpy(zero_copy_only=False)
-        return values
+        if name not in self._columns:
+            self._columns[name] = self._table[name].to_numpy(zero_copy_only=False)
+        return self._columns[name]
+
+    def row(self, number: int) -> dict[str, Any]:
+        """Return a row as column → value."""
+        found: dict[str, Any] = self._table.slice(number, 1).to_pylist()[0]
+        return found
 
     def _codes(self, names: Sequence[str]) -> IntArray:
         codes = np.zeros(self._table.num_rows, dtype=np.int64)
@@ -67,9 +77,10 @@ class Rows:
 
     def each_place(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
         """Return the axis values and the rows of every place, in order of first occurrence."""
-        codes, first = np.unique(self.places, return_index=True)
-        for code in codes[np.argsort(first)].tolist():
-            rows = np.flatnonzero(self.places == code)
+        order = np.argsort(self.places, kind="stable")
+        _, starts = np.unique(self.places[order], return_index=True)
+        groups = np.split(order, starts[1:]) if len(order) else []
+        for rows in sorted(groups, key=lambda rows: int(rows[0])):
             at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
             yield at, rows
 

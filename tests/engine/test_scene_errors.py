@@ -1,10 +1,13 @@
 """Everything that can be wrong with a scene is one clear message with its place and a way out."""
 
+from pathlib import Path
+
 import pytest
 
 from dsa_des.errors import SceneError
 from dsa_des.scene import load_scene
 
+MODULE = Path(__file__).parent / "engine_blocks.py"
 PULSE = "Pulse; scan_rate_hz = 5"
 CHAIN = {"a": PULSE, "b": "Relay", "c": "Relay"}
 WIRES = ['"a -> b -> c"']
@@ -77,8 +80,8 @@ def only(lab, blocks=CHAIN, wires=WIRES, **load):
         ),
         (
             "engine_blocks:Pulze; scan_rate_hz = 5",
-            "blocks.a.type = 'engine_blocks:Pulze': module 'engine_blocks' has no 'Pulze'; "
-            "did you mean 'Pulse'?",
+            f"blocks.a.type = 'engine_blocks:Pulze': module 'engine_blocks' ({MODULE}) has no "
+            "'Pulze'; did you mean 'Pulse'?",
         ),
         (
             "engine_blocks:NotABlock",
@@ -283,7 +286,7 @@ def test_a_type_that_cannot_be_judged_does_not_blame_its_neighbours(lab):
         (
             {"swaps": ["a=engine_blocks:Pulze"]},
             "--swap a = 'engine_blocks:Pulze': module "
-            "'engine_blocks' has no 'Pulze'; did you mean 'Pulse'?",
+            f"'engine_blocks' ({MODULE}) has no 'Pulze'; did you mean 'Pulse'?",
         ),
         ({"seed": -1}, "seed = -1: must be a whole number from 0 to 9223372036854775807"),
     ],

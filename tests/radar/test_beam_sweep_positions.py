@@ -61,8 +61,8 @@ def body_azimuths(simulation: Simulation, target: int, times: np.ndarray) -> tup
     """Azimuth and range by the exact flights, at any times."""
     traffic = simulation.components["traffic"]
     transform = simulation.components["transform"]
-    revisit = transform._revisit(traffic.flights)
-    seen = revisit(np.array([target]), times[:, np.newaxis])
+    states = traffic.flights(traffic.own, np.array([target]), times[:, np.newaxis])
+    seen = transform._revisited(*states)
     return seen["body_azimuth_rad"][:, 0], seen["range_m"][:, 0]
 
 
@@ -136,6 +136,6 @@ def test_a_passing_target_that_outruns_the_beam_for_a_while_is_still_found() -> 
 
 
 def test_targets_that_cannot_be_revisited_are_refused(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(TrafficSource, "flights", None)
+    monkeypatch.setattr(TrafficSource, "_steer", lambda *_: None)
     with pytest.raises(BlockFailure, match="beam_sweep needs to know the targets at instants"):
         simulate(tmp_path)

@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from components.known_flights import KnownFlights
+from components.traffic.state import TrajectoryState
+from components.traffic.steered_flight import SteeredFlight
 from dsa_des.recording import MemorySink, Recorder
 from dsa_des.scene import load_scene
 from dsa_des.simulation import Simulation
@@ -56,46 +59,123 @@ pause_s = 12
 """
 
 
-def simulate(tmp_path: Path, **options: Any) -> tuple[Any, dict[str, Any]]:
+def simulate(tmp_path: Path, scene: str = SCENE, **options: Any) -> tuple[Any, dict[str, Any]]:
     path = tmp_path / "loop.toml"
-    path.write_text(SCENE)
+    path.write_text(scene)
     sink = MemorySink()
     simulation = Simulation(load_scene(path), recorder=Recorder([sink]), **options)
     simulation.run()
     return simulation, sink.tables()
 
 
-def test_any_window_gives_the_same_rows(tmp_path: Path) -> None:
-    _, whole = simulate(tmp_path)
+def seen_from(simulation: Any, own: Any, target: int, time_s: float) -> tuple[float, float]:
+    """Return the azimuth and range of a target at a time, if the ownship flies like this."""
+    traffic, transform = simulation.components["traffic"], simulation.components["transform"]
+    states = traffic.flights(own, np.array([target]), np.array([[time_s]]))
+    seen = transform._revisited(*states)
+    return seen["body_azimuth_rad"][0, 0], seen["range_m"][0, 0]
+
+
+# In the second, manoeuvres are on their way for so long that a window knows of some that come
+# while it lasts; in the third, they may overtake each other.
+LATE = SCENE.replace("delay_s = 0.7", "delay_s = 4.3").replace("pause_s = 12", "pause_s = 1.5")
+JITTERED = SCENE.replace("delay_s = 0.7", "delay_s = 0.2, jitter_s = 2").replace(
+    "pause_s = 12", "pause_s = 0.5"
+)
+
+
+@pytest.mark.parametrize("scene", [SCENE, LATE, JITTERED])
+def test_any_window_gives_the_same_rows(tmp_path: Path, scene: str) -> None:
+    _, whole = simulate(tmp_path, scene)
     assert whole["manoeuvres"].num_rows >= 3
-    for options in ({"window": 1}, {"window": 5}, {"shuffle_ties": 2}):
-        _, other = simulate(tmp_path, **options)
+    windows = [{"window": 1}, {"window": 2}, {"window": 5}, {"window": 7}]
+    for options in (*windows, {"cuts": [5 * 10**9 + 1, 17 * 10**9]}, {"shuffle_ties": 2}):
+        _, other = simulate(tmp_path, scene, **options)
         for name, table in whole.items():
             assert table.equals(other[name]), (name, options)
 
 
-def test_lit_positions_follow_the_steered_flight(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("scene", "delay_s"), [(SCENE, 0.7), (LATE, 4.3)])
+@pytest.mark.parametrize("window", [None, 1])
+def test_a_scan_follows_the_flight_that_is_known_when_it_begins(
+    tmp_path: Path, scene: str, delay_s: float, window: int | None
+) -> None:
+    """What was ordered is read from the record, and the flight built from the first orders only."""
+    simulation, tables = simulate(tmp_path, scene, window=window)
+    traffic = simulation.components["traffic"]
+    orders = tables["manoeuvres"].to_pylist()
+    came_s = [order["time_s"] + delay_s for order in orders]
+    flights: list[Any] = [SteeredFlight(traffic.own.flight)]
+    for order, at_s in zip(orders, came_s, strict=True):
+        flights.append(flights[-1].turned(at_s, order["turn_rad"], order["rate_rad_s"]))
+    compared = under_way = 0
+    for row in tables["detections"].to_pylist():
+        scan_s, lit_s = float(row["scan"]), row["illuminated_s"]
+        target = traffic.roster.names.index(row["target"])
+        known = sum(at_s <= scan_s for at_s in came_s)
+        azimuth_rad, range_m = seen_from(simulation, flights[known], target, lit_s)
+        assert row["range_m"] == pytest.approx(range_m, abs=1e-6)
+        assert row["azimuth_rad"] == pytest.approx(azimuth_rad, abs=1e-9)
+        # The beam, at 340 deg/s from -170 deg on, is there then.
+        beam_rad = np.radians(-170 + 340 * (lit_s - scan_s))
+        assert row["azimuth_rad"] == pytest.approx(beam_rad, abs=1e-8)
+        compared += 1
+        if any(scan_s < at_s < lit_s - 0.05 for at_s in came_s):
+            under_way += 1
+            _, turned_m = seen_from(simulation, traffic.own, target, lit_s)
+            assert turned_m != range_m
+    assert compared > 50
+    assert under_way >= 2
+
+
+def test_without_manoeuvres_the_targets_would_be_elsewhere(tmp_path: Path) -> None:
     simulation, tables = simulate(tmp_path)
     traffic = simulation.components["traffic"]
-    revisit = simulation.components["transform"]._revisit(traffic.flights)
-    # The flight of the whole run is known now; a scan knows what was ordered when it began.
-    turns = np.array([start for start, _ in traffic.own.parts])
-    assert len(turns) == tables["manoeuvres"].num_rows
-    rows = tables["detections"].to_pylist()
-    compared = 0
-    for row in rows:
-        scan, lit = float(row["scan"]), row["illuminated_s"]
-        target = traffic.roster.names.index(row["target"])
-        seen = revisit(np.array([target]), np.array([[lit]]))
-        if ((turns > scan) & (turns <= lit)).any():
-            continue
-        compared += 1
-        assert row["range_m"] == pytest.approx(seen["range_m"][0, 0], abs=1e-6)
-        assert row["azimuth_rad"] == pytest.approx(seen["body_azimuth_rad"][0, 0], abs=1e-9)
-    assert compared > 0.9 * len(rows) > 50
-    # Without the manoeuvres the same targets would be elsewhere.
-    traffic.own = traffic.own.flight
-    last = rows[-1]
+    last = tables["detections"].to_pylist()[-1]
     target = traffic.roster.names.index(last["target"])
-    straight = revisit(np.array([target]), np.array([[last["illuminated_s"]]]))
-    assert abs(straight["range_m"][0, 0] - last["range_m"]) > 100.0
+    _, straight_m = seen_from(simulation, traffic.own.flight, target, last["illuminated_s"])
+    assert abs(straight_m - last["range_m"]) > 100.0
+
+
+def test_rows_keep_the_flights_they_know() -> None:
+    """Rows of many messages, joined, cut and picked, answer as each would alone."""
+
+    def flight(north_deg: float) -> Any:
+        def states(columns: Any, time_s: Any) -> Any:
+            zero = np.zeros(time_s.shape)
+            own = TrajectoryState(zero + north_deg, zero, zero, zero, zero, zero, zero == 0)
+            other = TrajectoryState(time_s, zero + columns, zero, zero, zero, zero, zero == 0)
+            return own, other
+
+        return states
+
+    flights = [flight(north_deg) for north_deg in range(4)]
+    parts = [
+        KnownFlights([flights[0], flights[1]], np.array([0, 1, 1])),
+        KnownFlights([flights[1]], np.array([0])),
+        KnownFlights([flights[3], flights[2], flights[1]], np.array([2, 0, 1])),
+    ]
+    knows = np.array([0, 1, 1, 1, 1, 3, 2])
+    joined = KnownFlights.join_rows(parts)
+    assert len(joined.flights) == 4
+    columns, rows = np.array([5, 8]), np.array([6, 0, 3, 5, 5])
+    time_s = np.arange(14.0).reshape(7, 2)
+    for one, which in ((joined, np.arange(7)), (joined.take_rows(rows), rows)):
+        own, other = one(columns, time_s[which])
+        assert (own.lat_deg == knows[which, np.newaxis]).all()
+        assert (other.lat_deg == time_s[which]).all()
+        assert (other.lon_deg == columns).all()
+    assert len(joined.take_rows(slice(1, 5)).flights) == 1
+
+    def northward(own: Any, other: Any) -> Any:
+        return {"north_deg": other.lat_deg - own.lat_deg}
+
+    def southward(own: Any, other: Any) -> Any:
+        return {"north_deg": own.lat_deg - other.lat_deg}
+
+    halves = [joined.take_rows(slice(0, 4)).seen_by(northward),
+              joined.take_rows(slice(4, 7)).seen_by(southward)]  # fmt: skip
+    found = KnownFlights.join_rows(halves)(columns, time_s)["north_deg"]
+    expected = time_s - knows[:, np.newaxis]
+    expected[4:] *= -1.0
+    assert (found == expected).all()

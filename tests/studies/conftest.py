@@ -59,6 +59,10 @@ class Fragile(Sensor):
     def look(self, cells):
         if self.p.flaw == "raise":
             raise RuntimeError("poisoned")
+        if self.p.flaw == "leave":
+            raise SystemExit(0)
+        if self.p.flaw.startswith("die unless ") and not os.path.exists(self.p.flaw[11:]):
+            os.kill(os.getpid(), signal.SIGKILL)
         if self.p.flaw == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if self.p.flaw.startswith("die once "):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from components.metrics.encounter import NMAC_M, WELL_CLEAR_M
 from components.metrics.track_quality import _ramp_quantiles
-from components.separation import Separation, first_inside, separations
+from components.separation import Separation, closest, first_inside, separations
 from dsa_des.entry_points import registered
 from dsa_des.message import Text
 from dsa_des.replicas import Recorded, Replica, run_replicas
@@ -149,20 +150,40 @@ def test_encounter_head_on(small: Path) -> None:
     scene = load_scene("small.toml", duration_s=60)
     (flight,) = separations(scene, 0.1)
     # 5 km apart, closing at 110 m/s, 100 m to the side and 10 m higher.
-    nearest = int(np.argmin(flight.range_m))
-    assert flight.time_s[nearest] == pytest.approx(5000 / 110, abs=0.1)
-    assert flight.range_m[nearest] == pytest.approx(np.hypot(100, 10), abs=0.6)
-    lost = first_inside(flight, *WELL_CLEAR_M)
+    range_m, time_s = closest(flight)
+    assert time_s == pytest.approx(5000 / 110, abs=0.1)
+    assert range_m == pytest.approx(np.hypot(100, 10), abs=0.6)
+    lost, collision = first_inside(flight, WELL_CLEAR_M, NMAC_M)
     assert lost == pytest.approx((5000 - np.sqrt(609.6**2 - 100**2)) / 110, abs=0.15)
-    assert first_inside(flight, *NMAC_M) > lost
+    assert collision > lost
 
 
 def test_distances_of_f3442_are_exclusive() -> None:
     assert pytest.approx((609.6, 76.2)) == WELL_CLEAR_M and pytest.approx((152.4, 30.48)) == NMAC_M
-    flight = Separation("x", np.arange(3.0), np.full(3, 700.0), np.array([609.6, 609.5, 0.0]),
+    inside = Separation("x", np.arange(3.0), np.full(3, 700.0), np.array([609.6, 609.5, 0.0]),
                         np.array([0.0, 76.2, 76.1]))  # fmt: skip
-    assert first_inside(flight, *WELL_CLEAR_M) == 2.0
-    assert np.isnan(first_inside(flight, 1.0, 0.5))
+    flight = SimpleNamespace(pieces=lambda: iter([inside]))
+    lost, never = first_inside(flight, WELL_CLEAR_M, (1.0, 0.5))
+    assert lost == 2.0
+    assert np.isnan(never)
+
+
+def test_distances_do_not_depend_on_the_pieces_they_come_in(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = load_scene("small.toml", duration_s=60)
+
+    def found() -> tuple[Any, ...]:
+        (flight,) = separations(scene, 0.13)
+        time_s = np.concatenate([piece.time_s for piece in flight.pieces()])
+        return time_s.tolist(), closest(flight), first_inside(flight, WELL_CLEAR_M, NMAC_M)
+
+    whole = found()
+    assert len(whole[0]) > 1000  # the grid and the samples of the source
+    assert np.all(np.diff(whole[0]) > 0)
+    for pieces in (50, 301):
+        monkeypatch.setattr("components.separation.MOST_AT_ONCE", pieces)
+        assert found() == whole
 
 
 @pytest.mark.parametrize("name", sorted(registered(METRICS)))

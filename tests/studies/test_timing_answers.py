@@ -14,7 +14,7 @@ from dsa_des.cli import main
 from dsa_des.clock import ClockSpec
 from dsa_des.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.folder import description
+from dsa_des.studies.identity import description
 from dsa_des.studies.output import Tables
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study

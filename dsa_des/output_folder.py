@@ -1,0 +1,208 @@
+"""A folder of results appears whole or not at all, and replaces nothing that is not ours."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.interruption import deferred
+from dsa_des.manifest import foreign_in
+from dsa_des.output_names import (
+    check_place,
+    claim_folder,
+    location_of,
+    named,
+    new_folder_name,
+    reason_of,
+)
+from dsa_des.unfinished import EARLIER, unfinished
+
+_MOST_SHOWN = 3
+_RESULTS = "results"
+
+
+class OutputFolder:
+    """The folder that a command writes its results into.
+
+    Parameters
+    ----------
+    path : Path
+        What the user named: a new folder, an empty one, or earlier results to replace.
+    stem : str, optional
+        Take the next free ``stem-NNN`` in the folder `path` instead.
+
+    Attributes
+    ----------
+    path : Path
+        Where the results are once they are written; with a `stem`, two commands at once may each
+        expect the same number.
+    """
+
+    def __init__(self, path: Path, stem: str | None = None) -> None:
+        self._home, self._stem = path, stem
+        self.path = path if stem is None else new_folder_name(path, stem)
+
+    @classmethod
+    def chosen(cls, out: str | None, parent: Path, stem: str) -> "OutputFolder":
+        """Return what ``--out`` names, or else the next free ``parent/stem-NNN``."""
+        return cls(parent, stem) if out is None else cls(named(out))
+
+    def check(self) -> None:
+        """Raise UsageError unless the results can go there."""
+        check_place(self.path)
+        if self._stem is None and (reason := _why_kept(location_of(self.path))):
+            raise UsageError(f"--out {self.path}: {reason}; choose a new name")
+
+    @contextmanager
+    def writing(self) -> Iterator[Path]:
+        """Give a temporary folder; it takes its name when the block succeeds.
+
+        When the block raises, nothing is left behind.
+
+        Raises
+        ------
+        UsageError
+            If the results cannot go there; before the block is entered.
+        OutputError
+            If they cannot be written.
+        """
+        self.check()
+        place = location_of(self.path)
+        before = _identity(place)
+        ready = False
+        try:
+            with unfinished(place) as folder:
+                results = folder / _RESULTS
+                results.mkdir()
+                ready = True
+                yield results
+                with deferred():
+                    if self._stem is not None:
+                        self._take_number(results, place.parent)
+                    else:
+                        self._take_name(results, place, before, folder / EARLIER)
+        except BrokenPipeError:  # that of our output on the terminal
+            raise
+        except OSError as error:
+            if not ready:
+                raise UsageError(
+                    f"--out {self.path}: cannot be written: {reason_of(error)}"
+                ) from error
+            raise OutputError(
+                f"{self.path}: the results cannot be written: {reason_of(error)}"
+            ) from error
+
+    def _take_number(self, results: Path, parent: Path) -> None:
+        """Rename to the first number that is free when we are done, not when we began."""
+        assert self._stem is not None
+        while True:
+            self.path = new_folder_name(self._home, self._stem)
+            place = parent / self.path.name
+            try:
+                results.rename(place)
+            except OSError:
+                if os.path.lexists(place):  # somebody was faster
+                    continue
+                raise
+            return
+
+    def _take_name(
+        self, results: Path, place: Path, before: tuple[int, ...] | None, earlier: Path
+    ) -> None:
+        """Replace what was there when we began, and nothing else."""
+        reason: str | None = "has come to be there while the results were made"
+        if _identity(place) is None:
+            reason = None
+        elif _identity(place) == before:
+            reason = _move_aside(place, earlier)
+        if reason is None:
+            try:
+                results.rename(place)
+                return
+            except OSError as error:
+                reason = f"cannot be replaced: {reason_of(error)}"
+                if earlier.exists():
+                    with suppress(OSError):
+                        earlier.rename(place)
+        # A finished run is not thrown away because its place was taken.
+        saved = new_folder_name(place.parent, place.name)
+        results.rename(saved)
+        wanted, self.path = self.path, self.path.with_name(saved.name)
+        raise OutputError(f"--out {wanted}: {reason}; the results are in {self.path}")
+
+
+@contextmanager
+def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
+    """Make a folder for results that come one by one; it is removed again if none came.
+
+    It is what ``--out`` names, which must be new or empty, or the next free ``parent/stem-NNN``.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be made.
+    """
+    folder = parent / stem if out is None else named(out)
+    made = [above for above in folder.parents if not os.path.lexists(above)]
+    if out is None:
+        folder = claim_folder(parent, stem)
+        made.insert(0, folder)
+    elif _make(folder):
+        made.insert(0, folder)
+    try:
+        yield folder
+    finally:
+        with deferred():
+            for one in made:
+                with suppress(OSError):
+                    one.rmdir()
+
+
+def _make(folder: Path) -> bool:
+    """Make a folder unless an empty one is there; return whether it was made."""
+    try:
+        if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
+            raise UsageError(f"--out {folder}: is there already; a new folder is needed")
+        check_place(folder)
+        new = not folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {folder}: cannot be written: {reason_of(error)}") from error
+    return new
+
+
+def _move_aside(place: Path, earlier: Path) -> str | None:
+    """Move earlier results out of the way, or return why they must stay."""
+    try:
+        place.rename(earlier)
+    except OSError as error:
+        return f"cannot be replaced: {reason_of(error)}"
+    if reason := _why_kept(earlier):
+        earlier.rename(place)
+    return reason
+
+
+def _why_kept(place: Path) -> str | None:
+    """Return why a folder must not be replaced, if so."""
+    if not os.path.lexists(place):
+        return None
+    try:
+        foreign = foreign_in(place)
+    except OSError as error:
+        return f"cannot be read: {reason_of(error)}"
+    if not foreign:
+        return None
+    shown = ", ".join(foreign[:_MOST_SHOWN])
+    if len(foreign) > _MOST_SHOWN:
+        shown += f" and {len(foreign) - _MOST_SHOWN} more"
+    return f"is a folder that holds something other than a run: {shown}"
+
+
+def _identity(place: Path) -> tuple[int, ...] | None:
+    """Return what tells a folder from another one and from a later state of itself."""
+    try:
+        about = place.lstat()
+    except FileNotFoundError:
+        return None
+    return about.st_dev, about.st_ino, about.st_mtime_ns

@@ -1,0 +1,68 @@
+"""Text that came from a file, a name, a path or an argument, made fit to be shown.
+
+A terminal obeys control characters: a name can move the cursor, set the window's title or turn
+the text that follows around. `printable` writes each of them as an escape, so that what is shown
+is what is there.
+"""
+
+#: Longest value of a scene and longest name that a message, a table or a figure repeats in full.
+MOST_OF_A_VALUE = 80
+MOST_OF_A_NAME = 60
+
+
+def printable(text: object, *, lines: bool = False) -> str:
+    r"""Return `text` with every character that is not plainly visible as an escape.
+
+    Parameters
+    ----------
+    text : object
+        Anything; what is no text is turned into some.
+    lines : bool
+        Whether line feeds stay what they are: for text whose parts were made printable before.
+
+    Returns
+    -------
+    str
+        Controls (C0 and C1), marks of direction, characters without width, separators other than
+        the blank, private, unassigned and lone surrogate code points as ``\x1b``, ``\u202e`` or
+        ``\U000e0001``. Text that was made printable before stays as it is.
+
+    Notes
+    -----
+    The rule is that of `str.isprintable`: Unicode's categories "other" and "separator", the blank
+    excepted, are not printable.
+    """
+    plain = _text_of(text)
+    if plain.isprintable():
+        return plain
+    return "".join(
+        letter if letter.isprintable() or (lines and letter == "\n") else _escape(letter)
+        for letter in plain
+    )
+
+
+def shortened(text: object, most: int = MOST_OF_A_NAME) -> str:
+    """Return printable text of at most `most` characters; an ellipsis stands for what is cut."""
+    plain = _text_of(text)
+    # What is cut away need not be escaped: one letter becomes one or more.
+    plain = printable(plain[: most + 1])
+    return plain if len(plain) <= most else plain[: max(0, most - 1)] + "…"
+
+
+def _text_of(text: object) -> str:
+    if type(text) is str:
+        return text
+    try:
+        # A stranger's exception may print itself wrongly, and a subclass may lie of itself.
+        return str.__str__(text) if isinstance(text, str) else str(text)
+    except Exception:
+        return f"<{type(text).__name__}>"
+
+
+def _escape(letter: str) -> str:
+    code = ord(letter)
+    if letter in "\n\r\t":
+        return {"\n": r"\n", "\r": r"\r", "\t": r"\t"}[letter]
+    if code < 0x100:
+        return f"\\x{code:02x}"
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

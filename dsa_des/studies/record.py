@@ -1,0 +1,233 @@
+"""What a study's folder says of itself: enough to read its tables, without the scene or any block.
+
+It is written when the study is begun and checked when it is read, since a folder may come from a
+stranger. Nothing that it names is opened or imported.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from dsa_des import __version__
+from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result
+from dsa_des.studies.study import Study, run_command, set_text
+from dsa_des.studies.study_tables import json_safe
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_Whole = Annotated[int, Field(ge=0, lt=2**63)]
+_Label = str | int | float
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+class AxisRecord(_Strict):
+    """An axis: its column, its values, and what each changes in the scene, as texts."""
+
+    column: str
+    values: list[_Label]
+    over: bool
+    numeric: bool
+    sets: list[list[tuple[str, str]]]
+    swaps: list[list[tuple[str, str]]]
+
+
+class DrawRecord(_Strict):
+    """A drawn value: its key in the scene, its column, and whether it is a number."""
+
+    key: str
+    column: str
+    numeric: bool
+
+
+class ResultRecord(_Strict):
+    """A result of a metric; see `Result`."""
+
+    name: str
+    kind: Literal["number", "event", "share"]
+    meaning: str
+
+
+class StopRecord(_Strict):
+    """When a cell had enough replicas."""
+
+    metric: str
+    half_width: float
+
+
+class FigureRecord(_Strict):
+    """A figure; see `read_figures`."""
+
+    kind: Literal["axis", "heat", "polar", "run"]
+    metric: str | None = None
+    title: str | None = None
+    axis: str | None = None
+    lines: str | None = None
+    x: str | None = None
+    y: str | None = None
+    cell: _Whole = 0
+    replica: _Whole = 0
+
+
+class StudyHead(_Strict):
+    """Which study a folder holds."""
+
+    #: The study's file.
+    study: str
+    #: Of all that fixes its results.
+    study_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class StudyRecord(StudyHead):
+    """A study as its tables need it.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If something is missing, of a wrong type, or names what is not there.
+    """
+
+    title: str
+    scene: str
+    seed: int
+    cells: _Whole
+    replicas: _Whole
+    axes: list[AxisRecord]
+    draws: list[DrawRecord]
+    results: list[ResultRecord]
+    sets: list[tuple[str, str]]
+    swaps: list[tuple[str, str]]
+    compare: tuple[str, _Label] | None
+    stop_when: StopRecord | None
+    confidence: Annotated[float, Field(gt=0.5, lt=1.0)]
+    interval: Literal["t", "bootstrap"]
+    figures: list[FigureRecord]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "StudyRecord":
+        axes = {axis.column: axis for axis in self.axes}
+        columns = self.schema_of_parts().names
+        if len(set(columns)) < len(columns):
+            raise ValueError("two columns have one name")
+        if self.compare is not None and self.compare[0] not in axes:
+            raise ValueError("compare names no axis")
+        if any(len(a.values) != len(a.sets) or len(a.values) != len(a.swaps) for a in self.axes):
+            raise ValueError("an axis has values without changes")
+        for figure in self.figures:
+            for name in (figure.axis, figure.lines, figure.x, figure.y):
+                if name is not None and name not in axes:
+                    raise ValueError("a figure names no axis")
+            if figure.kind == "polar" and figure.axis and not axes[figure.axis].numeric:
+                raise ValueError("a polar figure needs numbers")
+            if figure.kind != "run" and figure.metric is None:
+                raise ValueError("a figure needs a metric")
+        return self
+
+    @staticmethod
+    def of(study: Study) -> "StudyRecord":
+        """Return the record of a study."""
+        from dsa_des.studies.identity import description_text
+
+        return StudyRecord.model_validate_json(description_text(study))
+
+    def schema_of_parts(self) -> "pa.Schema":
+        """Return the columns of the study's parts."""
+        from dsa_des.studies.chunk import columns_of
+
+        return columns_of(
+            [(axis.column, axis.numeric) for axis in self.axes],
+            [(draw.column, draw.numeric) for draw in self.draws],
+            [(result.name, result.kind) for result in self.results],
+        )
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Columns of axes that are a sample."""
+        return tuple(axis.column for axis in self.axes if axis.over)
+
+    def results_list(self) -> list[Result]:
+        """Return what the metrics gave."""
+        kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
+        return [Result(r.name, kinds[r.kind], r.meaning) for r in self.results]
+
+    def command(self, row: Mapping[str, Any]) -> str:
+        """Return the command that repeats a run.
+
+        Parameters
+        ----------
+        row : mapping
+            Column → value of its row in the parts.
+        """
+        swaps, sets = list(self.swaps), list(self.sets)
+        place = int(row["cell"])
+        places = []
+        for axis in reversed(self.axes):
+            place, index = divmod(place, len(axis.values))
+            places.append(index)
+        for axis, index in zip(self.axes, reversed(places), strict=True):
+            swaps += axis.swaps[index]
+            sets += axis.sets[index]
+        sets += [(draw.key, set_text(row[draw.column])) for draw in self.draws]
+        return run_command(self.scene, int(row["seed"]), swaps, sets)
+
+
+def results_of(study: Study) -> list[Result]:
+    """Return the results that a study's metrics give."""
+    scene = study.scene(0)
+    return [result for spec in study.metrics for result in spec.build(scene).results()]
+
+
+def record_text(study: Study, digest: str) -> str:
+    """Return the content of ``study.json``.
+
+    Parameters
+    ----------
+    study : Study
+    digest : str
+        SHA-256 of all that fixes its results.
+    """
+    from dsa_des.studies.chunk import draw_column
+
+    content = {
+        "study": str(study.path.resolve()),
+        "study_sha256": digest,
+        "title": study.title,
+        "scene": str(study.scene_path.resolve()),
+        "seed": study.seed,
+        "cells": len(study.cells),
+        "replicas": study.replicas,
+        "axes": [
+            {
+                "column": axis.column,
+                "values": axis.labels,
+                "over": axis.column in study.over,
+                "numeric": axis.numeric,
+                "sets": [[(key, set_text(value)) for key, value in one] for one in axis.sets],
+                "swaps": axis.swaps,
+            }
+            for axis in study.axes
+        ],
+        "draws": [
+            {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.numeric}
+            for draw in study.draws
+        ],
+        "results": [vars(result) for result in results_of(study)],
+        "sets": [(key, set_text(value)) for key, value in study.sets],
+        "swaps": study.swaps,
+        "compare": study.baseline,
+        "stop_when": None if study.stop_when is None else vars(study.stop_when),
+        "confidence": study.confidence,
+        "interval": study.interval,
+        "figures": [
+            {key: item if isinstance(item, int) else str(item) for key, item in figure.items()}
+            for figure in study.figures
+        ],
+        "version": __version__,
+        "tables": study.tables,
+    }
+    return json.dumps(json_safe(content), indent=2, allow_nan=False) + "\n"

@@ -1,0 +1,85 @@
+"""Files of a folder that somebody else may have filled: no link is followed, no pipe is waited for.
+
+A folder of results can come from a stranger. Its names may be links to files elsewhere, so writing
+never opens a name that is there: a new file is made beside it and takes its name.
+"""
+
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+
+_NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+_BINARY = getattr(os, "O_BINARY", 0)
+#: How many names of temporary files are tried.
+_MOST_NAMES = 100
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name and rename it; a link of that name is replaced.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; nothing is left behind then.
+    """
+    temporary, number = _new_beside(path)
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def _new_beside(path: Path) -> tuple[Path, int]:
+    """Make a new file beside `path`; return its name and its descriptor."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
+    for number in range(_MOST_NAMES):
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.{number}")
+        with suppress(FileExistsError):
+            return temporary, os.open(temporary, flags, 0o666)
+    raise FileExistsError(17, f"has {_MOST_NAMES} temporary files beside it", str(path))
+
+
+def read_regular(path: Path, most: int | None = None) -> bytes:
+    """Return the content of a file that is no link, folder, pipe or device.
+
+    Parameters
+    ----------
+    path : Path
+    most : int, optional
+        Largest size, bytes.
+
+    Raises
+    ------
+    OSError
+        If it is no such file, too large, or cannot be read.
+    """
+    with os.fdopen(os.open(path, os.O_RDONLY | _NO_FOLLOW | _NO_WAIT | _BINARY), "rb") as file:
+        about = os.fstat(file.fileno())
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(22, "is no regular file", str(path))
+        if most is not None and about.st_size > most:
+            raise OSError(27, f"is larger than {most:,} bytes", str(path))
+        return file.read()
+
+
+def open_lock(path: Path) -> int:
+    """Return the descriptor of a lock file, made if need be; its content is never touched.
+
+    Raises
+    ------
+    OSError
+        If it is a link or no regular file, or cannot be made.
+    """
+    number = os.open(path, os.O_RDWR | os.O_CREAT | _NO_FOLLOW | _NO_WAIT, 0o666)
+    if not stat.S_ISREG(os.fstat(number).st_mode):
+        os.close(number)
+        raise OSError(22, "is no regular file", str(path))
+    return number

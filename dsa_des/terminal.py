@@ -1,0 +1,79 @@
+"""The one place that prints: everything shown goes through here and is printable.
+
+No other file prints, echoes, makes a console or writes to the standard streams; a test sees to
+that. Rich is imported only when it is asked for.
+"""
+
+import sys
+from typing import Any
+
+import click
+
+from dsa_des.plain_json import json_text
+from dsa_des.safe_text import printable
+
+
+def say(line: object = "", *, err: bool = False) -> None:
+    """Print one line; what could break out of it is escaped.
+
+    Parameters
+    ----------
+    line : object
+    err : bool
+        On standard error.
+    """
+    _put(printable(line), err)
+
+
+def say_lines(text: str, *, err: bool = False) -> None:
+    """Print text of several lines, whose parts were made printable before they were put in."""
+    _put(printable(text, lines=True), err)
+
+
+def say_json(value: Any) -> None:
+    """Print a value as JSON; all that is not ASCII is an escape, numbers that are none are null."""
+    _put(json_text(value, indent=2, ensure_ascii=True), False)
+
+
+def _put(text: str, err: bool) -> None:
+    stream = sys.stderr if err else sys.stdout
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    # A stream may know fewer letters than Unicode has.
+    click.echo(text.encode(encoding, "backslashreplace").decode(encoding), err=err)
+
+
+def console(width: int | None = None, *, err: bool = False) -> Any:
+    """Return a ``rich.console.Console`` that prints no control character and reads no markup.
+
+    Parameters
+    ----------
+    width : int, optional
+        Letters in a line where the stream is no terminal; that of a terminal is its own.
+    err : bool
+        On standard error.
+    """
+    from dsa_des.safe_console import SafeConsole
+
+    found = SafeConsole(stderr=err)
+    return found if width is None or found.is_terminal else SafeConsole(stderr=err, width=width)
+
+
+def progress(text: str) -> Any:
+    """Return a ``rich.progress.Progress`` on standard error, gone when it is done.
+
+    Parameters
+    ----------
+    text : {"seconds", "text"}
+        What stands behind the bar: simulated seconds, or the task's field ``text``.
+    """
+    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+
+    behind: dict[str, list[ProgressColumn]] = {
+        "seconds": [
+            TextColumn("{task.completed:.0f} of {task.total:.0f} s", markup=False),
+            TimeRemainingColumn(),
+        ],
+        "text": [TextColumn("{task.fields[text]}", markup=False)],
+    }
+    columns = [TextColumn("{task.description}", markup=False), BarColumn(), *behind[text]]
+    return Progress(*columns, console=console(err=True), transient=True)

@@ -1,0 +1,158 @@
+"""A split block is asked through its own face; replicas whose clocks differ keep theirs."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dsa_des.component import ClockedParameters, Component
+from dsa_des.lockstep import LockStep, NotInLockStep
+from dsa_des.message import Message
+from dsa_des.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
+from dsa_des.scene import load_scene
+from dsa_des.simulation import Simulation
+from dsa_des.split_block import SplitBlock, _part
+from dsa_des.wake import Wake
+from dsa_des.watched_parameters import WatchedParameters
+
+FIRST_LIGHT = "configs/first_light.toml"
+HEADING = "blocks.traffic.ownship.heading_deg"
+
+
+def near(*sets, duration_s="40"):
+    """First light with a target in reach from the start."""
+    sets = ["blocks.traffic.intruders[0].north_m=4000", *sets]
+    return load_scene(FIRST_LIGHT, sets=sets, duration_s=duration_s)
+
+
+def test_a_split_block_is_no_block(lock):
+    """It has nothing that the engine could ask in the place of the block itself."""
+    assert not issubclass(SplitBlock, Component)
+    scenes = lock.replicas_of(near(), {HEADING: 0.5}, {HEADING: -0.5})
+    simulation = LockStep(scenes)
+    for name, node in simulation.nodes.items():
+        assert type(node.component) is scenes[0].blocks[name].cls
+        assert node.component is simulation.components[name]
+    assert simulation.nodes["traffic"].runner is simulation.split["traffic"]
+    public = {name for name in dir(SplitBlock) if not name.startswith("_")}
+    assert public == {"run", "close"}
+
+
+@pytest.mark.parametrize("rate", ["0.1", "3"])
+def test_positions_are_published_at_their_rate_when_the_traffic_is_split(lock, rate):
+    scene = near(f"blocks.traffic.update_rate_hz={rate}")
+    simulation = lock.same_as_alone(lock.replicas_of(scene, {HEADING: 0.5}, {HEADING: -0.5}))
+    assert list(simulation.split) == ["traffic"]
+
+
+def test_the_publishing_rate_itself_can_be_drawn(lock):
+    rates = [{"blocks.traffic.update_rate_hz": Fraction(n, 10)} for n in (5, 25, 8)]
+    lock.same_as_alone(lock.replicas_of(near("blocks.traffic.update_rate_hz=1"), *rates))
+
+
+def test_a_clock_in_some_replicas_only_is_run_one_by_one(lock):
+    scene, rate = near(), {"blocks.traffic.update_rate_hz": 2}
+    for changes in ([{}, rate], [rate, {}]):
+        with pytest.raises(NotInLockStep, match="in some replicas only"):
+            LockStep(lock.replicas_of(scene, *changes))
+    replicas = [Replica(20), Replica(21, rate)]
+    outcomes = run_replicas(scene, replicas)
+    assert all(isinstance(outcome, Recorded) for outcome in outcomes)
+    _, alone = lock.tables_of(Simulation, scene_of(scene, replicas[1]))
+    got, wanted = outcomes[1].tables["detections"]["tick"], alone["detections"]["tick"]
+    assert got.tolist() == wanted.to_pylist()
+    assert "in some replicas only" in why_apart(scene, replicas)
+
+
+DELAYED = (
+    "wires=['traffic -> transform -> gate', 'gate -> eo', 'gate -> ir', "
+    "{from='gate', to='radar', delay='2 scans'}, 'radar -> fusion', 'eo -> fusion', "
+    "'ir -> fusion', 'fusion -> tracker']"
+)
+
+
+def test_a_delay_in_scans_follows_the_replicas_own_clock(lock):
+    scene = near(DELAYED)
+    rates = [{"blocks.radar.scan_rate_hz": rate} for rate in (4, 5)]
+    with pytest.raises(NotInLockStep, match="scans that differ"):
+        LockStep(lock.replicas_of(scene, *rates))
+    offsets = [{"blocks.radar.offset_s": Fraction(n, 100)} for n in (0, 5, 13)]
+    lock.same_as_alone(lock.replicas_of(scene, *offsets))
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [
+        ["blocks.traffic.latency_s=0.1"],
+        ["blocks.transform.latency_s=0.1", "blocks.fusion.latency_s=0.3"],
+        ["blocks.traffic.latency_s=0.1", "blocks.traffic.update_rate_hz=2"],
+        [DELAYED],
+    ],
+)
+@pytest.mark.parametrize("changes", [({}, {}), ({HEADING: 0.5}, {HEADING: -0.5})])
+@pytest.mark.parametrize("window", [None, 7])
+def test_delays_on_the_way_from_the_traffic(lock, sets, changes, window):
+    lock.same_as_alone(lock.replicas_of(near(*sets, duration_s="15"), *changes), window=window)
+
+
+CLOCKS = [{"rate_error_ppm": 100}, {"jitter_s": 0.01}, {"scan_rate_hz": 4}, {"offset_s": 0.125}]
+
+
+@pytest.mark.parametrize("change", CLOCKS)
+def test_one_instance_serves_clocks_that_differ(lock, change):
+    changes = {f"blocks.radar.{name}": value for name, value in change.items()}
+    simulation = lock.same_as_alone(lock.replicas_of(near(duration_s="15"), {}, changes, changes))
+    assert not simulation.split
+
+
+@pytest.mark.parametrize("change", CLOCKS)
+def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
+    """Such a radar reads its clock, so it is split; its requests must stay the same."""
+    scene = near("blocks.radar.beam_sweep=true", "blocks.gate.latency_s=0.25", duration_s="15")
+    changes = {f"blocks.radar.{name}": value for name, value in change.items()}
+    scenes = lock.replicas_of(scene, {}, changes, changes)
+    if "scan_rate_hz" in change:
+        with pytest.raises(NotInLockStep, match="radar asks for something else"):
+            lock.same_as_alone(scenes)
+    else:
+        assert list(lock.same_as_alone(scenes).split) == ["radar"]
+
+
+class Reader(ClockedParameters):
+    """Parameters with something beside the clock."""
+
+    gain: float = 2.0
+
+    def period_s(self):
+        return 1 / self.scan_rate_hz
+
+
+def test_reading_a_clock_that_differs_is_noticed():
+    own = Reader(scan_rate_hz=4, gain=3.0)
+    watched = WatchedParameters(own, {"scan_rate_hz"})
+    shown = watched.parameters
+    assert isinstance(shown, Reader) and shown.gain == 3.0 and shown.offset_s == 0
+    assert not watched.read
+    assert shown.period_s() == Fraction(1, 4)  # also within the model's own methods
+    assert watched.read
+    watched.refuse(NotInLockStep("differs"))
+    with pytest.raises(NotInLockStep, match="differs"):
+        shown.period_s()
+    assert shown.gain == 3.0
+    assert own.period_s() == Fraction(1, 4)
+
+
+def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
+    """Rows of an optional input: -1 stays -1, and no row of another replica slips in."""
+    ticks = np.array([3, 5, 1003, 1005], dtype=np.int64)
+    message = Message(np.array([2, 1004], dtype=np.int64))
+    held = {"cue": (message, np.array([0, 0, -1, 1]))}
+    wake = Wake(ticks, np.full(4, -1), 1, held, {}, None, 1000)
+    of_first, rows = _part(wake, slice(0, 2), 0).held("cue")
+    assert of_first.tick.tolist() == [2] and rows.tolist() == [0, 0]
+    of_second, rows = _part(wake, slice(2, 4), 1).held("cue")
+    assert of_second.tick.tolist() == [4] and rows.tolist() == [-1, 0]
+    nothing = Wake(
+        ticks[2:3], np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {}, None, 1000
+    )
+    assert _part(nothing, slice(0, 1), 1).held("cue") is None

@@ -1,0 +1,82 @@
+"""Random changes of single replicas: drawn parameters of every kind of block."""
+
+from typing import Any
+
+from dice import Dice
+
+from dsa_des.replicas import Replica
+
+#: Parameter → values, by the beginning of the block's type.
+_DRAWS: dict[str, dict[str, tuple[Any, ...]]] = {
+    "traffic.scripted": {
+        "ownship.heading_deg": (1.5, 200), "ownship.speed_mps": (0, 61.5),
+        "ownship.roll_deg": (10,), "intruders[0].east_m": (250, -1500),
+        "intruders[0].heading_deg": (10, 190), "intruders[0].rcs_dbsm": (-5, 10),
+    },
+    "traffic.random": {
+        "radius_km": (1, 4), "ownship.heading_deg": (33,), "speed_max_mps": (130,),
+        "altitude_spread_m": (0, 500), "intruders": (3, 8),
+    },
+    "traffic.": {"update_rate_hz": (0.3, 2)},
+    "geometry.": {"attitude": ("exact", "small_angle"), "model": ("flat_earth", "ellipsoid")},
+    "radar.": {
+        "range_km": (2, 9), "beam_sweep": (True, False), "range_resolution_m": (0, 50),
+        "minimum_range_m": (100,),
+    },
+    "radar.threshold": {"losses_db": (0, 6), "false_alarm_probability": (0.01,)},
+    "radar.swerling": {"swerling": (0, 1, 4), "losses_db": (1,), "detection": ("table",)},
+    "optical.": {"range_km": (2, 6)},
+    "optical.eo": {"threshold": (0.5, 3), "background": ("auto",), "sun_azimuth_deg": (90,)},
+    "optical.ir": {"threshold": (0.5, 3), "false_alarms_per_frame": (0, 0.5)},
+    "fusion.pick_best": {"coincidence_s": (0, 0.2)},
+    "fusion.gated": {"time_gate_s": (0, 0.3), "angle_gate_deg": (1, 30), "range_gate_m": (100,)},
+    "tracking.": {"drop_after_s": (0.5, 4)},
+    "avoidance.": {"pause_s": (0, 2), "turn_deg": (10, 45), "range_km": (3,)},
+}  # fmt: skip
+_SENSOR = {
+    "offset_s": (0, 0.25, "1/3"), "jitter_s": (0, 0.02), "rate_error_ppm": (0, 500, -20000),
+    "scan_rate_hz": (1, 3, "7/3"), "azimuth_resolution_deg": (0, 2), "enabled": (True, False),
+    "mount_azimuth_deg": (0, 30), "misalignment_deg": ([1, 0, 0],), "azimuth_deg": ([-45, 45],),
+}  # fmt: skip
+_SECTIONS = {
+    "navigation.position_bias_m": ([1, 2, 3],), "weather.rain_rate_mm_h": (0, 15),
+    "terrain.clutter_gamma_db": (-12,),
+}  # fmt: skip
+
+
+def keys_of(tables: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
+    """Return what may be changed in a scene: dotted key → values."""
+    found: dict[str, tuple[Any, ...]] = dict(_SECTIONS)
+    for name, table in tables["blocks"].items():
+        kind = table["type"]
+        for beginning, draws in _DRAWS.items():
+            if kind.startswith(beginning):
+                found |= {f"blocks.{name}.{key}": values for key, values in draws.items()}
+        if "scan_rate_hz" in table:
+            found |= {f"blocks.{name}.{key}": values for key, values in _SENSOR.items()}
+        found[f"blocks.{name}.latency_s"] = (0, 0.15)
+        if not table.get("intruders", True):
+            for key in [key for key in found if f"{name}.intruders[0]" in key]:
+                del found[key]
+    return found
+
+
+def replicas(tables: dict[str, Any], dice: Dice) -> list[Replica]:
+    """Return a few replicas that change the same keys, each to a value of its own.
+
+    Parameters
+    ----------
+    tables : dict
+        The scene.
+    dice : Dice
+        Receives ``drawn KIND.KEY`` as features.
+    """
+    keys = keys_of(tables)
+    drawn = dice.sample(sorted(keys), dice.choices((0, 1, 2, 4), (2, 5, 3, 1))[0])
+    for key in drawn:
+        block = tables["blocks"].get(key.split(".")[1], {"type": key.partition(".")[0]})
+        dice.features.add(f"drawn {block['type']} {key.rpartition('.')[2]}")
+    return [
+        Replica(dice.randrange(1000), {key: dice.choice(keys[key]) for key in drawn})
+        for _ in range(dice.pick(2, 2, 3, 5))
+    ]

@@ -1,0 +1,180 @@
+"""A run that kills its process is told apart, counted and tried again; others do not suffer."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dsa_des.cli import main
+from dsa_des.studies import executors
+from dsa_des.studies.attempts import TRIES, Attempts, halves
+from dsa_des.studies.chunk import CRASHED, DONE, Done
+from dsa_des.studies.executors import Local
+from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.runner import run_study
+from dsa_des.studies.study import Chunk
+from dsa_des.studies.study_file import read_study
+
+STUDY = """
+scene = "small.toml"
+seed = 1
+replicas = 9
+runs_per_chunk = 3
+metrics = ["first_detection"]
+set.duration_s = 2
+[draws]
+blocks.ir.flaw = { choice = ["none", "none", "none", "die once MARKER"] }
+"""
+
+
+def study(*words: str, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, ["study", *words])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def contents(folder: str) -> dict[str, bytes]:
+    files = [*Path(folder, "parts").iterdir(), Path(folder, "summary.parquet")]
+    return {path.name: path.read_bytes() for path in files}
+
+
+def test_a_run_that_always_kills_is_charged_alone_and_tried_again_on_resume(small: Path) -> None:
+    marker = small / "gone"
+    text = STUDY.replace("die once MARKER", f"die unless {marker}")
+    Path("study.toml").write_text(text)
+    marker.touch()
+    study("study.toml", "--workers", "2", "--out", "whole", "--quiet")
+    marker.unlink()
+    checked = read_study("study.toml")
+    guilty = {k for k in range(9) if "die" in checked.replica(k).changes["blocks.ir.flaw"]}
+    assert 0 < len(guilty) < 9
+    ran = study("study.toml", "--workers", "2", "--out", "o", "--quiet", code=1)
+    assert f"{len(guilty)} of 9 runs crashed" in ran.stderr and "--resume" in ran.stderr
+    rows = StudyFolder(Path("o")).results().to_pylist()
+    assert {row["replica"] for row in rows if row["status"] == CRASHED} == guilty
+    assert {row["replica"] for row in rows if row["status"] == DONE} == set(range(9)) - guilty
+    assert all((row["status"] == CRASHED) == (row["error"] is not None) for row in rows)
+    shown = CliRunner().invoke(main, ["study", "show", "o"])
+    assert shown.exit_code == 0 and f"{len(guilty)} of them crashed" in shown.output
+    marker.touch()  # whatever killed them is gone
+    study("study.toml", "--workers", "2", "--out", "o", "--quiet", "--resume")
+    assert contents("o") == contents("whole")
+
+
+def test_a_run_that_kills_once_is_no_crash(small: Path) -> None:
+    marker = small / "died"
+    Path("study.toml").write_text(STUDY.replace("MARKER", str(marker)))
+    marker.touch()
+    study("study.toml", "--workers", "1", "--out", "whole", "--quiet")
+    marker.unlink()
+    ran = study("study.toml", "--workers", "2", "--out", "o", "--quiet")
+    assert marker.exists() and "crashed" not in ran.output
+    assert contents("o") == contents("whole")
+
+
+def test_runs_that_failed_are_not_tried_again(small: Path) -> None:
+    text = STUDY.replace("die once MARKER", "raise")
+    Path("study.toml").write_text(text)
+    study("study.toml", "--workers", "1", "--out", "o", "--quiet")
+    times = {path: path.stat().st_mtime_ns for path in Path("o/parts").iterdir()}
+    status = [row["status"] for row in StudyFolder(Path("o")).results().to_pylist()]
+    assert "failed" in status and CRASHED not in status
+    study("study.toml", "--workers", "1", "--out", "o", "--quiet", "--resume")
+    assert times == {path: path.stat().st_mtime_ns for path in Path("o/parts").iterdir()}
+
+
+def test_kills_from_outside_make_no_error_rows(small: Path) -> None:
+    text = STUDY.replace('"none", "none", "none", "die once MARKER"', '"none"')
+    Path("study.toml").write_text(text.replace("runs_per_chunk = 3", "runs_per_chunk = 1"))
+    checked = read_study("study.toml")
+    alone = StudyFolder(Path("alone"))
+    alone.open(checked, resume=False)
+    run_study(checked, alone, executors.Serial())
+    folder = StudyFolder(Path("o"))
+    folder.open(checked, resume=False)
+    local = Local(2)
+    killed = []
+
+    def kill_all(progress: object) -> None:
+        """After every result, kill all workers there are."""
+        for worker in local._workers:
+            pool = worker._pool
+            for process in list((getattr(pool, "_processes", None) or {}).values()):
+                if len(killed) < 6 and process.pid not in killed:
+                    os.kill(process.pid, signal.SIGKILL)
+                    killed.append(process.pid)
+
+    try:
+        progress = run_study(checked, folder, local, kill_all)
+    finally:
+        local.close()
+    assert len(killed) >= 3 and progress.failed == progress.crashed == 0
+    assert folder.results().equals(alone.results())
+
+
+def test_a_block_that_leaves_ends_its_run_only(small: Path) -> None:
+    Path("study.toml").write_text(STUDY.replace("die once MARKER", "leave"))
+    for workers in ("1", "2"):
+        study("study.toml", "--workers", workers, "--out", f"o{workers}", "--quiet")
+        status = [row["status"] for row in StudyFolder(Path(f"o{workers}")).results().to_pylist()]
+        assert 0 < status.count("failed") < 9 and status.count(DONE) + status.count("failed") == 9
+    assert contents("o1") == contents("o2")
+
+
+class _Process:
+    """Runs pieces on paper: a piece with a guilty run is lost."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        module = "dsa_des.studies.attempts"
+        monkeypatch.setattr(f"{module}.joined", lambda name, parts: self.sum(name, parts))
+        monkeypatch.setattr(
+            f"{module}.crashed_run", lambda study, chunk, tries: Done(chunk.name, b"", 1, 1, 1)
+        )
+        self.deaths: list[Chunk] = []
+
+    @staticmethod
+    def sum(name: str, parts: list[Done]) -> Done:
+        return Done(name, b"", sum(p.runs for p in parts), 0, sum(p.crashed for p in parts))
+
+    def all(self, chunks: list[Chunk], guilty: set[int]) -> list[Done]:
+        attempts, found = Attempts(None, chunks), []  # type: ignore[arg-type]
+        while (piece := attempts.next()) is not None:
+            replicas = {k for _, start, end in piece.chunk.runs for k in range(start, end)}
+            if replicas & guilty:
+                self.deaths.append(piece.chunk)
+                done = attempts.lost(piece)
+            else:
+                done = attempts.done(piece, Done(piece.chunk.name, b"", len(piece.chunk), 0))
+            found += [done] if done is not None else []
+        return found
+
+
+def test_the_guilty_run_of_a_large_chunk_is_found_by_halving(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    process = _Process(monkeypatch)
+    (done,) = process.all([Chunk("one", ((0, 0, 100), (1, 100, 128)))], {77})
+    assert (done.runs, done.crashed) == (128, 1)
+    assert len(process.deaths) <= 2 + 7 + TRIES
+    assert [chunk.runs for chunk in process.deaths[-TRIES:]] == [((0, 77, 78),)] * TRIES
+
+
+def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts = Attempts(None, [Chunk("a", ((0, 0, 1),)), Chunk("b", ((0, 1, 2),))])  # type: ignore[arg-type]
+    first, second = attempts.next(), attempts.next()
+    assert first is not None and second is not None
+    attempts.lost(first)
+    assert attempts.next() is None  # the other one is still under way
+    attempts.done(second, Done("b", b"", 1, 0))
+    again = attempts.next()
+    assert again is not None and again.chunk.name == "a" and attempts.next() is None
+
+
+def test_halves_hold_each_run_once() -> None:
+    chunk = Chunk("one", ((0, 3, 5), (1, 0, 4), (2, 7, 8)))
+    first, second = halves(chunk)
+    runs = [(c, k) for part in (first, second) for c, a, b in part.runs for k in range(a, b)]
+    assert runs == [(c, k) for c, a, b in chunk.runs for k in range(a, b)]
+    assert (len(first), len(second)) == (3, 4)
