@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from dsa_des.input_files import read_input_text
+from dsa_des.input_files import InputFileError, read_input_text
 from dsa_des.limits import refuse_extremes
 
 
@@ -17,12 +17,14 @@ def table_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
 
     Raises
     ------
-    InputFileError
-        If the file cannot be read, or is not UTF-8 text.
     ValueError
-        If a cell is longer than any number, naming the line.
+        If the file cannot be read or is not UTF-8 text, or a cell is longer than any number,
+        naming the line.
     """
-    text = read_input_text(Path(path))
+    try:
+        text = read_input_text(Path(path))
+    except InputFileError as error:
+        raise ValueError(f"{path}: {error}") from None
     for number, line in enumerate(text.replace("\r", "\n").split("\n"), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
