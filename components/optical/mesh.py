@@ -199,8 +199,11 @@ def load_mesh(
         log.addHandler(logging.NullHandler())
     try:
         status_of(Path(path))
-        loaded: Any = trimesh.load(str(path), force="mesh")
-        loaded.merge_vertices(merge_tex=True, merge_norm=True)
+        with np.errstate(all="ignore"):  # numbers that are none are refused below
+            loaded: Any = trimesh.load(str(path), force="mesh")
+            loaded.merge_vertices(merge_tex=True, merge_norm=True)
+        if np.ndim(loaded.vertices) != 2 or np.shape(loaded.vertices)[1] != 3:
+            raise ValueError("its vertices do not have three coordinates each")
         if len(loaded.faces) == 0:
             raise ValueError("it holds no triangles")
     except InputFileError as error:

@@ -54,6 +54,9 @@ def study_case(rng: random.Random, case: Case) -> Case:
         _mutate(rng, study, scene)
     if isinstance(study.get("set"), dict):
         study["set"]["duration_s"] = 1  # many long runs are no fault, and no case either
+    for table in (study.get("axes"), study.get("draws")):
+        if isinstance(table, dict):
+            table.pop("duration_s", None)
     case.files["scene.toml"] = _bytes(rng, study)
     if rng.random() < 0.05:
         extending(rng, case)

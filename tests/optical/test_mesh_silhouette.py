@@ -139,3 +139,22 @@ def test_bad_meshes_are_named(box, change, says):
 def test_bad_file_options_are_named(tmp_path, change):
     with pytest.raises(ValueError, match=next(iter(change))):
         load_mesh(tmp_path / "any.stl", **change)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("m.obj", b"", "is not a mesh that can be read"),
+        ("m.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "do not have three coordinates"),
+        ("m.obj", b"v 0 0 0\nf 1 2 9\n", "m.obj"),
+        ("m.stl", bytes(range(256)), "is not a mesh that can be read"),
+        ("m.zip", b"PK\x03\x04", "is not a mesh that can be read"),
+    ],
+)
+def test_a_broken_mesh_is_named(tmp_path, capfd, name, content, message):
+    pytest.importorskip("trimesh")
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=message):
+        load_mesh(path)
+    assert "Traceback" not in capfd.readouterr().err
