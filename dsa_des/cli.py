@@ -170,6 +170,16 @@ def components(name: str | None) -> None:
     show_components(name)
 
 
+@main.command()
+@click.option("--copy", metavar="DIR", help="Copy them and all that they extend into DIR.")
+@plain_errors
+def examples(copy: str | None) -> None:
+    """List the shipped scenes and studies: their names stand for their files everywhere."""
+    from dsa_des.commands.examples import show_examples
+
+    show_examples(copy)
+
+
 _workers_option = click.option(
     "--workers", type=int, metavar="N", help="Processes [default: one per processor]."
 )

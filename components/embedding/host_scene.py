@@ -11,6 +11,7 @@ from dsa_des.block.component import Component
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.scene.block import Block
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import Scene, load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 
@@ -39,7 +40,7 @@ def load_for_host(
         if tuple(sets) or tuple(swaps):
             raise UsageError("sets and swaps change a scene while it is loaded: give its file")
         return scene if seed is None else replace(scene, seed=seed)
-    scene_file = read_scene_file(scene)
+    scene_file = read_scene_file(chosen_file(scene, "scene"))
     blocks = scene_file.data.get("blocks", {})
     if isinstance(blocks, dict) and _NAME not in blocks and not _has_traffic(scene_file):
         blocks[_NAME] = {"type": HOST}

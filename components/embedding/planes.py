@@ -12,6 +12,7 @@ from components.aircraft.aircraft import Aircraft
 from components.embedding.host_traffic import Plane
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 
@@ -25,7 +26,7 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
     ----------
     name : str
     aircraft : path, Aircraft, mapping or None
-        A file such as those in ``configs/aircraft``, or its keys.
+        A file, the name of one that is shipped (``f_16``), or its keys.
     values : mapping
         Keys of `Aircraft` that override those of `aircraft`, table by table.
 
@@ -36,7 +37,7 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
     """
     described = SceneFile(Path(_CALL), {})
     if isinstance(aircraft, str | Path):
-        described = read_scene_file(aircraft)
+        described = read_scene_file(chosen_file(aircraft))
         # A file may say how an obstacle stays in place: here the host says where it is.
         _leave_out_flight(described.data)
     elif isinstance(aircraft, Aircraft):

@@ -20,6 +20,7 @@ from dsa_des.commands.study import (
 )
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import new_folder
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
@@ -56,7 +57,7 @@ def compare_command(
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        found = _compare_swap(Path(paths[0]), swaps, replicas, results, workers, out)
+        found = _compare_swap(chosen_file(paths[0]), swaps, replicas, results, workers, out)
         tell_crashed(found, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
@@ -64,17 +65,18 @@ def compare_command(
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    studies = [_study_at(Path(path), replicas) for path in paths]
+    files = [chosen_file(path) for path in paths]
+    studies = [_study_at(path, replicas) for path in files]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         known_results(record.results_list(), results)
     by_place: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
-        for path, study in zip(paths, studies, strict=True):
-            place = Path(path).resolve()
+        for file, study in zip(files, studies, strict=True):
+            place = file.resolve()
             if place not in by_place:
-                by_place[place] = _tables(Path(path), study, workers, home)
-        found = [by_place[Path(path).resolve()] for path in paths]
+                by_place[place] = _tables(file, study, workers, home)
+        found = [by_place[file.resolve()] for file in files]
         for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(found) == 2 else f"scatter-{number}"
             _compare(found[0], other, (paths[0], path), results, home / stem)

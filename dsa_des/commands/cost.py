@@ -17,6 +17,7 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.run.reports import load_reports
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
@@ -48,7 +49,9 @@ def cost_of_accuracy(
         return
     if scene is None:
         raise UsageError("SCENE is missing: only --map needs none")
-    variants = Variants(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    variants = Variants(
+        chosen_file(scene, "scene"), sets=sets, swaps=swaps, seed=seed, duration_s=duration
+    )
     for key in variants.dropped:
         say(f"note: the swap dropped {key}", err=True)
     climbs, notes = ladders_to_climb(variants, block, against)

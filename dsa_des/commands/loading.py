@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal.terminal import say
 
@@ -14,7 +15,8 @@ def load(
     duration: str | None,
 ) -> Scene:
     """Load and check a scene; parameters that a swap dropped are listed on standard error."""
-    loaded = load_scene(scene, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    path = chosen_file(scene, "scene")
+    loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     for key in loaded.dropped:
         say(f"note: the swap dropped {key}", err=True)
     return loaded

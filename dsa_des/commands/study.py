@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_names import claim_folder, named
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import latest_folder
@@ -45,7 +46,7 @@ def study_command(
     elif len(words) == 2 and words[0] == "show":
         show_study(Path(words[1]))
     elif len(words) == 1 and words[0] != "show":
-        study = read_study(words[0], sets=sets)
+        study = read_study(chosen_file(words[0], "study"), sets=sets)
 
         def again(path: Path) -> str:
             return _resume_command(words[0], path, sets, workers, executor, scheduler)

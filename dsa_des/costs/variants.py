@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from dsa_des.block.ladder import Ladder, Rung, Unavailable
@@ -42,7 +43,7 @@ class Variants:
 
     def __init__(
         self,
-        path: str,
+        path: Path | str,
         *,
         sets: Iterable[str] = (),
         swaps: Iterable[str] = (),

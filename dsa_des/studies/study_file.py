@@ -1,6 +1,7 @@
 """From a study file to a study that can be run, every problem reported before anything runs."""
 
 import math
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,6 +12,7 @@ from pydantic import ValidationError
 from dsa_des.block.component import SourcedText
 from dsa_des.block.entry_points import registered
 from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.scene.examples import find_example
 from dsa_des.scene.overrides import apply_set
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
@@ -180,6 +182,8 @@ class _Reader:
         if not path.is_absolute():
             path = getattr(name, "folder", Path()) / path
         try:
+            if not os.path.lexists(path):
+                path = find_example(str(name), "scene") or path
             base = read_scene_file(path)
         except SceneError as error:
             self.problems += error.problems

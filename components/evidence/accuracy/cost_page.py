@@ -13,10 +13,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from components.examples import folder
 from dsa_des.terminal.interruption import plain_ending
 
 DOCS = Path(__file__).parents[3] / "docs"
-_CONFIGS = Path(__file__).parents[3] / "configs"
 
 _PAGE = """# What accuracy costs
 
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--encounter",
         type=Path,
-        default=_CONFIGS / "encounters" / "crossing.daa",
+        default=folder() / "encounters" / "crossing.daa",
         help="encounter for the second half; the published page was made with NRC_Intercept23.daa",
     )
     parser.add_argument("--encounter-says", default="a made-up crossing", help="what it is")
@@ -103,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     compare = comparison()
 
     def costs_of(scene: str, *sets: str) -> tuple[Variants, list[RungCost]]:
-        variants = Variants(str(_CONFIGS / scene), sets=sets)
+        variants = Variants(str(folder() / scene), sets=sets)
         climbs, _ = ladders_to_climb(variants, None, None)
         return variants, [
             cost

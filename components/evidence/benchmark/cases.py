@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
 
+from components.examples import folder
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
 
-SCENES = Path(__file__).parents[3] / "configs" / "benchmark"
+SCENES = folder() / "benchmark"
 CLOCKED = ("eo", "ir", "radar")
 
 
@@ -69,14 +69,12 @@ def chosen(names: Sequence[str]) -> list[Case]:
     Raises
     ------
     UsageError
-        If a name is unknown, or the scenes are not there.
+        If a name is unknown.
     """
     known = {case.name: case for case in CASES}
     for name in names:
         if name not in known:
             raise UsageError(f"there is no benchmark scene {name!r}{did_you_mean(name, known)}")
-    if not SCENES.is_dir():
-        raise UsageError(f"{SCENES} is not there: the benchmark runs from a source tree")
     return [known[name] for name in names] if names else list(CASES)
 
 

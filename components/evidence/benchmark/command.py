@@ -83,7 +83,6 @@ def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
 
 def _measured_calls(quick: bool, repeats: int) -> dict[str, Any]:
     """Measure calls of the embedding interface in a fresh process."""
-    chosen([])  # says so where the scenes are missing
     return _fresh("embedded", [f"--repeats={repeats}", f"--calls={300 if quick else 1800}"])
 
 

@@ -8,32 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from components.aircraft.aircraft import Aircraft
+from components.examples import folder
 from components.optical.camera import Camera
 from components.optical.eo import ElectroOptical
 from components.optical.ir import Infrared
 from components.radar.swerling import SwerlingParameters
 from dsa_des.block.component import Context
-from dsa_des.errors import UsageError
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.time.randomness import Streams
 
 
 def configs() -> Path:
-    """Return the folder ``configs`` of the project: beside the packages, or in the current folder.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
-    places = (Path(__file__).parents[3] / "configs", Path("configs").resolve())
-    for place in places:
-        if (place / "thesis").is_dir():
-            return place
-    raise UsageError(
-        f"the scenes of the thesis are neither in {places[0]} nor in {places[1]}: "
-        "run this from the project's folder"
-    )
+    """Return the folder ``configs`` of the project: in the package, or beside it in its source."""
+    return folder()
 
 
 def table(name: str) -> dict[str, Any]:
