@@ -47,6 +47,9 @@ class Sensor(Component):
 
     Effects that act on the ``report`` are called with the detections, the targets and the
     message's row of each scan, and return the detections that are sent.
+
+    Extras of a look are recorded if the message of the output ``detections`` declares them; a
+    sensor with extras of its own has a subclass of `Detections` there.
     """
 
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
@@ -106,6 +109,12 @@ class Sensor(Component):
         return self.axes.reach(self.reach)
 
     @cached_property
+    def _message(self) -> type[Detections]:
+        """What is sent: `Detections`, or a subclass that declares columns of its own."""
+        message: type[Detections] = type(self).outputs["detections"].message  # type: ignore[assignment]
+        return message
+
+    @cached_property
     def _judgements(self) -> list[Any]:
         return self.built("declaration")
 
@@ -152,7 +161,7 @@ class Sensor(Component):
             azimuth, elevation = self.axes.to_body(azimuth, elevation)
         else:
             azimuth, elevation, range_m = p, q, r
-        detections = Detections(
+        detections = self._message(
             tick=wake.ticks,
             scan=wake.scans,
             evaluated=evaluated,
