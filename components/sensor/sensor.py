@@ -6,6 +6,7 @@ engine's business.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -60,6 +61,11 @@ class Sensor(Component):
     rewindable = True
     #: Whether detections carry a range.
     measures_range = False
+    hooks: ClassVar[Mapping[str, str]] = {
+        "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "declaration": "(cells, look) -> look: which detections declare their target",
+        "report": "(detections, targets, rows) -> detections: what is sent",
+    }
     effects = SENSOR_EFFECTS
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
