@@ -79,6 +79,7 @@ class Transform(Component):
     windowed = True
     lockstep = True
     rewindable = True
+    hooks = {"ownship": "(states) -> what the ownship believes of itself, by name"}
     effects = (NavigationErrors(),)
     ladders = (EARTH, ATTITUDE)
     #: The type's own model of the Earth.

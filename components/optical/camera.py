@@ -64,6 +64,11 @@ class Camera(Sensor):
     #: Columns of the roster that hold the areas and the contrast it sees.
     areas: ClassVar[str] = ""
     contrasts: ClassVar[str] = ""
+    hooks = {
+        "area": "(cells) -> area in m² to add to each cell's",
+        "contrast": "(cells) -> factor of each cell's contrast",
+        "signature": "(cells) -> what to add to each cell's signature",
+    }
     effects: ClassVar[tuple[Effect, ...]] = (
         DynamicSignature(),
         Visibility(),

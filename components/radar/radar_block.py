@@ -20,6 +20,7 @@ class Radar(Sensor):
     """A sensor that measures range; subclasses decide what is detected."""
 
     measures_range = True
+    hooks = {"SNR": "(cells) -> factor of each cell's SNR"}
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

@@ -77,6 +77,10 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
+    hooks = {
+        "RCS": "which Swerling model each cell has",
+        "method of Pd": "name of the method that gives the probability of detection",
+    }
     effects = (RcsFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:

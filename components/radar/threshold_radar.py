@@ -40,6 +40,10 @@ class LinkBudgetRadar(Radar):
     """A radar whose decision rests on the SNR of its link budget."""
 
     Parameters = LinkBudgetParameters
+    hooks = {
+        "mean RCS": "(cells) -> each cell's mean RCS in m²",
+        "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
+    }
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,

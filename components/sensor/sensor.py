@@ -6,6 +6,7 @@ engine's business.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -47,6 +48,9 @@ class Sensor(Component):
 
     Effects that act on the ``report`` are called with the detections, the targets and the
     message's row of each scan, and return the detections that are sent.
+
+    Extras of a look are recorded if the message of the output ``detections`` declares them; a
+    sensor with extras of its own has a subclass of `Detections` there.
     """
 
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
@@ -57,6 +61,11 @@ class Sensor(Component):
     rewindable = True
     #: Whether detections carry a range.
     measures_range = False
+    hooks: ClassVar[Mapping[str, str]] = {
+        "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "declaration": "(cells, look) -> look: which detections declare their target",
+        "report": "(detections, targets, rows) -> detections: what is sent",
+    }
     effects = SENSOR_EFFECTS
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -106,6 +115,12 @@ class Sensor(Component):
         return self.axes.reach(self.reach)
 
     @cached_property
+    def _message(self) -> type[Detections]:
+        """What is sent: `Detections`, or a subclass that declares columns of its own."""
+        message: type[Detections] = type(self).outputs["detections"].message  # type: ignore[assignment]
+        return message
+
+    @cached_property
     def _judgements(self) -> list[Any]:
         return self.built("declaration")
 
@@ -152,7 +167,7 @@ class Sensor(Component):
             azimuth, elevation = self.axes.to_body(azimuth, elevation)
         else:
             azimuth, elevation, range_m = p, q, r
-        detections = Detections(
+        detections = self._message(
             tick=wake.ticks,
             scan=wake.scans,
             evaluated=evaluated,

@@ -26,6 +26,7 @@ from dsa_des.block.ladder import Ladder
 from dsa_des.block.limits import refuse_extremes
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
+from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import resolve_home
 from dsa_des.time.clock import ClockSpec, parse_rational
 from dsa_des.time.randomness import Stream, Streams
@@ -205,7 +206,11 @@ class Component:
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
-    #: Physics that is built only when the scene calls for it (`dsa_des.block.effect`).
+    #: Quantities that effects may act on, and how what they build is called there. Those of base
+    #: classes count too. The block asks for what was built by `built`.
+    hooks: ClassVar[Mapping[str, str]] = {}
+    #: Physics that is built only when the scene calls for it (`dsa_des.block.effect`). Each acts on
+    #: one of the `hooks`.
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.block.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
@@ -223,6 +228,14 @@ class Component:
         if isinstance(parameters, ClockedParameters):
             return parameters.clock_spec()
         return None
+
+    @classmethod
+    def all_hooks(cls) -> dict[str, str]:
+        """Return the hooks of this class and its bases, with their descriptions."""
+        found: dict[str, str] = {}
+        for base in reversed(cls.__mro__):
+            found.update(vars(base).get("hooks", {}))
+        return found
 
     @classmethod
     def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
@@ -276,7 +289,19 @@ class Component:
         return []
 
     def built(self, acts_on: str) -> list[Any]:
-        """Return what was built of the effects that act on a quantity, in declared order."""
+        """Return what was built of the effects that act on a quantity, in declared order.
+
+        Raises
+        ------
+        ValueError
+            If the quantity is none of the block's `hooks`.
+        """
+        known = self.all_hooks()
+        if acts_on not in known:
+            raise ValueError(
+                f"{self.path()} asks for effects that act on {acts_on!r}, which is not among its "
+                f"hooks{did_you_mean(acts_on, known)}"
+            )
         return [
             self.context.effects[effect.name]
             for effect in type(self).effects

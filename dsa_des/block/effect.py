@@ -34,7 +34,7 @@ class Verdict:
 class Effect:
     """One effect of a block type; stateless, shared by all blocks of that type."""
 
-    #: What it is called, and the quantity it acts on.
+    #: What it is called, and the quantity it acts on: one of the hooks of its block.
     name: ClassVar[str]
     acts_on: ClassVar[str]
     #: Whether it can be built when the scene does not call for it, without changing a bit.

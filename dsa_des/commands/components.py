@@ -92,8 +92,25 @@ def _describe(console: Any, name: str, cls: type[Component]) -> None:
     for row in parameter_rows(cls.Parameters):
         table.add_row(*row)
     console.print(table, highlight=False)
+    _describe_hooks(console, cls)
     for ladder in cls.ladders:
         _describe_ladder(console, ladder)
+
+
+def _describe_hooks(console: Any, cls: type[Component]) -> None:
+    """Print what effects may act on, how they are called there, and which effects do."""
+    hooks = cls.all_hooks()
+    if not hooks:
+        return
+    console.print()
+    console.print("hooks, what effects may act on", style="bold")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("  hook", "what it calls", "effects"):
+        table.add_column(heading)
+    for hook, how in sorted(hooks.items()):
+        names = ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
+        table.add_row(f"  {hook}", how, names or "-")
+    console.print(table, highlight=False)
 
 
 def _describe_ladder(console: Any, ladder: Ladder) -> None:

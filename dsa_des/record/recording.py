@@ -13,6 +13,7 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Columns, Message, Schema, Text, rows_of
 from dsa_des.record.attempts import attempt
+from dsa_des.record.declared_columns import DeclaredColumns
 from dsa_des.time.timeline import own_scans
 
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
@@ -50,6 +51,7 @@ class Recorder:
         self._schemas: dict[str, Schema] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
         self._texts: dict[tuple[str, str], _TextCodes] = {}
+        self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
 
     def open(
@@ -65,6 +67,7 @@ class Recorder:
         for message in messages:
             for table, schema in message.recorded.items():
                 self._schemas.setdefault(table, dict(leading)).update(schema)
+        self._declared = DeclaredColumns(self._schemas, leading)
         if self._wanted is not None:
             self._schemas = {
                 table: {
@@ -82,10 +85,17 @@ class Recorder:
             sink.open(self._schemas)
 
     def record(self, block: str, message: Message) -> None:
-        """Note a message that `block` has sent."""
+        """Note a message that `block` has sent.
+
+        Raises
+        ------
+        ValueError
+            If the message holds a table or a column that no message of the run declares.
+        """
         if self._wanted is not None and self._pending.keys().isdisjoint(message.recorded):
             return
         for table, columns in message.tables().items():
+            self._declared.check(block, table, columns, type(message).__name__)
             if table in self._pending and len(columns["tick"]):
                 self._pending[table].append((block, columns))
 

@@ -134,6 +134,7 @@ class Simulation:
         #: The instants of the call in which a block failed.
         self.failed_at = np.empty(0, dtype=np.int64)
         self._window = window
+        self._has_run = False
         self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
         queued = any(block.options.processor for block in scene.blocks.values())
@@ -375,6 +376,8 @@ class Simulation:
 
         Raises
         ------
+        RuntimeError
+            If it has run before.
         SceneError
             If a block waits for a host program.
         BlockFailure
@@ -387,6 +390,12 @@ class Simulation:
         ]
         if hosted:
             raise SceneError(hosted)
+        if self._has_run:
+            raise RuntimeError(
+                "a simulation runs once, and this one has run: its blocks hold what they have "
+                "seen; make another Simulation of the scene to run it again"
+            )
+        self._has_run = True
         started = time.process_time()
         end = self.end_tick
         if self.recorder is not None:

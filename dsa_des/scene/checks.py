@@ -10,7 +10,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 from dsa_des.block.strangers import Left, strangers_code
-from dsa_des.errors import Problem
+from dsa_des.errors import Problem, did_you_mean
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.wiring import Wire
 from dsa_des.text.safe_text import shortened
@@ -127,6 +127,25 @@ def _check_clock(
     if spec.offset_s >= longest_s:
         message = f"must be below {float(longest_s):.4g} s"
         problems.append(scene.problem((*key, "offset_s"), message, str(spec.offset_s)))
+
+
+def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]", problems: list[Problem]) -> None:
+    """Add effects that nothing would ever call, or of which only one could be told."""
+    for name, block in blocks.items():
+        cls, hooks = block.cls, block.cls.all_hooks()
+        said = [
+            f"{cls.path()} has an effect {effect.name!r} that acts on {effect.acts_on!r}, which is "
+            f"no hook of the block{did_you_mean(effect.acts_on, hooks) or '; it has none'}"
+            for effect in cls.effects
+            if effect.acts_on not in hooks
+        ]
+        names = [effect.name for effect in cls.effects]
+        said += [
+            f"{cls.path()} has two effects named {twice!r}: each needs a name of its own"
+            for twice in sorted({n for n in names if names.count(n) > 1})
+        ]
+        key = ("blocks", name, "type")
+        problems += [scene.problem(key, message, block.type_name) for message in said]
 
 
 def check_activity(

@@ -15,7 +15,7 @@ from dsa_des.block.sections import section_models
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block import Block
-from dsa_des.scene.checks import check_activity, check_lookalikes, check_times
+from dsa_des.scene.checks import check_activity, check_effects, check_lookalikes, check_times
 from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.scene.options import BlockOptions, split_options, with_latencies
 from dsa_des.scene.overrides import apply_set, apply_swap
@@ -228,6 +228,7 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     graph = build_graph(list(classes), wires)
     check_graph(scene_file, graph, classes, problems, unsure)
     ticks_per_s = check_times(scene_file, blocks, wires, duration, problems, processors)
+    check_effects(scene_file, blocks, problems)
     if not unsure:
         check_activity(scene_file, blocks, wires, problems)
     if problems:

@@ -180,3 +180,9 @@ def test_sampling_in_windows_equals_looking_back_over_a_list(sent, batches, dela
         arrived = [i for i, tick in enumerate(sent) if tick + delay <= t]
         expected.append(arrived[-1] if arrived else None)
     assert found == expected
+
+
+def test_a_simulation_that_has_run_says_that_it_runs_once(lab):
+    run = lab.run(lab.write({"a": "Pulse; scan_rate_hz = 4", "b": "Relay"}, ['"a -> b"']))
+    with pytest.raises(RuntimeError, match="a simulation runs once"):
+        run.simulation.run()
