@@ -16,6 +16,8 @@ from dsa_des.block.message import Text
 from dsa_des.record.recording import Columns
 
 _SKIPPED = "skipped_"
+#: The first scan and the last: what was seen there may have been in sight before, or still be.
+_ENDS = ("the start", "the end of the run")
 SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.startswith(_SKIPPED))
 
 
@@ -52,9 +54,10 @@ class SensorSummary:
             "first_detection", "last_detection"}}}``. ``detections`` are those of targets,
             ``false_alarms`` all others. ``evaluated`` counts target evaluations over all scans,
             ``skipped`` targets not evaluated, by reason. A detection is
-            ``{"time_s", "range_m", "target"}`` or None; ``range_m`` is the true slant range at
-            that instant, for every sensor, also those that measure none; of several targets
-            detected in one instant it is the nearest.
+            ``{"time_s", "range_m", "target"}`` or None, with ``at`` where it is in the sensor's
+            first scan ("the start") or its last ("the end of the run"); ``range_m`` is the true
+            slant range at that instant, for every sensor, also those that measure none; of
+            several targets detected in one instant it is the nearest.
         """
         return {"sensors": {name: entry.result() for name, entry in self._entries.items()}}
 
@@ -91,8 +94,13 @@ class _Sensor:
         self.skipped = dict.fromkeys(SKIP_COLUMNS, 0)
         self.first: _Sighting | None = None
         self.last: _Sighting | None = None
+        #: Ticks of the first and the last scan.
+        self.span: tuple[int, int] | None = None
 
     def add_scans(self, columns: Columns, rows: IntArray) -> None:
+        tick = _numbers(columns, "tick")
+        begin = int(tick[rows[0]]) if self.span is None else self.span[0]
+        self.span = begin, int(tick[rows[-1]])
         self.scans += len(rows)
         self.evaluated += int(_numbers(columns, "evaluated")[rows].sum())
         for name in self.skipped:
@@ -123,9 +131,18 @@ class _Sensor:
             "detections": self.detections,
             "false_alarms": self.false_alarms,
             "skipped": {name.removeprefix(_SKIPPED): n for name, n in self.skipped.items()},
-            "first_detection": None if self.first is None else self.first.result(),
-            "last_detection": None if self.last is None else self.last.result(),
+            "first_detection": self._marked(self.first, 0),
+            "last_detection": self._marked(self.last, 1),
         }
+
+    def _marked(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
+        """Say of a sighting whether it is at the sensor's first or last scan."""
+        if seen is None:
+            return None
+        found = seen.result()
+        if self.span is not None and seen.tick == self.span[end]:
+            found["at"] = _ENDS[end]
+        return found
 
 
 class _Sighting:

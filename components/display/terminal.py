@@ -24,6 +24,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
             ("sensor", "scans>", "detections>", "", "time [s]>", "true range>", "target"),
             _sensor_rows(summary["sensors"]),
         )
+        for line in unseen_lines(summary["sensors"]):
+            _print_line(console, line)
         alarms = [
             f"{name} {entry['false_alarms']:,}"
             for name, entry in summary["sensors"].items()
@@ -76,9 +78,51 @@ def _sensor_rows(sensors: dict[str, Any]) -> list[tuple[str, ...]]:
         for which in ("first", "last"):
             seen = entry[f"{which}_detection"]
             place = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
-            rows.append((*start, which, *place))
+            censored = f" (at {_SHORT_ENDS.get(seen['at'], seen['at'])})" if seen.get("at") else ""
+            rows.append((*start, which + censored, *place))
             start = ("", "", "")
     return rows
+
+
+_SHORT_ENDS = {"the start": "start", "the end of the run": "end"}
+
+#: Why a target was not looked at, by the name of the count.
+_WHY_NOT_SEEN = {
+    "absent": "absent",
+    "off": "there while the sensor was off",
+    "field_of_view": "outside its field of view",
+    "range": "beyond its range",
+    "culled": "too far away to be looked at",
+}
+
+
+def unseen_lines(sensors: dict[str, Any]) -> list[str]:
+    """Say of each sensor without a detection why it saw nothing.
+
+    Parameters
+    ----------
+    sensors : dict
+        As of `SensorSummary.result`.
+    """
+    lines = []
+    for name, entry in sensors.items():
+        if entry["first_detection"] is not None:
+            continue
+        evaluated = entry.get("evaluated", 0)
+        skipped = {why: count for why, count in entry.get("skipped", {}).items() if count}
+        every = evaluated + sum(skipped.values())
+        if not entry["scans"]:
+            lines.append(f"{name} saw nothing: it never scanned")
+        elif every:
+            unit = "scans" if every == entry["scans"] else "looks (one per scan and target)"
+            reasons = [
+                f"{_WHY_NOT_SEEN.get(why, why)} in {count:,}"
+                for why, count in sorted(skipped.items(), key=lambda item: -item[1])
+            ]
+            if evaluated:
+                reasons.append(f"in reach but not detected in {evaluated:,}")
+            lines.append(f"{name} saw nothing: target {', '.join(reasons)} of {every:,} {unit}")
+    return lines
 
 
 def _by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
@@ -94,7 +138,12 @@ def _show_closest(console: Any, targets: dict[str, Any]) -> None:
     ]
     met.sort(key=lambda item: item[0]["range_m"])
     rows = [
-        (name, f"{approach['time_s']:.3f}", distance_text(approach["range_m"]))
+        (
+            name,
+            f"{approach['time_s']:.3f}",
+            distance_text(approach["range_m"]),
+            f"at {approach['at']}" if approach.get("at") else "",
+        )
         for approach, name in met[:MOST_TARGETS]
     ]
     notes = []
@@ -105,7 +154,7 @@ def _show_closest(console: Any, targets: dict[str, Any]) -> None:
     title = "Closest approach to each target"
     if notes:
         title += f" ({'; '.join(notes)})"
-    _print_table(console, title, ("target", "time [s]>", "true range>"), rows)
+    _print_table(console, title, ("target", "time [s]>", "true range>", ""), rows)
 
 
 def _print_table(

@@ -17,6 +17,7 @@ from components.messages.known_flights import Flights, KnownFlights
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
+from components.traffic.censored import censored_approaches, present_together_s
 from components.traffic.closest_approach import (
     Approaches,
     closest_approaches,
@@ -24,7 +25,7 @@ from components.traffic.closest_approach import (
 )
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
-from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
+from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
@@ -281,19 +282,28 @@ class TrafficSource(Component):
         return []
 
     def report(self) -> dict[str, Any]:
-        """Return the closest approach of every target over the run."""
+        """Return the closest approach of every target over the run.
+
+        ``at`` says where it is the first or the last instant that was looked at: the aircraft
+        may have been nearer before, or come nearer after.
+        """
         end_s = float(self.context.duration_s)
         names = self.roster.names
         best = self._closest_approaches(end_s)
-        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), strict=True)
+        where = censored_approaches(self, best.time_s, end_s)
+        found = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         return {
             "targets": {
                 name: {
-                    "closest_approach": {"time_s": time_s, "range_m": range_m}
+                    "closest_approach": {
+                        "time_s": time_s,
+                        "range_m": range_m,
+                        **({"at": at} if at else {}),
+                    }
                     if math.isfinite(range_m)
                     else None
                 }
-                for name, time_s, range_m in found
+                for name, time_s, range_m, at in found
             }
         }
 
@@ -303,25 +313,13 @@ class TrafficSource(Component):
             return looked_at_one_by_one(self.own, self.targets, self.sample_times_s, end_s)
         best = Approaches.none(len(self.targets))
         speeds = max_speeds_mps(self.targets)
-        present_s = _present_together_s(self.own, self.targets, end_s)
+        present_s = present_together_s(self.own, self.targets, end_s)
         for times in samples:
             closest_approaches(
                 self.own.at, self.fleet.each, times,
                 closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
             )  # fmt: skip
         return best
-
-
-def _present_together_s(
-    own: Any, targets: Sequence[Any], end_s: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the first and the last time (targets,) of a run at which both may be there, s."""
-    first, last = intervals_present_s([own])[0].tolist()
-    intervals = intervals_present_s(targets)
-    return (
-        np.maximum(intervals[:, 0], max(first, 0.0)),
-        np.minimum(intervals[:, 1], min(last, end_s)),
-    )
 
 
 def roster_of(

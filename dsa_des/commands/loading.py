@@ -13,10 +13,15 @@ def load(
     swaps: Iterable[str],
     seed: int | None,
     duration: str | None,
+    quiet: bool = False,
 ) -> Scene:
-    """Load and check a scene; parameters that a swap dropped are listed on standard error."""
+    """Load and check a scene; parameters that were dropped are listed on standard error."""
     path = chosen_file(scene, "scene")
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    if quiet:
+        return loaded
     for key in loaded.dropped:
         say(f"note: the swap dropped {key}", err=True)
+    for note in loaded.notes:
+        say(f"note: {note}", err=True)
     return loaded

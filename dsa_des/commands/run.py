@@ -25,7 +25,7 @@ def run_scene(
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
-    loaded = load(scene, sets, swaps, seed, duration)
+    loaded = load(scene, sets, swaps, seed, duration, quiet)
     target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,

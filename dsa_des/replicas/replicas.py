@@ -23,6 +23,7 @@ from dsa_des.scene.options import BlockOptions, with_latencies
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
+from dsa_des.scene.steps import no_item, place_of, unquoted
 from dsa_des.time.clock import parse_rational
 
 #: Which columns of which tables are recorded; None records everything.
@@ -211,9 +212,11 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
 
 def key_path(key: str) -> tuple[str | int, ...]:
     """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
-    parts = key.replace("[", ".").replace("]", "").split(".")
+    parts = unquoted(key).replace("[", ".").replace("]", "").split(".")
     return tuple(
-        int(part) if part.isascii() and part.isdecimal() and len(part) < 10 else part
+        int(part)
+        if part.isascii() and part.isdecimal() and len(part) < 10 and str(int(part)) == part
+        else part
         for part in parts
     )
 
@@ -245,11 +248,22 @@ def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
         given[str(first)] = _changed(getattr(old, str(first)), rest, value)
         return model.model_validate(given)
     if isinstance(old, list | tuple):
-        if not isinstance(first, int) or first >= len(old):
-            raise ValueError(f"there is no item {first!r}: the list has {len(old)} (from 0)")
         items = list(old)
-        items[first] = _changed(items[first], rest, value)
+        place, rest = _item(items, path)
+        items[place] = _changed(items[place], rest, value)
         return items
     if isinstance(old, dict):
         return {**old, first: _changed(old.get(first), rest, value)}
     raise ValueError(f"{first!r}: there is no table around it")
+
+
+def _item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
+    """Return which item the head of a path means, by number or name, and the tail of the path.
+
+    Names may hold the dots at which the path was split.
+    """
+    for length in range(len(path), 0, -1):
+        place = place_of(items, ".".join(map(str, path[:length])))
+        if place is not None:
+            return place, path[length:]
+    raise ValueError(no_item(items, str(path[0])))

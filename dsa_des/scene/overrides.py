@@ -4,20 +4,16 @@ They are two verbs: `--set` changes one value; `--swap` puts another type into a
 name, its wires and the parameters the new type knows, and lists those it dropped.
 """
 
-import re
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import SourcedText
+from dsa_des.block.component import Component, SourcedText
 from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.files.toml_input import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.options import BlockOptions
 from dsa_des.scene.scene_file import COMMAND_LINE, Key, SceneFile, dotted
-
-#: An item of a list, ``[3]`` or ``3``, and what follows it.
-_INDEX = re.compile(r"[0-9]{1,9}")
-_ITEM = re.compile(r"\[?([^.\[\]]*)\]?\.?(.*)")
+from dsa_des.scene.steps import no_item, step, unquoted
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
@@ -65,7 +61,8 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     ----------
     scene : SceneFile
     text : str
-        The dotted key, for example ``blocks.traffic.intruders[0].east_m``.
+        The dotted key, for example ``blocks.traffic.intruders[0].east_m`` or, by the name of
+        the item, ``blocks.traffic.intruders.head_on.east_m``.
     value : object
         As TOML would give it.
     source : str
@@ -73,33 +70,33 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     """
     container: Any = scene.data
     key: list[str | int] = []
-    rest = text.replace('"', "")
+    rest = unquoted(text)
     while True:
-        step, part, rest = _step(container, rest)
-        if isinstance(step, str) and isinstance(container, list):
-            message = f"there is no item {part!r}: the list has {len(container)} (from 0)"
-            return [Problem(source, text, message)]
-        if key == ["blocks"] and step not in container:
-            hint = did_you_mean(str(step), container)
+        place, part, rest = step(container, rest)
+        if place is None:
+            return [Problem(source, text, no_item(container, part))]
+        if key == ["blocks"] and place not in container:
+            hint = did_you_mean(str(place), container)
             return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
-        key.append(step)
+        key.append(place)
         if len(key) > DEEPEST:
             message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
             return [Problem(source, text, message)]
         if not rest:
-            container[step] = value
+            container[place] = value
             break
-        if isinstance(container, dict) and step not in container:
-            container[step] = {}
+        if isinstance(container, dict) and place not in container:
+            container[place] = {}
             scene.sources[tuple(key)] = source
-        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[step])):
-            container[step] = table
-        elif not isinstance(container[step], dict | list):
+        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[place])):
+            container[place] = table
+        elif not isinstance(container[place], dict | list):
             return [Problem(source, text, f"{dotted(tuple(key))} is no table")]
-        container = container[step]
+        container = container[place]
     for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
         del scene.sources[source_key]
     scene.sources[tuple(key)] = source
+    scene.of_other_type.pop(tuple(key[:3]), None)
     return []
 
 
@@ -122,13 +119,46 @@ def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[s
     except UnknownType as error:
         return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
     block = blocks[name]
-    known = {"type", *BlockOptions.model_fields, *cls.Parameters.model_fields}
-    dropped = sorted(key for key in block if key not in known)
+    dropped = sorted(key for key in block if key not in _known_keys(cls))
     for parameter in dropped:
         del block[parameter]
     block["type"] = _sourced(type_name)
     scene.sources[_type_key(name)] = COMMAND_LINE
     return [], [f"blocks.{name}.{parameter}" for parameter in dropped]
+
+
+def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:
+    """Drop what a block inherited from a table of another type and its own type lacks.
+
+    Parameters
+    ----------
+    scene : SceneFile
+    name : str
+        Of the block.
+    cls : type of Component
+        Its own type.
+
+    Returns
+    -------
+    list of str
+        A note on each parameter that was dropped.
+    """
+    block = scene.data["blocks"][name]
+    notes = []
+    for key, old in sorted(scene.of_other_type.items()):
+        parameter = key[-1]
+        mine = key[:2] == ("blocks", name) and parameter in block
+        if mine and parameter not in _known_keys(cls):
+            del block[parameter]
+            notes.append(
+                f"{dotted(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
+                f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
+            )
+    return notes
+
+
+def _known_keys(cls: type[Component]) -> set[str]:
+    return {"type", *BlockOptions.model_fields, *cls.Parameters.model_fields}
 
 
 def _type_key(name: str) -> Key:
@@ -139,23 +169,6 @@ def _wire_table(entry: Any) -> dict[str, str] | None:
     """Return the table of a wire written as ``"a -> b"``, so that its options can be set."""
     ends = [end.strip() for end in entry.split("->")] if isinstance(entry, str) else []
     return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
-
-
-def _step(container: Any, rest: str) -> tuple[str | int, str, str]:
-    """Return the next step into a container, as it was written, and what is left of the key.
-
-    A key that is already there is found whole, dots and brackets included: a study has axes of
-    names such as ``wires[4].drop_probability``.
-    """
-    if isinstance(container, list):
-        part, tail = _ITEM.match(rest).groups()  # type: ignore[union-attr]
-        inside = _INDEX.fullmatch(part) is not None and int(part) < len(container)
-        return int(part) if inside else part, part, tail
-    there = [
-        name for name in container if rest == name or rest.startswith((f"{name}.", f"{name}["))
-    ]
-    part = max(there, key=len, default=rest.partition(".")[0])
-    return part, part, rest[len(part) :].removeprefix(".")
 
 
 def _sourced(value: Any) -> Any:

@@ -18,7 +18,7 @@ from dsa_des.scene.block import Block
 from dsa_des.scene.checks import check_activity, check_effects, check_lookalikes, check_times
 from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.scene.options import BlockOptions, split_options, with_latencies
-from dsa_des.scene.overrides import apply_set, apply_swap
+from dsa_des.scene.overrides import apply_set, apply_swap, drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.scene.scene_file import COMMAND_LINE, Key, SceneFile, dotted, read_scene_file
@@ -55,6 +55,8 @@ class Scene:
         Shared processors by name.
     dropped : list of str
         Dotted keys of parameters that a swap dropped.
+    notes : list of str
+        What else was done to the scene that its files do not show.
     """
 
     path: Path
@@ -69,6 +71,7 @@ class Scene:
     sections: dict[str, Parameters] = field(default_factory=dict)
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def tolerance(self) -> dict[str, float]:
@@ -218,7 +221,8 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
     seed = _seed(scene_file, problems)
     duration = _duration(scene_file, problems)
     sections = _sections(scene_file, problems)
-    classes, blocks = _blocks(scene_file, problems)
+    notes: list[str] = []
+    classes, blocks = _blocks(scene_file, problems, notes)
     unsure: set[str] = set()
     processors = _processors(scene_file, blocks, problems)
     wires = with_latencies(
@@ -245,6 +249,7 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
         ticks_per_s,
         sections,
         processors,
+        notes=notes,
     )
 
 
@@ -299,7 +304,7 @@ def _sections(scene_file: SceneFile, problems: list[Problem]) -> dict[str, Param
 
 
 def _blocks(
-    scene_file: SceneFile, problems: list[Problem]
+    scene_file: SceneFile, problems: list[Problem], notes: list[str]
 ) -> tuple[dict[str, Any], dict[str, Block]]:
     tables = scene_file.data.get("blocks", {})
     classes: dict[str, Any] = {}
@@ -327,6 +332,7 @@ def _blocks(
             problems.append(scene_file.problem((*key, "type"), str(error), str(type_name)))
             continue
         classes[name] = cls
+        notes += drop_of_other_type(scene_file, name, cls)
         extra, given = split_options(table, cls.Parameters)
         try:
             with strangers_code(ValidationError):

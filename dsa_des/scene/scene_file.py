@@ -1,12 +1,14 @@
 """Reading scene files: TOML, ``extends`` in any table, and where each key was written.
 
 A table may say ``extends = "other.toml"`` (or a list of files): the keys of those files come
-first and its own keys override them, table by table. Paths are taken from the folder of the file
-that holds them.
+first and its own keys override them, table by table; a list whose items have a ``name`` is also
+changed item by item, by a table of these names. ``remove = ["calibrate"]`` takes inherited keys
+away. Paths are taken from the folder of the file that holds them.
 """
 
 import os
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,9 +24,10 @@ from dsa_des.files.input_files import (
     read_input_text,
 )
 from dsa_des.files.toml_input import DEEPEST, TomlError, parse_toml
+from dsa_des.scene.inheritance import REMOVE, Inheritance
+from dsa_des.scene.steps import Key, dotted
 from dsa_des.text.safe_text import shortened
 
-Key = tuple[str | int, ...]
 COMMAND_LINE = "command line"
 # Files that extend each other in a row; scenes have about four.
 _LONGEST_CHAIN = 32
@@ -33,14 +36,6 @@ _LONGEST_CHAIN = 32
 _MOST_VALUES = 20_000_000
 # What a file counts for, however short it is.
 _VALUES_PER_FILE = 200
-
-
-def dotted(key: Key) -> str:
-    """Return ``blocks.traffic.intruders[1].name`` for a key path."""
-    text = ""
-    for part in key:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return text
 
 
 @dataclass
@@ -54,11 +49,20 @@ class SceneFile:
         Merged tables; every text is a `SourcedText`.
     sources : dict
         For each key path that was written, the file (or ``command line``).
+    of_other_type : dict
+        Keys of blocks that were inherited from a table of another type → that type.
     """
 
     path: Path
     data: dict[str, Any]
     sources: dict[Key, str] = field(default_factory=dict)
+    of_other_type: dict[Key, str] = field(default_factory=dict)
+
+    def copy(self) -> "SceneFile":
+        """Return tables that can be changed without changing these."""
+        return SceneFile(
+            self.path, deepcopy(self.data), dict(self.sources), dict(self.of_other_type)
+        )
 
     def source_of(self, key: Key) -> str:
         """Return the file in which `key`, or the nearest table around it, was written."""
@@ -86,13 +90,14 @@ def read_scene_file(path: Path | str) -> SceneFile:
     data = reader.file(path, (), ())
     if problems:
         raise SceneError(problems)
-    return SceneFile(path, data, reader.sources)
+    return SceneFile(path, data, reader.sources, reader.inheritance.of_other_type)
 
 
 class _Reader:
     def __init__(self, problems: list[Problem]) -> None:
         self.problems = problems
         self.sources: dict[Key, str] = {}
+        self.inheritance = Inheritance(self.sources, problems)
         #: What was read of each file: its real path, and its tables or what is wrong with it.
         self._read: dict[Path, tuple[Path, dict[str, Any] | Exception]] = {}
         self._taken = 0
@@ -104,7 +109,7 @@ class _Reader:
         real, tables = self._read[path]
         if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
             self.sources[at] = str(path)
-            return self._table(tables, path, at, (*chain, real))
+            return self.inheritance.finished(self._table(tables, path, at, (*chain, real)), at)
         if isinstance(tables, TomlError):
             self.problems.append(Problem(str(path), "", str(tables)))
             return {}
@@ -151,18 +156,21 @@ class _Reader:
                 continue
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
-            merge(merged, self.file(path.parent / base, at, chain))
+            self.inheritance.merge(merged, self.file(path.parent / base, at, chain), at)
             self.sources[at] = base_source
         own = {
             key: self._value(value, path, (*at, key), chain)
             for key, value in table.items()
             if key != "extends"
         }
-        return merge(merged, own)
+        if REMOVE in own:
+            own[REMOVE] = self.inheritance.removals(own[REMOVE], str(path))
+        return self.inheritance.merge(merged, own, at)
 
     def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
         self._count(path)
         self.sources[at] = str(path)
+        self.inheritance.of_other_type.pop(at, None)
         if isinstance(value, dict):
             return self._table(value, path, at, chain)
         if isinstance(value, list):
@@ -183,12 +191,7 @@ def _tables_of(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
 
 def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Put the keys of `over` into `base`, table by table, and return `base`."""
-    for key, value in over.items():
-        if isinstance(value, dict) and isinstance(base.get(key), dict):
-            merge(base[key], value)
-        else:
-            base[key] = value
-    return base
+    return Inheritance({}, []).merge(base, over, ())
 
 
 def _similar_file(path: Path) -> str:
@@ -200,3 +203,13 @@ def _similar_file(path: Path) -> str:
         return f" (there is no folder {shortened(str(path.parent), 300)})"
     close = nearest(path.name, names)
     return f"; did you mean {path.parent / close}?" if close else ""
+
+
+__all__ = [
+    "COMMAND_LINE",
+    "Key",
+    "SceneFile",
+    "dotted",
+    "merge",
+    "read_scene_file",
+]

@@ -271,7 +271,7 @@ def changed_scene(
     SceneError
         With every problem found.
     """
-    file = SceneFile(base.path, deepcopy(base.data), dict(base.sources))
+    file = base.copy()
     problems: list[Problem] = []
     for block, name in swaps:
         found, _ = apply_swap(file, f"{block}={name}")

@@ -5,10 +5,11 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.replicas.replicas import Replica, key_path, scene_of
+from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.run.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile
+from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import TRIALS, Metric, Result
 from dsa_des.studies.study import Study
@@ -125,18 +126,22 @@ def _check_axes(study: Study, add: Callable[..., None]) -> None:
     owner: dict[tuple[str | int, ...], str] = {}
     for axis in study.axes:
         for key in {key for sets in axis.sets for key, _ in sets}:
-            first = owner.setdefault(key_path(key), axis.key)
+            first = owner.setdefault(key_in(study.base.data, key), axis.key)
             if first != axis.key:
                 add(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
 
 
 def _check_draws(study: Study, scene: Scene, add: Callable[..., None]) -> None:
     """Report draws of values that the scene does not allow, and of keys that are axes."""
+    tables = study.base.data
     on_axes = {
-        key_path(key): axis.key for axis in study.axes for sets in axis.sets for key, _ in sets
+        key_in(tables, key): axis.key
+        for axis in study.axes
+        for sets in axis.sets
+        for key, _ in sets
     }
     for draw in study.draws:
-        if axis := on_axes.get(key_path(draw.key)):
+        if axis := on_axes.get(key_in(tables, draw.key)):
             add(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
         for value in _worst(draw, study):
             try:

@@ -32,7 +32,8 @@ def test_json_summary_has_the_promised_shape(first_light: tuple[Path, dict]) -> 
     assert radar["scans"] == 600  # 5 Hz x 120 s
     assert summary["sensors"]["eo"]["scans"] == 2399  # from 0.05 s: the one at 120 s is not run
     assert summary["sensors"]["ir"]["scans"] == 240
-    assert set(radar["first_detection"]) == {"time_s", "range_m", "target"}
+    assert set(radar["first_detection"]) == {"time_s", "range_m", "target", "at"}
+    assert set(radar["last_detection"]) == {"time_s", "range_m", "target"}
     assert radar["evaluated"] >= radar["detections"] > 0
     assert sum(summary["fused"].values()) == pq.ParquetFile(out / "fused.parquet").metadata.num_rows
     assert set(summary["targets"]) == {"head_on", "crossing"}

@@ -127,3 +127,14 @@ def test_fused_rows_are_counted_by_combination():
     result = observer.result()["fused"]
     assert result == {"eo": 1, "radar": 3, "radar+eo": 1}
     assert list(result) == sorted(result)
+
+
+def test_sightings_at_the_first_and_the_last_scan_are_marked():
+    rows = [("radar", 10, 1, 0), ("radar", 20, 1, 0), ("radar", 30, 1, 0)]
+    early = [("eo", 5, 1, 0), ("eo", 30, 1, 0), ("eo", 40, 1, 0)]
+    pieces = [("scans", scans(rows)), ("scans", scans(early)), ("detections", detections(SEEN))]
+    found = sensors_of(pieces)
+    assert found["radar"]["first_detection"]["at"] == "the start"
+    assert found["radar"]["last_detection"]["at"] == "the end of the run"
+    assert "at" not in found["eo"]["first_detection"]
+    assert "at" not in found["eo"]["last_detection"]

@@ -103,3 +103,31 @@ def test_distances_read_well(range_m, text):
 def test_speed_survives_a_clock_that_did_not_tick():
     assert speed_text(10.0, 0.0) == "10 s simulated in 0 s of CPU time"
     assert "1,230" in speed_text(36000.0, 29.3)
+
+
+def test_why_a_sensor_saw_nothing():
+    blind = sensor(70, 0) | {"evaluated": 0, "skipped": {"field_of_view": 70, "range": 0}}
+    weak = sensor(70, 0) | {"evaluated": 100, "skipped": {"field_of_view": 10, "range": 30}}
+    seeing = sensor(9, 1, SIGHTING, LAST) | {"evaluated": 0, "skipped": {"range": 9}}
+    text = " ".join(printed({"sensors": {"eo": blind, "ir": weak, "radar": seeing}}).split())
+    assert "eo saw nothing: target outside its field of view in 70 of 70 scans" in text
+    assert (
+        "ir saw nothing: target beyond its range in 30, outside its field of view in 10, "
+        "in reach but not detected in 100 of 140 looks" in text
+    )
+    assert "radar saw nothing" not in text
+
+
+def test_censored_values_are_marked():
+    first = SIGHTING | {"at": "the start"}
+    approach = {"time_s": 9.0, "range_m": 800.0, "at": "the end of the run"}
+    text = printed(
+        {
+            "sensors": {"eo": sensor(1, 1, first, LAST)},
+            "targets": {"a": {"closest_approach": approach}, "b": {"closest_approach": None}},
+        }
+    )
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    assert any(line.startswith("eo 1 1 first (at start) 60.013") for line in lines)
+    assert "a 9.000 800.0 m at the end of the run" in lines
+    assert sum("(at " in line for line in lines) == 1

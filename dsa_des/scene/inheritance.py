@@ -1,0 +1,169 @@
+"""How the keys of a file lie over those of the files it extends.
+
+Table by table, own keys win. What more there is to it: keys that ``remove`` takes away, items of a
+list that are changed by their ``name``, and parameters that came from a block of another type.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsa_des.errors import Problem, did_you_mean
+from dsa_des.scene.steps import Key, dotted, names_of, no_item, place_of, step, unquoted
+
+REMOVE = "remove"
+
+
+@dataclass(eq=False)
+class Removal:
+    """One key that a table removes from what it inherits.
+
+    Parameters
+    ----------
+    text : str
+        Dotted, from the table that says it.
+    source : str
+        The file.
+    found : bool
+    known : tuple of str
+        What the table does inherit.
+    """
+
+    text: str
+    source: str
+    found: bool = False
+    known: tuple[str, ...] = ()
+
+
+class Removals(list[Removal]):
+    """What stands for ``remove = [...]`` while files are put together."""
+
+
+class Inheritance:
+    """Puts tables over each other.
+
+    Parameters
+    ----------
+    sources : dict
+        Key path → file; kept right where items of lists move.
+    problems : list of Problem
+        Takes what is wrong.
+    """
+
+    def __init__(self, sources: dict[Key, str], problems: list[Problem]) -> None:
+        self.of_other_type: dict[Key, str] = {}
+        self._sources = sources
+        self._problems = problems
+        self._any_removals = False
+
+    def removals(self, names: Any, source: str) -> Any:
+        """Return what stands for the value of ``remove``; what is no list of texts is itself."""
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            return names
+        self._any_removals = True
+        return Removals(Removal(str(name), source) for name in names)
+
+    def merge(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> dict[str, Any]:
+        """Put the keys of `over` into `base`, table by table, and return `base`."""
+        removals = over.get(REMOVE)
+        if isinstance(removals, Removals):
+            for removal in removals:
+                self._remove(base, removal, at)
+            base[REMOVE] = Removals([*base.get(REMOVE, ()), *removals])
+        if len(at) == 2 and at[0] == "blocks":
+            self._remember_type(base, over, at)
+        for key, value in over.items():
+            mine = base.get(key)
+            if isinstance(value, Removals):
+                continue
+            if isinstance(value, dict) and isinstance(mine, dict):
+                self.merge(mine, value, (*at, key))
+            elif isinstance(value, dict) and isinstance(mine, list) and names_of(mine):
+                self._merge_items(mine, value, (*at, key))
+            else:
+                base[key] = value
+        return base
+
+    def finished(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
+        """Return the tables of a file that is read to its end, without what was to be removed."""
+        if self._any_removals:
+            self._strip(tables, at)
+        return tables
+
+    def _remember_type(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> None:
+        old = base.get("type")
+        if isinstance(old, str) and "type" in over and over["type"] != old:
+            for key in base:
+                if key not in over and key != REMOVE:
+                    self.of_other_type.setdefault((*at, key), str(old))
+
+    def _merge_items(self, items: list[Any], over: Mapping[str, Any], at: Key) -> None:
+        """Change items of a list by their names."""
+        removals = over.get(REMOVE)
+        if isinstance(removals, Removals):
+            for removal in removals:
+                self._remove(items, removal, at)
+        for name, value in over.items():
+            if isinstance(value, Removals):
+                continue
+            place = place_of(items, name)
+            if place is None:
+                source = self._sources.get((*at, name), "")
+                message = no_item(items, name)
+                self._problems.append(Problem(source, dotted((*at, name)), message))
+                continue
+            self._move_sources((*at, name), (*at, place))
+            if isinstance(value, dict) and isinstance(items[place], dict):
+                self.merge(items[place], value, (*at, place))
+            else:
+                items[place] = value
+        if isinstance(removals, Removals):
+            self._report(removals, at)
+
+    def _remove(self, container: Any, removal: Removal, at: Key) -> None:
+        rest = unquoted(removal.text)
+        removal.known = tuple(map(str, container)) if isinstance(container, dict) else ()
+        while isinstance(container, dict | list):
+            place: Any
+            place, _, rest = step(container, rest)
+            if place is None or (isinstance(container, dict) and place not in container):
+                return
+            if not rest:
+                del container[place]
+                removal.found = True
+                self._forget(container, (*at, place))
+                return
+            container, at = container[place], (*at, place)
+
+    def _forget(self, container: Any, key: Key) -> None:
+        """Forget where a key was written; later items of a list move up."""
+        for known in [known for known in self._sources if known[: len(key)] == key]:
+            del self._sources[known]
+        if isinstance(container, list):
+            around, place = key[:-1], int(key[-1])
+            for number in range(place, len(container)):
+                self._move_sources((*around, number + 1), (*around, number))
+
+    def _move_sources(self, old: Key, new: Key) -> None:
+        for known in [known for known in self._sources if known[: len(old)] == old]:
+            self._sources[(*new, *known[len(old) :])] = self._sources.pop(known)
+
+    def _strip(self, value: Any, at: Key) -> None:
+        if isinstance(value, list):
+            for number, item in enumerate(value):
+                self._strip(item, (*at, number))
+        if not isinstance(value, dict):
+            return
+        if isinstance(value.get(REMOVE), Removals):
+            self._report(value.pop(REMOVE), at)
+        for key, item in value.items():
+            self._strip(item, (*at, key))
+
+    def _report(self, removals: Removals, at: Key) -> None:
+        for removal in removals:
+            if not removal.found:
+                message = (
+                    f"nothing of this name is inherited{did_you_mean(removal.text, removal.known)}"
+                )
+                key = dotted((*at, REMOVE))
+                self._problems.append(Problem(removal.source, key, message, removal.text))

@@ -1,0 +1,106 @@
+"""Steps along a dotted key: keys of tables, and items of lists by number or by their ``name``."""
+
+import re
+from typing import Any
+
+from dsa_des.errors import did_you_mean
+
+Key = tuple[str | int, ...]
+
+_INDEX = re.compile(r"[0-9]{1,9}")
+#: A part between quotes is what is in them.
+_QUOTED = re.compile(r""""([^"]*)"|(?<![^.\[])'([^']*)'(?![^.\]])""")
+
+
+def dotted(key: Key) -> str:
+    """Return ``blocks.traffic.intruders[1].name`` for a key path."""
+    text = ""
+    for part in key:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def unquoted(text: str) -> str:
+    """Return a dotted key without the quotes around its parts."""
+    return _QUOTED.sub(lambda found: found[1] if found[2] is None else found[2], text).replace(
+        '"', ""
+    )
+
+
+def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
+    """Return the next step into a table or list, as it was written, and what is left of the key.
+
+    A name that is already there is found whole, dots and brackets included: a study has axes of
+    names such as ``wires[4].drop_probability``. The step into a list is None where it has no such
+    item; `no_item` says what it has.
+    """
+    if isinstance(container, list):
+        return _item(container, rest)
+    part = _longest([str(name) for name in container], rest)
+    part = rest.partition(".")[0] if part is None else part
+    return part, part, rest[len(part) :].removeprefix(".")
+
+
+def _item(items: list[Any], rest: str) -> tuple[int | None, str, str]:
+    bracket = rest.startswith("[")
+    names = names_of(items)
+    inside = rest[1:] if bracket else rest
+    part = _longest([f"{name}]" for name in names], inside) if bracket else _longest(names, rest)
+    if part is None:
+        part = re.match(r"[^\[\]]*" if bracket else r"[^.\[\]]*", inside)[0]  # type: ignore[index]
+    else:
+        part = part.removesuffix("]") if bracket else part
+    tail = inside[len(part) :]
+    tail = (tail.removeprefix("]") if bracket else tail).removeprefix(".")
+    return place_of(items, part), part, tail
+
+
+def place_of(items: list[Any], part: str) -> int | None:
+    """Return which item a number or a name means; None where none does, or several do."""
+    if _INDEX.fullmatch(part):
+        return int(part) if int(part) < len(items) else None
+    places = [number for number, item in enumerate(items) if _name(item) == part]
+    return places[0] if len(places) == 1 else None
+
+
+def no_item(items: list[Any], part: str) -> str:
+    """Say that a list has no such item, or several, and what it has."""
+    names = names_of(items)
+    if names.count(part) > 1:
+        return f"{names.count(part)} items of the list are called {part!r}: give a number, from 0"
+    message = f"there is no item {part!r}: the list has {len(items)} (from 0)"
+    if not names:
+        return message
+    return message + did_you_mean(part, names)
+
+
+def names_of(items: list[Any]) -> list[str]:
+    """Return the names of the tables of a list that have one."""
+    return [name for item in items if (name := _name(item))]
+
+
+def _name(item: Any) -> str:
+    found = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
+    return str(found) if isinstance(found, str) else ""
+
+
+def _longest(names: list[str], rest: str) -> str | None:
+    there = [name for name in names if rest == name or rest.startswith((f"{name}.", f"{name}["))]
+    return max(there, key=len, default=None)
+
+
+def key_in(tables: Any, text: str) -> Key:
+    """Return the key path that a dotted key means in some tables, items by their number.
+
+    What the tables do not hold stays as it was written.
+    """
+    found: list[str | int] = []
+    rest = unquoted(text)
+    while rest:
+        place, part, rest = step(tables, rest)
+        found.append(part if place is None else place)
+        inside = place is not None if isinstance(tables, list) else place in tables
+        tables = tables[place] if inside else {}
+        if not isinstance(tables, dict | list):
+            tables = {}
+    return tuple(found)

@@ -1,0 +1,213 @@
+"""Scenes that extend others: other types, removed keys, and items of lists by their names."""
+
+import pytest
+
+from dsa_des.cli import main
+from dsa_des.errors import SceneError
+from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.scene.scene import load_scene
+from dsa_des.studies.study_file import read_study
+
+BASE = """
+duration_s = 2
+wires = ["traffic -> transform -> radar"]
+[blocks.traffic]
+type = "traffic.scripted"
+[blocks.traffic.ownship]
+lat_deg = 0
+lon_deg = 0
+alt_m = 1000
+speed_mps = 70
+[[blocks.traffic.intruders]]
+name = "head_on"
+east_m = 3000
+north_m = 1
+up_m = 0
+speed_mps = 70
+[[blocks.traffic.intruders]]
+name = "N12.3 [b]"
+east_m = 4000
+north_m = 1
+up_m = 0
+speed_mps = 70
+[blocks.transform]
+type = "geometry.ellipsoid"
+[blocks.radar]
+type = "radar.swerling"
+scan_rate_hz = 5
+power_w = 1000
+antenna_gain_db = 30
+wavelength_m = 0.03
+[blocks.radar.calibrate]
+rcs_dbsm = 0
+range_km = 10
+pd = 0.5
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    (tmp_path / "base.toml").write_text(BASE)
+
+    def path(text, name="scene.toml", base="base.toml"):
+        (tmp_path / name).write_text(f'extends = "{base}"\n{text}')
+        return tmp_path / name
+
+    return path
+
+
+def east_m(scene, place):
+    return float(scene.blocks["traffic"].parameters.intruders[place].east_m)
+
+
+def test_another_type_drops_what_it_lacks_and_says_so(write):
+    path = write('[blocks.radar]\ntype = "radar.range_boundary"\nrange_km = 5\n')
+    scene = load_scene(path)
+    assert set(scene.blocks["radar"].parameters.model_fields_set) == {"scan_rate_hz", "range_km"}
+    dropped = {note.split()[0].removeprefix("blocks.radar.") for note in scene.notes}
+    assert dropped == {"power_w", "antenna_gain_db", "wavelength_m", "calibrate"}
+    assert all("base.toml" in note and "scene.toml" in note for note in scene.notes)
+
+
+def test_a_typo_of_its_own_is_still_an_error(write):
+    path = write('[blocks.radar]\ntype = "radar.range_boundary"\nrange_km = 5\npower_w = 2\n')
+    with pytest.raises(SceneError, match=r"scene.toml: blocks.radar.power_w.*unknown parameter"):
+        load_scene(path)
+    path = write('[blocks.radar]\ntype = "radar.range_boundary"\nrange_km = 5\n')
+    with pytest.raises(SceneError, match=r"command line: blocks.radar.power_w.*unknown"):
+        load_scene(path, sets=["blocks.radar.power_w=3"])
+
+
+def test_back_to_the_first_type_nothing_is_lost(write):
+    write('[blocks.radar]\ntype = "radar.range_boundary"\nrange_km = 5\n', "middle.toml")
+    path = write('[blocks.radar]\ntype = "radar.swerling"\n', base="middle.toml")
+    scene = load_scene(path)
+    assert scene.blocks["radar"].parameters.calibrate.range_km == 10
+    assert scene.notes == []
+
+
+def test_a_block_that_extends_a_sensor_of_another_type(write, tmp_path):
+    (tmp_path / "sensor.toml").write_text(BASE.partition("[blocks.radar]\n")[2].partition("[")[0])
+    path = write(
+        '[blocks.second]\nextends = "sensor.toml"\ntype = "radar.range_boundary"\nrange_km = 9\n'
+    )
+    scene = load_scene(
+        path, sets=['wires=["traffic -> transform -> radar", "transform -> second"]']
+    )
+    assert scene.blocks["second"].parameters.range_km == 9
+    assert len(scene.notes) == 3
+
+
+def test_notes_reach_standard_error_and_not_when_quiet(write, tmp_path, monkeypatch):
+    from click.testing import CliRunner
+
+    monkeypatch.chdir(tmp_path)
+    path = str(write('[blocks.radar]\ntype = "radar.range_boundary"\nrange_km = 5\n'))
+    for command in (["check", path], ["run", path], ["run", path, "--json"]):
+        done = CliRunner().invoke(main, command)
+        assert done.exit_code == 0, done.stderr
+        assert done.stderr.count("was dropped") == 4
+        assert "was dropped" not in done.stdout
+    assert CliRunner().invoke(main, ["run", path, "--quiet"]).output == ""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[blocks.radar]\nremove = ["calibrate"]\nbandwidth_hz = 1e6\n',
+        'remove = ["blocks.radar.calibrate"]\nblocks.radar.bandwidth_hz = 1e6\n',
+    ],
+)
+def test_an_inherited_key_is_removed(write, text):
+    with pytest.raises(SceneError, match="exactly one of bandwidth_hz and calibrate"):
+        load_scene(write("[blocks.radar]\nbandwidth_hz = 1e6\n"))
+    scene = load_scene(write(text))
+    assert scene.blocks["radar"].parameters.calibrate is None
+
+
+def test_what_is_removed_may_be_given_anew(write):
+    anew = "[blocks.radar.calibrate]\nrcs_dbsm = 1\nrange_km = 2\npd = 0.9\nswerling = 3\n"
+    write('[blocks.radar]\nremove = ["calibrate"]\nbandwidth_hz = 1e6\n', "middle.toml")
+    path = write(f'blocks.radar.remove = ["bandwidth_hz"]\n{anew}', base="middle.toml")
+    assert load_scene(path).blocks["radar"].parameters.calibrate.range_km == 2
+
+
+def test_removing_what_is_not_there_is_an_error(write):
+    path = write('[blocks.radar]\nremove = ["calibrat"]\n')
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert str(caught.value) == (
+        f"{path}: blocks.radar.remove = 'calibrat': nothing of this name is inherited; "
+        "did you mean 'calibrate'?"
+    )
+
+
+def test_items_of_lists_are_removed_and_changed_by_name(write):
+    path = write('[blocks.traffic.intruders]\nremove = ["head_on"]\n"N12.3 [b]".east_m = 7\n')
+    scene = load_scene(path)
+    assert len(scene.blocks["traffic"].parameters.intruders) == 1
+    assert east_m(scene, 0) == 7
+    path = write("[blocks.traffic.intruders.head_on]\neast_m = -1e400\n")
+    with pytest.raises(SceneError, match=r"scene.toml: blocks.traffic.intruders\[0\].east_m"):
+        load_scene(path)
+    path = write("[blocks.traffic.intruders.head_off]\neast_m = 1\n")
+    with pytest.raises(SceneError, match="did you mean 'head_on'"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "place"),
+    [
+        ("intruders.head_on.east_m", 0),
+        ('intruders."head_on".east_m', 0),
+        ("intruders['head_on'].east_m", 0),
+        ("intruders[head_on].east_m", 0),
+        ("intruders[0].east_m", 0),
+        ("intruders.N12.3 [b].east_m", 1),
+        ('intruders["N12.3 [b]"].east_m', 1),
+    ],
+)
+def test_an_item_has_a_name_on_the_command_line(write, key, place):
+    scene = load_scene(write(""), sets=[f"blocks.traffic.{key}=123"])
+    assert [east_m(scene, 0), east_m(scene, 1)] == ([123, 4000] if place == 0 else [3000, 123])
+
+
+@pytest.mark.parametrize("item", ["head_on", '"head_on"', "0", "N12.3"])
+def test_an_item_has_a_name_in_replicas(write, item):
+    scene = load_scene(write(""), sets=["blocks.traffic.intruders[1].name=N12.3"])
+    changed = scene_of(scene, Replica(1, {f"blocks.traffic.intruders.{item}.east_m": 5.0}))
+    assert east_m(changed, int(item == "N12.3")) == 5
+
+
+def test_unknown_and_ambiguous_names(write):
+    with pytest.raises(SceneError, match=r"no item 'head_of'.* did you mean 'head_on'"):
+        load_scene(write(""), sets=["blocks.traffic.intruders.head_of.east_m=1"])
+    scene = load_scene(write(""))
+    with pytest.raises(SceneError, match=r"no item 'head_of'.* did you mean 'head_on'"):
+        scene_of(scene, Replica(1, {"blocks.traffic.intruders.head_of.east_m": 1.0}))
+    twice = [
+        "blocks.traffic.intruders[1].name=head_on",
+        "blocks.traffic.intruders.head_on.east_m=1",
+    ]
+    with pytest.raises(SceneError, match="2 items of the list are called 'head_on'"):
+        load_scene(write(""), sets=twice)
+
+
+def test_studies_address_items_by_name(write, tmp_path):
+    write("")
+    study = tmp_path / "study.toml"
+    study.write_text(
+        'scene = "scene.toml"\nmetrics = ["first_detection"]\nreplicas = 2\n'
+        "set.blocks.traffic.intruders.head_on.speed_mps = 80\n"
+        "axes.blocks.traffic.intruders.head_on.east_m = [1000, 2000]\n"
+        "draws.blocks.traffic.intruders.head_on.north_m = {uniform = [0, 5]}\n"
+    )
+    read = read_study(study)
+    assert [east_m(read.scene(cell), 0) for cell in range(2)] == [1000, 2000]
+    drawn = scene_of(read.scene(0), read.replica(1)).blocks["traffic"].parameters.intruders[0]
+    assert 0 < float(drawn.north_m) <= 5
+    assert float(drawn.speed_mps) == 80
+    with study.open("a") as file:
+        file.write('draws."blocks.traffic.intruders[0].east_m" = {uniform = [0, 5]}\n')
+    with pytest.raises(SceneError, match="is set by the axis"):
+        read_study(study)
