@@ -84,6 +84,12 @@ def check_times(
             if (time_s := getattr(processor, what)) >= longest_s:
                 key: Key = ("processors", name, what)
                 problems.append(scene.problem(key, limit, str(time_s)))
+    for name, block in blocks.items():
+        for what, value in block.parameters:
+            # Exact times of a block's own, such as gates and pauses, are counted in ticks too.
+            own = isinstance(value, Fraction) and what.endswith("_s") and what != "offset_s"
+            if own and abs(value) >= longest_s:
+                problems.append(scene.problem(("blocks", name, what), limit, str(value)))
     for name, spec in clocks.items():
         _check_clock(scene, ("blocks", name), spec, ticks_per_s, problems)
     return ticks_per_s

@@ -91,6 +91,9 @@ CASES = {
          "--set", "blocks.radar.scan_rate_hz=1e-5"],
         "scans take longer than this scene's ticks reach",
     ),
+    "a gate beyond all ticks": (
+        {}, [*RUN, "--set", "blocks.fusion.coincidence_s=1e30"], "how far this scene's ticks reach",
+    ),
     "rcs": ({}, [*RUN, "--set", "blocks.traffic.intruders[0].rcs_dbsm=1e200"], "to 300 in size"),
     "subnormal": ({}, [*RUN, "--set", "blocks.radar.range_km=5e-324"], "from 1e-30"),
     "endless work": (
