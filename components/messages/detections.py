@@ -6,16 +6,40 @@ is clockwise and elevation upward.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry, static
+from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
 _BITS_OF_INT64 = 63
 _COUNTED_BITS = 12
+
+
+#: Columns of ``scans`` for targets that were not evaluated, by reason.
+_SKIPPED = {
+    "skipped_absent": "int64",
+    "skipped_off": "int64",
+    "skipped_field_of_view": "int64",
+    "skipped_range": "int64",
+    "skipped_culled": "int64",
+}
+#: Columns of ``detections`` that only some sensors fill. For others, a subclass has a field
+#: ``extras: dict[str, AnyArray] = per_entry(columns={**EXTRAS, "name": "float64"}, ...)``.
+EXTRAS = {
+    "snr_db": "float64",
+    "detection_probability": "float64",
+    "pixels": "float64",
+    "declared": "bool",
+    "illuminated_s": "float64",
+    "ned_azimuth_rad": "float64",
+    "ned_elevation_rad": "float64",
+    "own_lat_deg": "float64",
+    "own_lon_deg": "float64",
+    "own_alt_m": "float64",
+}
 
 
 @dataclass(frozen=True)
@@ -31,6 +55,14 @@ class SensorOffer:
 
     measures_range: bool
     resolution_rad: float
+
+
+def _target_names(message: Any) -> Text:
+    return Text(message.target, message.roster.names)
+
+
+def _contributor_names(message: Any) -> Text:
+    return combination_text(message.contributors, message.sensors)
 
 
 @dataclass(eq=False)
@@ -57,6 +89,7 @@ class Detections(Message):
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
     extras : dict of (entries,)
+        Only those in `EXTRAS` are recorded; a subclass may declare more.
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
@@ -67,82 +100,34 @@ class Detections(Message):
     roster : Roster
     """
 
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "scans": {
-            "scan": "int64",
-            "evaluated": "int64",
-            "detected": "int64",
-            "skipped_absent": "int64",
-            "skipped_off": "int64",
-            "skipped_field_of_view": "int64",
-            "skipped_range": "int64",
-            "skipped_culled": "int64",
-        },
-        "detections": {
-            "scan": "int64",
-            "target": "text",
-            "azimuth_rad": "float64",
-            "elevation_rad": "float64",
-            "range_m": "float64",
-            "confidence": "float64",
-            "true_azimuth_rad": "float64",
-            "true_elevation_rad": "float64",
-            "true_range_m": "float64",
-            "snr_db": "float64",
-            "detection_probability": "float64",
-            "pixels": "float64",
-            "declared": "bool",
-            "illuminated_s": "float64",
-            "ned_azimuth_rad": "float64",
-            "ned_elevation_rad": "float64",
-            "own_lat_deg": "float64",
-            "own_lon_deg": "float64",
-            "own_alt_m": "float64",
-        },
-    }
+    row_table = "scans"
+    entry_table = "detections"
 
-    scan: IntArray
-    evaluated: IntArray
-    skipped: dict[str, IntArray]
-    offsets: IntArray
-    target: IntArray = per_entry()
-    azimuth_rad: FloatArray = per_entry()
-    elevation_rad: FloatArray = per_entry()
-    range_m: FloatArray = per_entry()
-    confidence: FloatArray = per_entry()
-    true_azimuth_rad: FloatArray = per_entry()
-    true_elevation_rad: FloatArray = per_entry()
-    true_range_m: FloatArray = per_entry()
-    extras: dict[str, AnyArray] = per_entry()
+    scan: IntArray = per_row(column="int64", in_entries=True)
+    evaluated: IntArray = per_row(column="int64")
+    offsets: IntArray = per_row(
+        column="int64", name="detected", value=lambda message: np.diff(message.offsets)
+    )
+    skipped: dict[str, IntArray] = per_row(columns=_SKIPPED, value=lambda m: m.skipped_columns())
+    target: IntArray = per_entry(column="text", value=_target_names)
+    azimuth_rad: FloatArray = per_entry(column="float64")
+    elevation_rad: FloatArray = per_entry(column="float64")
+    range_m: FloatArray = per_entry(column="float64")
+    confidence: FloatArray = per_entry(column="float64")
+    true_azimuth_rad: FloatArray = per_entry(column="float64")
+    true_elevation_rad: FloatArray = per_entry(column="float64")
+    true_range_m: FloatArray = per_entry(column="float64")
+    extras: dict[str, AnyArray] = per_entry(columns=EXTRAS, value=lambda m: m.extra_columns())
     roster: Roster = static()
 
-    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
-        """Return the rows of ``scans`` and ``detections``."""
-        counts = np.diff(self.offsets)
-        skipped = {f"skipped_{reason}": count for reason, count in self.skipped.items()}
-        scans: dict[str, AnyArray | Text] = {
-            "tick": self.tick,
-            "scan": self.scan,
-            "evaluated": self.evaluated,
-            "detected": counts,
-            **skipped,
-        }
-        detections: dict[str, AnyArray | Text] = {
-            "tick": np.repeat(self.tick, counts),
-            "scan": np.repeat(self.scan, counts),
-            "target": Text(self.target, self.roster.names),
-            "azimuth_rad": self.azimuth_rad,
-            "elevation_rad": self.elevation_rad,
-            "range_m": self.range_m,
-            "confidence": self.confidence,
-            "true_azimuth_rad": self.true_azimuth_rad,
-            "true_elevation_rad": self.true_elevation_rad,
-            "true_range_m": self.true_range_m,
-            # A sensor without a rule declares what it detects; nobody is behind a false alarm.
-            "declared": self.target >= 0,
-            **self.extras,
-        }
-        return {"scans": scans, "detections": detections}
+    def skipped_columns(self) -> dict[str, IntArray]:
+        """Return how many targets were skipped, by column."""
+        return {f"skipped_{reason}": count for reason, count in self.skipped.items()}
+
+    def extra_columns(self) -> dict[str, AnyArray]:
+        """Return the extras with ``declared``, which all detections have."""
+        # A sensor without a rule declares what it detects; nobody is behind a false alarm.
+        return {"declared": self.target >= 0, **self.extras}
 
 
 @dataclass(eq=False)
@@ -167,51 +152,25 @@ class FusedDetections(Message):
         Those with range first, each group by name.
     """
 
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "fused": {
-            "target": "text",
-            "sensors": "text",
-            "azimuth_rad": "float64",
-            "elevation_rad": "float64",
-            "range_m": "float64",
-            "angle_source": "text",
-            "range_source": "text",
-            "true_azimuth_rad": "float64",
-            "true_elevation_rad": "float64",
-            "true_range_m": "float64",
-        }
-    }
+    entry_table = "fused"
 
     offsets: IntArray
-    target: IntArray = per_entry()
-    azimuth_rad: FloatArray = per_entry()
-    elevation_rad: FloatArray = per_entry()
-    range_m: FloatArray = per_entry()
-    contributors: IntArray = per_entry()
-    angle_source: IntArray = per_entry()
-    range_source: IntArray = per_entry()
-    true_azimuth_rad: FloatArray = per_entry()
-    true_elevation_rad: FloatArray = per_entry()
-    true_range_m: FloatArray = per_entry()
+    target: IntArray = per_entry(column="text", value=_target_names)
+    contributors: IntArray = per_entry(column="text", name="sensors", value=_contributor_names)
+    azimuth_rad: FloatArray = per_entry(column="float64")
+    elevation_rad: FloatArray = per_entry(column="float64")
+    range_m: FloatArray = per_entry(column="float64")
+    angle_source: IntArray = per_entry(
+        column="text", value=lambda message: Text(message.angle_source, message.sensors)
+    )
+    range_source: IntArray = per_entry(
+        column="text", value=lambda message: Text(message.range_source, message.sensors)
+    )
+    true_azimuth_rad: FloatArray = per_entry(column="float64")
+    true_elevation_rad: FloatArray = per_entry(column="float64")
+    true_range_m: FloatArray = per_entry(column="float64")
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
-
-    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
-        """Return the rows of ``fused``."""
-        columns: dict[str, AnyArray | Text] = {
-            "tick": np.repeat(self.tick, np.diff(self.offsets)),
-            "target": Text(self.target, self.roster.names),
-            "sensors": combination_text(self.contributors, self.sensors),
-            "azimuth_rad": self.azimuth_rad,
-            "elevation_rad": self.elevation_rad,
-            "range_m": self.range_m,
-            "angle_source": Text(self.angle_source, self.sensors),
-            "range_source": Text(self.range_source, self.sensors),
-            "true_azimuth_rad": self.true_azimuth_rad,
-            "true_elevation_rad": self.true_elevation_rad,
-            "true_range_m": self.true_range_m,
-        }
-        return {"fused": columns}
 
 
 @dataclass(eq=False)
@@ -232,39 +191,17 @@ class Tracks(Message):
     sensors : tuple of str
     """
 
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "tracks": {
-            "target": "text",
-            "azimuth_rad": "float64",
-            "elevation_rad": "float64",
-            "range_m": "float64",
-            "age_s": "float64",
-            "updated_by": "text",
-        }
-    }
+    entry_table = "tracks"
 
     offsets: IntArray
-    target: IntArray = per_entry()
-    azimuth_rad: FloatArray = per_entry()
-    elevation_rad: FloatArray = per_entry()
-    range_m: FloatArray = per_entry()
-    age_s: FloatArray = per_entry()
-    contributors: IntArray = per_entry()
+    target: IntArray = per_entry(column="text", value=_target_names)
+    azimuth_rad: FloatArray = per_entry(column="float64")
+    elevation_rad: FloatArray = per_entry(column="float64")
+    range_m: FloatArray = per_entry(column="float64")
+    age_s: FloatArray = per_entry(column="float64")
+    contributors: IntArray = per_entry(column="text", name="updated_by", value=_contributor_names)
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
-
-    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
-        """Return the rows of ``tracks``."""
-        columns: dict[str, AnyArray | Text] = {
-            "tick": np.repeat(self.tick, np.diff(self.offsets)),
-            "target": Text(self.target, self.roster.names),
-            "azimuth_rad": self.azimuth_rad,
-            "elevation_rad": self.elevation_rad,
-            "range_m": self.range_m,
-            "age_s": self.age_s,
-            "updated_by": combination_text(self.contributors, self.sensors),
-        }
-        return {"tracks": columns}
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
-from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.message import Message
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.message import Message, per_row
 
 
 @dataclass(eq=False)
@@ -20,17 +20,10 @@ class Manoeuvres(Message):
         Rate of the turn, above 0.
     """
 
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "manoeuvres": {"turn_rad": "float64", "rate_rad_s": "float64"}
-    }
+    row_table = "manoeuvres"
 
-    turn_rad: FloatArray
-    rate_rad_s: FloatArray
-
-    def tables(self) -> dict[str, dict[str, AnyArray]]:  # type: ignore[override]
-        """Return the rows of ``manoeuvres``."""
-        columns = {"tick": self.tick, "turn_rad": self.turn_rad, "rate_rad_s": self.rate_rad_s}
-        return {"manoeuvres": columns}
+    turn_rad: FloatArray = per_row(column="float64")
+    rate_rad_s: FloatArray = per_row(column="float64")
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

@@ -4,14 +4,15 @@ A `Message` holds a *batch* of rows in time order: a single row when blocks run 
 when they run in a look-ahead window. Physics written over rows serves both.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.types import AnyArray, IntArray
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.recorded_columns import Columns, DerivedColumns, Text, recorded_as
 
 # How a field of a message depends on its rows.
 PER_ROW = "row"  # first axis is the rows
@@ -22,11 +23,39 @@ STATIC = "static"  # the same for all rows
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 #: Fields that hold instants beside `Message.tick`.
 _TICK_FIELDS: dict[type, tuple[str, ...]] = {}
+#: What each class records by its fields.
+_DERIVED: dict[type, DerivedColumns] = {}
 
 
-def per_row(**kwargs: Any) -> Any:
-    """Declare a field whose first axis is the rows (also the default for plain fields)."""
-    return field(metadata={"per": PER_ROW}, **kwargs)
+def per_row(
+    *,
+    column: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    name: str = "",
+    value: Callable[[Any], Any] | None = None,
+    in_entries: bool = False,
+    **kwargs: Any,
+) -> Any:
+    """Declare a field whose first axis is the rows (also the default for plain fields).
+
+    Parameters
+    ----------
+    column : {"int64", "float64", "bool", "text"}, optional
+        Record the field as a column of this kind in the class's ``row_table``.
+    columns : mapping, optional
+        For a dict: each column it may hold, and its kind. What it does not hold is null.
+    name : str
+        The column's, where it is not the field's.
+    value : callable, optional
+        Given the message, returns what is recorded, where that is not the field itself; needed
+        for text, which is recorded as `Text`.
+    in_entries : bool
+        Also repeat the column for each entry, in ``entry_table``.
+    **kwargs
+        Passed on to `dataclasses.field`.
+    """
+    how = recorded_as(column, columns, name, value, in_entries)
+    return field(metadata={"per": PER_ROW, **how}, **kwargs)
 
 
 def per_row_tick(**kwargs: Any) -> Any:
@@ -34,9 +63,19 @@ def per_row_tick(**kwargs: Any) -> Any:
     return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
 
 
-def per_entry(**kwargs: Any) -> Any:
-    """Declare a field with a varying number of entries per row; the class must have `offsets`."""
-    return field(metadata={"per": PER_ENTRY}, **kwargs)
+def per_entry(
+    *,
+    column: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    name: str = "",
+    value: Callable[[Any], Any] | None = None,
+    **kwargs: Any,
+) -> Any:
+    """Declare a field with a varying number of entries per row; the class must have `offsets`.
+
+    It is recorded in the class's ``entry_table``; for the arguments see `per_row`.
+    """
+    return field(metadata={"per": PER_ENTRY, **recorded_as(column, columns, name, value)}, **kwargs)
 
 
 def static(**kwargs: Any) -> Any:
@@ -67,35 +106,29 @@ def _tick_fields(message_type: type) -> tuple[str, ...]:
     return _TICK_FIELDS[message_type]
 
 
-@dataclass(frozen=True, eq=False)
-class Text:
-    """A text column kept as codes into a tuple of names (code -1 is null).
-
-    Parameters
-    ----------
-    codes : ndarray of int
-    names : tuple of str
-    """
-
-    codes: AnyArray
-    names: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.codes)
-
-
-#: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
-#: In float64, NaN means null.
-Columns = dict[str, AnyArray | Text]
-Schema = dict[str, str]
-
-
 def rows_of(columns: Columns, rows: slice) -> Columns:
     """Return some rows of recorded columns."""
     return {
         name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
         for name, values in columns.items()
     }
+
+
+def derived(message_type: type) -> DerivedColumns:
+    """Return what a message class records by its fields."""
+    if message_type not in _DERIVED:
+        _DERIVED[message_type] = DerivedColumns(
+            message_type, lambda metadata: metadata.get("per") == PER_ENTRY
+        )
+    return _DERIVED[message_type]
+
+
+class _DerivedRecorded:
+    """`Message.recorded` of a class that does not write it itself."""
+
+    def __get__(self, message: Any, owner: type) -> Mapping[str, Mapping[str, str]]:
+        # `dataclass` asks for it while it makes `Message` itself.
+        return derived(owner).recorded if is_dataclass(owner) else {}
 
 
 @dataclass(eq=False)
@@ -111,9 +144,14 @@ class Message:
 
     tick: IntArray
 
+    #: Tables of the columns that fields declare (`per_row`, `per_entry`).
+    row_table: ClassVar[str] = ""
+    entry_table: ClassVar[str] = ""
+
     #: What a recorder writes: table → column → "int64", "float64", "bool" or "text".
-    #: Columns block, tick and time_s are added by the engine.
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    #: Columns block, tick and time_s are added by the engine. It follows from the fields; a class
+    #: whose columns do not writes it, and `tables`, itself.
+    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = _DerivedRecorded()  # type: ignore[assignment]
 
     #: Static fields that may differ between messages: `concatenate` brings them together.
     joins_static: ClassVar[frozenset[str]] = frozenset()
@@ -151,12 +189,12 @@ class Message:
             result.scan = self.scan + scans  # type: ignore[attr-defined]
         return result
 
-    def tables(self) -> dict[str, dict[str, AnyArray | Text]]:
+    def tables(self) -> dict[str, Columns]:
         """Return the rows to record: table → column → values, as declared in `recorded`.
 
-        Every table has a column ``tick``, in order; by default nothing is recorded.
+        Every table has a column ``tick``, in order; by default what the fields declare.
         """
-        return {}
+        return derived(type(self)).tables(self)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

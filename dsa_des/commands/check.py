@@ -5,6 +5,7 @@ from dsa_des.commands.loading import load
 from dsa_des.run.long_run import say_if_long
 from dsa_des.run.simulation import Simulation
 from dsa_des.scene.collection import no_collection
+from dsa_des.scene.graph import in_cycles
 from dsa_des.terminal.terminal import say
 
 
@@ -38,6 +39,7 @@ def check_scene_file(
             return
         simulation = Simulation(loaded)
     say_if_long(simulation)
+    _say_if_slowed(simulation)
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "
@@ -50,3 +52,15 @@ def check_scene_file(
             f"  {node.name}: {float(spec.rate_hz):g} Hz from {float(spec.offset_s):g} s, "
             f"a scan every {float(node.clock.period):,.10g} ticks"
         )
+
+
+def _say_if_slowed(simulation: Simulation) -> None:
+    """Say which blocks keep a feedback loop from looking ahead."""
+    scene = simulation.scene
+    looped = in_cycles(scene.graph)
+    if not looped or not simulation.unwound:
+        return
+    # A window is rewound as a whole, so a block outside of the loop counts as well.
+    say(f"note: the feedback loop of {', '.join(sorted(looped))} runs scan by scan, which is slow:")
+    for name, why in simulation.unwound.items():
+        say(f"  {name} ({scene.classes[name].path()}) {why}")

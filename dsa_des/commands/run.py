@@ -22,6 +22,7 @@ def run_scene(
     as_json: bool,
     simulate_everything: bool,
     realtime: str | None,
+    check_rewinding: bool,
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
@@ -31,6 +32,7 @@ def run_scene(
         loaded,
         target,
         simulate_everything=simulate_everything,
+        check_rewinding=check_rewinding,
         silent=quiet or as_json,
         pacer=pacer,
     )
@@ -42,3 +44,5 @@ def run_scene(
             report.show(console, summary)
         if pacer is not None:
             console.print(pacer.sentence(), soft_wrap=True)
+        if check_rewinding:
+            console.print("Every window ran twice from its saved state and came out the same.")

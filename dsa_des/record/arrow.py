@@ -10,7 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.message import Columns, Schema, Text, rows_of
+from dsa_des.block.message import rows_of
+from dsa_des.block.recorded_columns import Columns, Schema, Text
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.
 ROW_GROUP = 65536

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from dsa_des.block.message import Schema
+from dsa_des.block.recorded_columns import Schema
 from dsa_des.errors import nearest
 
 # Declared names that an error lists.

@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.message import Columns, Message, Schema, Text, rows_of
+from dsa_des.block.message import Message, rows_of
+from dsa_des.block.recorded_columns import Columns, Schema, Text
 from dsa_des.record.attempts import attempt
 from dsa_des.record.declared_columns import DeclaredColumns
 from dsa_des.time.timeline import own_scans

@@ -34,10 +34,13 @@ def record_run(
     target: Path | OutputFolder,
     *,
     simulate_everything: bool = False,
+    check_rewinding: bool = False,
     silent: bool = True,
     pacer: Pacer | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
+
+    With `check_rewinding` every window runs twice, see `Simulation`.
 
     Raises
     ------
@@ -50,7 +53,12 @@ def record_run(
         target = OutputFolder(target)
     target.check()
     recorder = Recorder([])
-    simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
+    simulation = Simulation(
+        loaded,
+        recorder=recorder,
+        simulate_everything=simulate_everything,
+        check_rewinding=check_rewinding,
+    )
     say_if_long(simulation)
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)

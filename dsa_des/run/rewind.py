@@ -8,7 +8,7 @@ while nothing comes back.
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import networkx as nx
@@ -17,6 +17,7 @@ import numpy as np
 from dsa_des.block.component import Component
 from dsa_des.record.recording import Recorder
 from dsa_des.run.channel import Channel
+from dsa_des.run.rewind_check import Witness
 from dsa_des.run.run_state import RewindableRun, RunningBlock
 from dsa_des.scene.graph import in_cycles, window_order
 
@@ -82,13 +83,29 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
     return window_order(opened, set(graph), cut_loops(opened, classes))
 
 
-def may_rewind(graph: nx.DiGraph, classes: Mapping[str, type[Component]], queued: bool) -> bool:
-    """Return whether a scene with feedback can look ahead: every block must let itself rewind."""
-    return (
-        bool(in_cycles(graph))
-        and not queued
-        and all(c.windowed and c.rewindable and c.process is None for c in classes.values())
-    )
+def cannot_rewind(
+    classes: Mapping[str, type[Component]], queued: Collection[str] = ()
+) -> dict[str, str]:
+    """Return the blocks that the engine cannot take back to an earlier state, and why each.
+
+    Parameters
+    ----------
+    classes : mapping
+        The class of each block.
+    queued : collection of str
+        Blocks on a shared processor.
+    """
+    found = {}
+    for name, cls in sorted(classes.items()):
+        if cls.process is not None:
+            found[name] = "has a process of its own"
+        elif not cls.windowed:
+            found[name] = "runs scan by scan (windowed is False)"
+        elif not cls.rewindable:
+            found[name] = "does not let itself be rewound (rewindable is False)"
+        elif name in queued:
+            found[name] = "shares a processor"
+    return found
 
 
 def rewinding_windows(simulation: RewindableRun, end: int) -> Iterator[tuple[int, int]]:
@@ -122,6 +139,8 @@ def rewinding_windows(simulation: RewindableRun, end: int) -> Iterator[tuple[int
             simulation.window = (start, stop)
             simulation.run_window(start, stop)
             simulation.raise_failure()
+        if simulation.witness is not None:
+            _run_again(simulation, simulation.witness, checkpoint, start, stop)
         coming = checkpoint.earliest_since(feedback, -1)
         if coming < 0:
             length = min(2 * length, simulation.window_ticks)
@@ -131,6 +150,17 @@ def rewinding_windows(simulation: RewindableRun, end: int) -> Iterator[tuple[int
             came = coming
         yield start, stop
         start = stop
+
+
+def _run_again(
+    simulation: RewindableRun, witness: Witness, checkpoint: "Checkpoint", start: int, stop: int
+) -> None:
+    """Run a window a second time from its saved state; it must give the same."""
+    first = witness.seen()
+    checkpoint.restore()
+    simulation.run_window(start, stop)
+    times_s = start / simulation.ticks_per_s, stop / simulation.ticks_per_s
+    witness.compare(first, simulation.failure, times_s)
 
 
 class Checkpoint:

@@ -10,6 +10,7 @@ from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.run.channel import Channel
+from dsa_des.run.rewind_check import Witness
 
 
 class RunningBlock(Protocol):
@@ -60,13 +61,14 @@ class RewindableRun(RunState, Protocol):
 
     ``failure`` is what a block raised in this window and why, ``failed_at`` the instants of the
     call; ``cuts`` are ticks at which windows end, ``cut_edges`` the (source, target) pairs of the
-    wires that close loops.
+    wires that close loops. ``witness``, if there is one, compares windows that run twice.
     """
 
     failure: tuple[BlockFailure, BaseException] | None
     failed_at: IntArray
     cuts: list[int]
     cut_edges: set[tuple[str, str]]
+    witness: Witness | None
     window_ticks: int
 
     @property

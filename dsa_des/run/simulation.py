@@ -29,9 +29,10 @@ from dsa_des.run.effect_plan import Planned, plan, unspent
 from dsa_des.run.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.run.pinpoint import pinpoint
 from dsa_des.run.processors import Processing, Processor
-from dsa_des.run.rewind import cut_loops, may_rewind, rewinding_windows, telling_order
+from dsa_des.run.rewind import cannot_rewind, cut_loops, rewinding_windows, telling_order
+from dsa_des.run.rewind_check import Witness
 from dsa_des.run.run_state import RunningBlock
-from dsa_des.scene.graph import depths, window_order
+from dsa_des.scene.graph import depths, in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, ScanClock
 from dsa_des.time.randomness import Streams
@@ -103,11 +104,15 @@ class Simulation:
         Given each planned effect and what was built of it, returns what is used instead.
     cuts : iterable of int
         Ticks at which look-ahead windows are cut in two; results do not depend on them.
+    check_rewinding : bool
+        Run every window a second time from its saved state and compare all that blocks send and
+        remember; the first that did something else is the `BlockFailure` of the run.
 
     Raises
     ------
     SceneError
-        If the scene has no length, or a block cannot be set up.
+        If the scene has no length, a block cannot be set up, or `check_rewinding` is asked for
+        where a block cannot be rewound.
     """
 
     def __init__(
@@ -121,6 +126,7 @@ class Simulation:
         simulate_everything: bool = False,
         wrap_effect: Callable[[Planned, Any], Any] | None = None,
         cuts: Iterable[int] = (),
+        check_rewinding: bool = False,
     ) -> None:
         if window is not None and window < 1:
             raise ValueError(f"window is {window}: it must be 1 or more scans")
@@ -137,8 +143,13 @@ class Simulation:
         self._has_run = False
         self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
-        queued = any(block.options.processor for block in scene.blocks.values())
-        self._rewinds = window != 1 and may_rewind(scene.graph, scene.classes, queued)
+        #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
+        queued = {name for name, block in scene.blocks.items() if block.options.processor}
+        self.unwound = cannot_rewind(scene.classes, queued)
+        loops = bool(in_cycles(scene.graph))
+        self._rewinds = window != 1 and not self.unwound and (loops or check_rewinding)
+        if check_rewinding and not self._rewinds:
+            raise self._nothing_rewinds()
         self.cut_edges = cut_loops(scene.graph, scene.classes) if self._rewinds else set()
         self._place = telling_order(scene.graph, scene.classes)
         self.streams = self._make_streams()
@@ -148,6 +159,10 @@ class Simulation:
         self.plan = self._plan_effects(simulate_everything, wrap_effect)
         self._set_up_components()
         self.nodes = self._build_nodes(window, shuffle_ties)
+        self.witness = Witness(self.components.values()) if check_rewinding else None
+        if self.witness is not None:
+            for node in self.nodes.values():
+                node.runner = self.witness.runner(node.component)
         connect(scene, self.nodes, self.replicas)
         if self.replicas is None:  # replicas in lock step were judged one by one
             check_reach(scene, self.nodes, self.end_tick)
@@ -163,6 +178,15 @@ class Simulation:
     def span_ticks(self) -> int:
         """Ticks from one replica's start to the next; 0 for a single run."""
         return 0 if self.replicas is None else self.replicas.span_ticks
+
+    def _nothing_rewinds(self) -> SceneError:
+        said = "check_rewinding: nothing is rewound in this scene"
+        if not self.unwound:
+            return SceneError([self._problem("blocks", f"{said} with a window of one scan")])
+        return SceneError(
+            self._problem(f"blocks.{name}.type", f"{said}: {self.scene.classes[name].path()} {why}")
+            for name, why in self.unwound.items()
+        )
 
     # -- building ------------------------------------------------------------------------------
 
@@ -440,6 +464,8 @@ class Simulation:
 
     def run_window(self, start: int, end: int) -> None:
         """Run every block over [start, end)."""
+        if self.witness is not None:
+            self.witness.begin()
         for node in self.nodes.values():
             node.open_window(start, end)
         try:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from engine_blocks import Beat, Pulse
 
-from components.messages.detections import Detections
+from components.messages.detections import EXTRAS, Detections
 from components.radar.threshold_radar import ThresholdRadar
 from components.sensor.look import Look
+from dsa_des.block.message import per_entry
 from dsa_des.block.ports import Output
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import ColumnSink, Recorder
@@ -103,10 +104,9 @@ class CloudyRadar(ThresholdRadar):
 class CloudyDetections(Detections):
     """Detections with a column of their own."""
 
-    recorded = {
-        **Detections.recorded,
-        "detections": {**Detections.recorded["detections"], "cloud_share": "float64"},
-    }
+    extras: dict = per_entry(
+        columns={**EXTRAS, "cloud_share": "float64"}, value=lambda message: message.extra_columns()
+    )
 
 
 class DeclaredCloudyRadar(CloudyRadar):

@@ -1,0 +1,129 @@
+"""What a message records follows from its fields; columns and their order are the files' face."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from components.messages.detections import EXTRAS, Detections, FusedDetections, Tracks
+from components.messages.steering import Manoeuvres
+from dsa_des.block.message import Message, Text, per_entry, per_row, static
+
+# As files of earlier versions have them; whoever reads one by position must not be surprised.
+COLUMNS = {
+    "scans": "scan evaluated detected skipped_absent skipped_off skipped_field_of_view "
+    "skipped_range skipped_culled",
+    "detections": "scan target azimuth_rad elevation_rad range_m confidence true_azimuth_rad "
+    "true_elevation_rad true_range_m snr_db detection_probability pixels declared illuminated_s "
+    "ned_azimuth_rad ned_elevation_rad own_lat_deg own_lon_deg own_alt_m",
+    "fused": "target sensors azimuth_rad elevation_rad range_m angle_source range_source "
+    "true_azimuth_rad true_elevation_rad true_range_m",
+    "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by",
+    "manoeuvres": "turn_rad rate_rad_s",
+}
+KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared"]}
+TEXTS = ["target", "sensors", "angle_source", "range_source", "updated_by"]
+
+
+@dataclass(eq=False)
+class Catch(Message):
+    """Fish by net: a row per haul."""
+
+    row_table = "hauls"
+    entry_table = "fish"
+
+    haul: np.ndarray = per_row(column="int64", name="number", in_entries=True)
+    crew: np.ndarray = per_row(
+        column="text", in_entries=True, value=lambda m: Text(m.crew, m.names)
+    )
+    note: np.ndarray = per_row()
+    offsets: np.ndarray = per_row()
+    mass_kg: np.ndarray = per_entry(column="float64")
+    extras: dict = per_entry(columns={"age_years": "float64", "marked": "bool"})
+    names: tuple = static()
+
+
+def catch(**extras):
+    return Catch(
+        np.array([3, 7, 9]),
+        haul=np.array([1, 2, 3]),
+        crew=np.array([0, 1, 0]),
+        note=np.zeros(3),
+        offsets=np.array([0, 2, 2, 3]),
+        mass_kg=np.array([0.5, 0.75, 4.0]),
+        extras=extras,
+        names=("ann", "ben"),
+    )
+
+
+@pytest.mark.parametrize("message", [Detections, FusedDetections, Tracks, Manoeuvres])
+def test_tables_have_the_columns_they_always_had(message):
+    for table, columns in message.recorded.items():
+        assert " ".join(columns) == COLUMNS[table]
+        for name, kind in columns.items():
+            expected = next((k for k, names in KINDS.items() if name in names), "float64")
+            if name.startswith("skipped_"):
+                expected = "int64"
+            assert kind == ("text" if name in TEXTS else expected), name
+
+
+def test_columns_follow_from_fields():
+    assert Catch.recorded == {
+        "hauls": {"number": "int64", "crew": "text"},
+        "fish": {
+            "number": "int64",
+            "crew": "text",
+            "mass_kg": "float64",
+            "age_years": "float64",
+            "marked": "bool",
+        },
+    }
+    assert Message.recorded == {} and Message(np.array([1])).tables() == {}
+
+
+def test_rows_are_repeated_for_their_entries():
+    tables = catch(marked=np.array([True, False, True])).tables()
+    hauls, fish = tables["hauls"], tables["fish"]
+    assert hauls["tick"].tolist() == [3, 7, 9] and hauls["number"].tolist() == [1, 2, 3]
+    assert fish["tick"].tolist() == [3, 3, 9] and fish["number"].tolist() == [1, 1, 3]
+    assert [fish["crew"].names[code] for code in fish["crew"].codes] == ["ann", "ann", "ann"]
+    assert fish["mass_kg"].tolist() == [0.5, 0.75, 4.0]
+    assert fish["marked"].tolist() == [True, False, True]
+    assert "age_years" not in fish  # not held: the recorder writes null
+
+
+def test_a_subclass_declares_more():
+    @dataclass(eq=False)
+    class Measured(Catch):
+        extras: dict = per_entry(columns={"length_m": "float64"})
+
+    assert list(Measured.recorded["fish"]) == ["number", "crew", "mass_kg", "length_m"]
+    assert "age_years" in Catch.recorded["fish"]
+
+
+def test_a_dict_cannot_take_the_place_of_another_fields_column():
+    with pytest.raises(ValueError, match=r"Catch\.extras holds 'mass_kg'"):
+        catch(mass_kg=np.zeros(3)).tables()
+
+
+def test_a_column_without_a_table_or_twice_is_refused():
+    @dataclass(eq=False)
+    class Homeless(Message):
+        size: np.ndarray = per_row(column="float64")
+
+    @dataclass(eq=False)
+    class Twice(Message):
+        row_table = "sizes"
+        size: np.ndarray = per_row(column="float64")
+        other: np.ndarray = per_row(column="float64", name="size")
+
+    with pytest.raises(TypeError, match=r"Homeless\.size .* no row_table"):
+        _ = Homeless.recorded
+    with pytest.raises(TypeError, match="two fields for column 'size'"):
+        _ = Twice.recorded
+    with pytest.raises(ValueError, match=r"'float32'.*float64"):
+        per_row(column="float32")
+
+
+def test_the_extras_of_detections_are_columns_of_theirs():
+    assert EXTRAS.items() <= Detections.recorded["detections"].items()
