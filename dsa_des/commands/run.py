@@ -32,6 +32,7 @@ def run_scene(
         target,
         simulate_everything=simulate_everything,
         silent=quiet or as_json,
+        warn=not quiet,
         pacer=pacer,
     )
     if as_json:
