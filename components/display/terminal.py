@@ -171,7 +171,7 @@ def _print_table(
         table.add_column(
             Text(name.removesuffix(">")),
             justify="right" if number else "left",
-            no_wrap=number,
+            no_wrap=number or not name,
             overflow="fold",
         )
     for row in rows:

@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
+from components.radar.plausible import implausible
 from components.sensor.parameters import SensorParameters
 from dsa_des.block.component import Parameters
 
@@ -113,15 +114,20 @@ class LinkBudgetParameters(RadarParameters):
         )
         if self.calibrate is None:
             return budget
-        bandwidth_hz = calibrated_bandwidth(
-            budget,
-            rcs_dbsm=self.calibrate.rcs_dbsm,
-            range_km=self.calibrate.range_km,
-            pd=self.calibrate.pd,
-            pulses=self.pulses,
-            false_alarm_probability=self.false_alarm_probability,
-            model=f"swerling{self.calibrate.swerling}",
-        )
+        try:
+            bandwidth_hz = calibrated_bandwidth(
+                budget,
+                rcs_dbsm=self.calibrate.rcs_dbsm,
+                range_km=self.calibrate.range_km,
+                pd=self.calibrate.pd,
+                pulses=self.pulses,
+                false_alarm_probability=self.false_alarm_probability,
+                model=f"swerling{self.calibrate.swerling}",
+            )
+        except ValueError as error:
+            # What follows from a carrier of 24 Hz must not be blamed on the range.
+            wrong = implausible(self)
+            raise ValueError("; ".join([*wrong, str(error)])) from error
         return replace(budget, bandwidth_hz=bandwidth_hz)
 
 

@@ -16,6 +16,7 @@ from components.radar.clutter_effects import GroundClutter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.ladder import DETECTION, RCS
 from components.radar.parameters import LinkBudgetParameters, budget_report
+from components.radar.plausible import high_false_alarms, implausible
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
@@ -129,6 +130,11 @@ class LinkBudgetRadar(Radar):
             model=model,
         )
         return float(10.0 * np.log10(snr))
+
+    def warnings(self) -> list[str]:
+        """Say which values no radar has, and what its false alarm probability comes to."""
+        snr_db = self.required_snr_db(0.5, "swerling1")
+        return [*super().warnings(), *implausible(self.p), *high_false_alarms(self.p, snr_db)]
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use."""

@@ -14,6 +14,7 @@ from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
 from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
+from components.traffic.suspicious import suspicions
 from components.traffic.traffic_file import TrafficFile
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
@@ -93,6 +94,11 @@ class RecordedTraffic(TrafficSource):
             return [SharedTimes(self.content.ownship.sample_times_s)]
         each = OwnTimes([target.sample_times_s for target in self.content.intruders])
         return [SharedTimes(self.content.ownship.sample_times_s), each]
+
+    def warnings(self) -> list[str]:
+        """Say what no aircraft does, and which error of units it looks like."""
+        lines = suspicions(self.content, float(self.context.duration_s))
+        return [f"file {self.p.file}: {line}" for line in lines]
 
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and what the file's own clock said at time 0."""

@@ -284,6 +284,13 @@ class Component:
         """Return sections of the run's summary that only this block knows."""
         return {}
 
+    def warnings(self) -> list[str]:
+        """Say, after `setup`, what of this block decides results unseen or cannot be meant.
+
+        One sentence each, which names the parameter; the engine adds the block's name.
+        """
+        return []
+
     def left_out(self) -> list[str]:
         """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []

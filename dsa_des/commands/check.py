@@ -4,6 +4,7 @@ from dsa_des.block.foreign import Foreign, Imports, imports
 from dsa_des.commands.loading import load
 from dsa_des.run.long_run import say_if_long
 from dsa_des.run.simulation import Simulation
+from dsa_des.run.warnings import say_warnings, warnings_of
 from dsa_des.scene.collection import no_collection
 from dsa_des.scene.graph import in_cycles
 from dsa_des.terminal.terminal import say
@@ -40,6 +41,7 @@ def check_scene_file(
         simulation = Simulation(loaded)
     say_if_long(simulation)
     _say_if_slowed(simulation)
+    say_warnings(warnings_of(simulation), "warning")
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

@@ -34,6 +34,7 @@ def run_scene(
         simulate_everything=simulate_everything,
         check_rewinding=check_rewinding,
         silent=quiet or as_json,
+        warn=not quiet,
         pacer=pacer,
     )
     if as_json:

@@ -21,6 +21,7 @@ from dsa_des.run.long_run import say_if_long
 from dsa_des.run.pacing import Pacer
 from dsa_des.run.reports import draw_all, load_reports
 from dsa_des.run.simulation import Outcome, Simulation
+from dsa_des.run.warnings import say_warnings, warnings_of
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
@@ -36,11 +37,13 @@ def record_run(
     simulate_everything: bool = False,
     check_rewinding: bool = False,
     silent: bool = True,
+    warn: bool = False,
     pacer: Pacer | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
     With `check_rewinding` every window runs twice, see `Simulation`.
+    What blocks warn of is listed in ``run.json``; with `warn` also on standard error.
 
     Raises
     ------
@@ -60,6 +63,9 @@ def record_run(
         check_rewinding=check_rewinding,
     )
     say_if_long(simulation)
+    warnings = warnings_of(simulation)
+    if warn:
+        say_warnings(warnings, "note")
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
@@ -86,6 +92,8 @@ def record_run(
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        if warnings:
+            info["warnings"] = warnings
         if notes:
             info["notes"] = list(notes)
         write_run_json(folder, info)

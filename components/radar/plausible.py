@@ -1,0 +1,67 @@
+"""Values of a radar's link budget that can be computed with and that no radar has."""
+
+import math
+from typing import Any
+
+#: Key → least and largest value of radars that were built, and the unit.
+_RANGES = {
+    "frequency_hz": (3e6, 3e11, "Hz"),
+    "wavelength_m": (1e-3, 100.0, "m"),
+    "power_w": (1e-4, 1e8, "W"),
+    "antenna_gain_db": (-3.0, 75.0, "dB"),
+    "noise_figure_db": (0.0, 30.0, "dB"),
+    "losses_db": (0.0, 50.0, "dB"),
+    "integration_gain_db": (0.0, 70.0, "dB"),
+    "bandwidth_hz": (1.0, 2e10, "Hz"),
+}
+#: Noise above the threshold in one look of a hundred is more than any radar's operator bears.
+HIGH_FALSE_ALARM_PROBABILITY = 0.01
+_PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
+
+
+def implausible(parameters: Any) -> list[str]:
+    """Say which values no radar has, by their own names.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    """
+    found = []
+    for key, (low, high, unit) in _RANGES.items():
+        value = getattr(parameters, key)
+        if value is None or low <= value <= high:
+            continue
+        text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
+        found.append(text + _other_unit(value, low, high, unit))
+    return found
+
+
+def _other_unit(value: float, low: float, high: float, unit: str) -> str:
+    """Name a multiple of the unit in which the number would be plausible."""
+    if unit == "dB":
+        return ""
+    for factor in (1e9, 1e6, 1e3, 1e-3, 1e-6):
+        # Amid the range, not just inside it.
+        if value > 0 and 10.0 * low <= value * factor <= high:
+            return f" (is it {value:g} {_PREFIXES[factor]}{unit}, {value * factor:g} {unit}?)"
+    return ""
+
+
+def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
+    """Say that a radar detects echoes below its noise because so many false alarms are allowed.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    snr_db : float
+        At which half of the looks detect.
+    """
+    pfa = parameters.false_alarm_probability
+    if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
+        return []
+    by_default = "false_alarm_probability" not in parameters.model_fields_set
+    whose = "the thesis's, as the scene gives none" if by_default else "as the scene says"
+    return [
+        f"false_alarm_probability is {pfa:g} per look ({whose}): half of the looks at a target "
+        f"detect at an SNR of {snr_db:.1f} dB; with 1e-6, as radars have, it takes far more"
+    ]

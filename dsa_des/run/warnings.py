@@ -1,0 +1,26 @@
+"""What blocks say of their own values before a run: defaults that decide, what cannot be meant."""
+
+from dsa_des.record.attempts import attempt
+from dsa_des.run.simulation import Simulation
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import shortened
+
+MOST_WARNINGS = 20
+_LONGEST = 500
+
+
+def warnings_of(simulation: Simulation) -> list[str]:
+    """Return what the blocks of a scene that is set up warn of, each with its block's name."""
+    found: list[str] = []
+    for name, component in simulation.components.items():
+        for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
+            found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+    return found
+
+
+def say_warnings(warnings: list[str], word: str) -> None:
+    """Print warnings on standard error, after a word such as ``note``."""
+    for text in warnings[:MOST_WARNINGS]:
+        say(f"{word}: {text}", err=True)
+    if len(warnings) > MOST_WARNINGS:
+        say(f"{word}: and {len(warnings) - MOST_WARNINGS} more", err=True)
