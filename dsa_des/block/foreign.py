@@ -1,29 +1,34 @@
 """Importing what a file names: ``module:Class``, and entry points that other packages registered.
 
-The working directory is where a user's own modules lie, and where anybody's files may lie. It is
-looked at last, only for a module that is not installed, and only while that module is imported;
-no file in it can stand in for one of ours or of an installed package.
+The working directory and the folder of the scene are where a user's own modules lie, and where
+anybody's files may lie. No file there can stand in for one of ours or of an installed package:
+see `dsa_des.block.module_search`.
 """
 
 import contextlib
 import importlib
-import importlib.util
 import io
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block import source_file
+from dsa_des.block.hidden import refuse_hidden
+from dsa_des.block.module_search import (
+    file_of,
+    last_on_path,
+    needed,
+    other_of_the_name,
+    remember,
+    searched,
+)
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import UsageError, did_you_mean
 
 _OURS = "dsa-des"
-# Modules found beside the scene: what is beside them may be imported with them again.
-_BESIDE: set[str] = set()
 
 
 class NotImportable(Exception):
@@ -100,27 +105,34 @@ def imports(policy: Imports) -> Iterator[Imports]:
         _IMPORTS.reset(token)
 
 
-def load_named(name: str, key: str = "") -> Any:
-    """Return what ``module:Class`` names.
+def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
+    """Return what ``module:Class`` or ``./file.py:Class`` names.
 
     Parameters
     ----------
     name : str
+        One that knows the folder it was written in (`SourcedText`) is looked for there, too.
     key : str
         Who names it, for messages.
+    beside : sequence of Path
+        Further folders in which a module may lie, such as that of the scene.
 
     Raises
     ------
     NotImportable
         If it cannot be imported.
     """
-    module_name, _, class_name = name.partition(":")
-    if not class_name or not all(module_name.split(".")):
-        raise NotImportable("must have the form module:Class")
+    module_name, class_name = source_file.split_name(name)
+    path = source_file.path_of(name) if source_file.is_file(module_name) else None
+    if not class_name or (path is None and not all(module_name.split("."))):
+        raise NotImportable("must have the form module:Class or ./file.py:Class")
+    beside = (*([Path(name.folder)] if hasattr(name, "folder") else []), *beside)
     policy = _IMPORTS.get()
     if policy.announce is not None or not policy.allowed:
-        policy.about_to(Foreign(key, name, module_name, file_of(module_name)))
-    module = _imported(module_name)
+        file = file_of(module_name, beside) if path is None else str(path)
+        short = module_name if path is None else path.stem
+        policy.about_to(Foreign(key, name, short, file))
+    module = _imported(module_name, beside) if path is None else _imported_file(path)
     try:
         with strangers_code():
             return getattr(module, class_name)
@@ -145,8 +157,12 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
     ------
     NotImportable
         If it cannot be imported.
+    UsageError
+        If it is ours and another package hides it.
     """
-    if key and not is_ours(point):
+    if is_ours(point):
+        refuse_hidden(point.module)
+    elif key:
         policy = _IMPORTS.get()
         if policy.announce is not None or not policy.allowed:
             policy.about_to(Foreign(key, point.name, point.module, file_of(point.module)))
@@ -179,87 +195,43 @@ def is_ours(point: EntryPoint) -> bool:
     return point.dist is None or point.dist.name.lower().replace("_", "-") == _OURS
 
 
-def file_of(module_name: str) -> str:
-    """Return the file that a module is imported from, without importing anything.
-
-    Where there is none: ``there is no such module``, or the kind of module it is.
-    """
-    try:
-        spec = _spec(module_name)
-    except (ImportError, AttributeError, TypeError, ValueError, OSError):
-        spec = None
-    if spec is None:
-        return "there is no such module"
-    if spec.has_location and spec.origin:
-        return spec.origin
-    if spec.submodule_search_locations:
-        return "a folder without __init__.py"
-    return spec.origin or "no file"
-
-
-def _spec(module_name: str) -> ModuleSpec | None:
-    top, *rest = module_name.split(".")
-    with _path_for(top):
-        # Finds the module of a name without dots; nothing is imported.
-        spec = importlib.util.find_spec(top) if top else None
-    name = top
-    for part in rest:
-        if spec is None or spec.submodule_search_locations is None:
-            return None
-        name = f"{name}.{part}"
-        spec = PathFinder.find_spec(name, list(spec.submodule_search_locations))
-    return spec
-
-
-@contextlib.contextmanager
-def _path_for(top: str) -> Iterator[None]:
-    """Put the working directory last on the module path if nothing before it has the module."""
-    here = str(Path.cwd())
-    if here in sys.path or (not _is_beside(top, here) and _installed(top)):
-        yield
-        return
-    importlib.invalidate_caches()
-    sys.path.append(here)
-    try:
-        yield
-    finally:
-        with contextlib.suppress(ValueError):  # a module may have changed the path
-            sys.path.reverse()
-            sys.path.remove(here)
-        sys.path.reverse()
-
-
-def _is_beside(top: str, here: str) -> bool:
-    return f"{here}:{top}" in _BESIDE
-
-
-def _installed(top: str) -> bool:
-    try:
-        return top in sys.modules or importlib.util.find_spec(top) is not None
-    except (ImportError, AttributeError, TypeError, ValueError, OSError):
-        return False
-
-
-def _imported(module_name: str) -> Any:
+def _imported(module_name: str, beside: Sequence[Path]) -> Any:
     top = module_name.partition(".")[0]
-    here = str(Path.cwd())
-    beside = _is_beside(top, here) or not _installed(top)
+    folders = searched(beside)
+    if others := other_of_the_name(top, folders):
+        raise NotImportable(
+            f"module {top!r} was imported from {others[0]} before, which {others[1]} is not: "
+            "name that ./FILE.py:CLASS"
+        )
+    extra = needed(top, folders)
     try:
-        with _path_for(top), strangers_code(), _no_output(module_name):
+        with last_on_path(extra), strangers_code(), _no_output(module_name):
             module = importlib.import_module(module_name)
     except Left as error:
-        raise NotImportable(_why(module_name, error)) from error.__cause__
-    if beside:
-        _BESIDE.add(f"{here}:{top}")
+        raise NotImportable(_why(module_name, beside, error)) from error.__cause__
+    remember(top, extra)
     return module
 
 
-def _why(module_name: str, error: Left) -> str:
-    cause, file = error.__cause__, file_of(module_name)
+def _imported_file(path: Path) -> Any:
+    if what := source_file.missing(path):
+        raise NotImportable(what)
+    try:
+        with strangers_code(), _no_output(path.name):
+            return source_file.imported(path)
+    except Left as error:
+        left = "it left with " if isinstance(error.__cause__, SystemExit) else ""
+        raise NotImportable(f"{path} cannot be imported: {left}{error}") from error.__cause__
+
+
+def _why(module_name: str, beside: Sequence[Path], error: Left) -> str:
+    cause, file = error.__cause__, file_of(module_name, beside)
     missing = (cause.name or "") if isinstance(cause, ModuleNotFoundError) else ""
     if missing and (module_name == missing or module_name.startswith(f"{missing}.")):
+        others = [folder for folder in searched(beside)[1:] if Path(folder).is_dir()]
         return (
-            f"there is no module {module_name!r} in the working directory or on the Python path"
+            f"there is no module {module_name!r} in the working directory"
+            f"{''.join(f', in {folder}' for folder in others)} or on the Python path"
             f"{_shadowed(module_name)}"
         )
     if isinstance(cause, SystemExit):
@@ -284,6 +256,8 @@ def _shadowed(module_name: str) -> str:
 
 def _where(module: Any) -> str:
     file = getattr(module, "__file__", None)
+    if file == module.__name__:
+        return str(file)
     return f"module {module.__name__!r}" + (f" ({file})" if file else "")
 
 

@@ -1,9 +1,12 @@
-"""Finding blocks by name: entry points of group ``dsa_des.components``, or ``module:Class``.
+"""Finding blocks by name: entry points of group ``dsa_des.components``, or a class by its place.
+
+That is ``module:Class`` or ``./file.py:Class``.
 
 Our own blocks are registered in the same way as a stranger's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from dsa_des.block.component import Component, Parameters
@@ -26,14 +29,16 @@ class NotImported(UnknownType):
     """
 
 
-def find(type_name: str, key: str = "") -> type[Component]:
-    """Return the class of a registered block type or of ``module:Class``.
+def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Component]:
+    """Return the class of a registered block type, ``module:Class`` or ``./file.py:Class``.
 
     Parameters
     ----------
     type_name : str
     key : str
         Who names it, for those who want to know what is imported.
+    beside : sequence of Path
+        Folders in which a module may lie, such as that of the scene.
 
     Raises
     ------
@@ -47,7 +52,7 @@ def find(type_name: str, key: str = "") -> type[Component]:
         hint = did_you_mean(type_name, registered())
         raise UnknownType(f"unknown block type{hint} (or module:Class)")
     try:
-        found = load_named(type_name, key) if point is None else load_point(point, key)
+        found = load_named(type_name, key, beside) if point is None else load_point(point, key)
     except NotAllowed as error:
         raise NotImported(str(error)) from None
     except NotImportable as error:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.block.entry_points import registered
+from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
     check_workers,
     finish,
@@ -98,6 +99,7 @@ def _compare_swap(
         block, equals, name = swap.partition("=")
         if not equals or not name:
             raise UsageError(f"--swap {swap!r}: must have the form BLOCK=TYPE")
+        name = absolute(name)
         if block not in scene.blocks:
             hint = did_you_mean(block, scene.blocks)
             raise UsageError(f"--swap {swap}: the scene has no block {block!r}{hint}")

@@ -4,6 +4,7 @@ Each entry point is a `click.Command` in a module that imports click only, so th
 instant: a command imports what it needs when it is called.
 """
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -12,7 +13,9 @@ import click
 
 from dsa_des.block.entry_points import registered
 from dsa_des.commands.plain_errors import plain_output
+from dsa_des.errors import UsageError
 from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.terminal import say_lines
 from dsa_des.text.safe_text import printable
 
 COMMANDS = "dsa_des.commands"
@@ -41,7 +44,11 @@ class PluginGroup(click.Group):
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run a command and end the program."""
         with plain_ending(), plain_output():
-            return super().main(*args, **kwargs)
+            try:
+                return super().main(*args, **kwargs)
+            except UsageError as error:  # a registered command that cannot be imported
+                say_lines(f"error: {error}", err=True)
+                sys.exit(2)
 
     # click turns KeyboardInterrupt into exit code 1 outside of these two.
     def make_context(self, *args: Any, **kwargs: Any) -> click.Context:

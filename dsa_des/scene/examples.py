@@ -110,9 +110,10 @@ def folders() -> list[Path]:
     """
     found = []
     for point in registered(GROUP).values():
+        folder_of = installed(point)
         try:
             with strangers_code():
-                found.append(Path(installed(point)()))
+                found.append(Path(folder_of()))
         except Left as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__

@@ -100,29 +100,34 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     return []
 
 
-def apply_swap(scene: SceneFile, assignment: str) -> tuple[list[Problem], list[str]]:
-    """Apply one ``--swap``; return what is wrong with it and the dropped parameters' keys."""
+def apply_swap(
+    scene: SceneFile, assignment: str, folder: Path | None = None
+) -> tuple[list[Problem], list[str]]:
+    """Apply one ``--swap``; return what is wrong with it and the dropped parameters' keys.
+
+    `folder` is that of the file that says so, if one does: it is where ``./file.py:Class`` lies.
+    """
     parsed = parse_assignment(assignment, "--swap")
     if isinstance(parsed, Problem):
         return [parsed], []
-    name, type_name = parsed
+    name, type_name = parsed[0], SourcedText.of(parsed[1], folder or Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
         return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
     try:
-        cls = find(type_name, dotted(_type_key(name)))
+        cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
-        blocks[name]["type"] = _sourced(type_name)
+        blocks[name]["type"] = type_name
         scene.sources[_type_key(name)] = COMMAND_LINE
         return [], []
     except UnknownType as error:
-        return [Problem(COMMAND_LINE, f"--swap {name}", str(error), type_name)], []
+        return [Problem(COMMAND_LINE, f"--swap {name}", str(error), str(type_name))], []
     block = blocks[name]
     dropped = sorted(key for key in block if key not in _known_keys(cls))
     for parameter in dropped:
         del block[parameter]
-    block["type"] = _sourced(type_name)
+    block["type"] = type_name
     scene.sources[_type_key(name)] = COMMAND_LINE
     return [], [f"blocks.{name}.{parameter}" for parameter in dropped]
 

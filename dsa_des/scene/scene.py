@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from dsa_des.block.component import Component, Parameters, as_written
 from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.block.sections import section_models
+from dsa_des.block.source_file import absolute
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block import Block
@@ -325,7 +326,7 @@ def _blocks(
             problems.append(scene_file.problem((*key, "type"), message))
             continue
         try:
-            cls = find(type_name, dotted((*key, "type")))
+            cls = find(type_name, dotted((*key, "type")), (scene_file.path.parent,))
         except NotImported:
             continue
         except UnknownType as error:
@@ -346,7 +347,7 @@ def _blocks(
             problems.append(scene_file.problem(key, message))
             continue
         check_lookalikes(scene_file, key, given, cls.Parameters, problems)
-        blocks[name] = Block(name, str(type_name), cls, parameters, options)
+        blocks[name] = Block(name, str(absolute(type_name)), cls, parameters, options)
     return classes, blocks
 
 

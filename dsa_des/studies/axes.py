@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.component import as_written
+from dsa_des.block.source_file import absolute
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import parse_rational
@@ -141,7 +142,12 @@ def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
         raise ValueError("a swap takes types of blocks, as texts")
     labels = tuple(str(value) for value in values)
     _refuse_twice(labels)
-    return Axis(key, labels, ((),) * len(labels), tuple(((block, name),) for name in labels))
+    return Axis(
+        key,
+        labels,
+        ((),) * len(labels),
+        tuple(((block, str(absolute(value))),) for value in values),
+    )
 
 
 def _files(key: str, spec: Mapping[str, Any]) -> Axis:

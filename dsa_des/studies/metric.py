@@ -8,6 +8,7 @@ so ten thousand replicas cost little more than one.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -171,8 +172,14 @@ class Metric:
         return {}
 
 
-def find_metric(name: str) -> type[Metric]:
-    """Return a registered metric, or that of ``module:Class``.
+def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
+    """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``.
+
+    Parameters
+    ----------
+    name : str
+    beside : sequence of Path
+        Folders in which a module may lie, such as that of the scene.
 
     Raises
     ------
@@ -184,7 +191,9 @@ def find_metric(name: str) -> type[Metric]:
         hint = did_you_mean(name, registered(METRICS))
         raise ValueError(f"unknown metric{hint} (or module:Class)")
     try:
-        found = load_named(name, "metrics") if point is None else load_point(point, "metrics")
+        found = (
+            load_named(name, "metrics", beside) if point is None else load_point(point, "metrics")
+        )
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
     if not (isinstance(found, type) and issubclass(found, Metric)):

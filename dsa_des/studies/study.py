@@ -44,7 +44,7 @@ class MetricSpec:
         """
         from dsa_des.studies.metric import check_tables
 
-        cls = find_metric(self.name)
+        cls = find_metric(self.name, (scene.path.parent,))
         try:
             with strangers_code(ValueError):
                 check_tables(cls, scene)
@@ -274,7 +274,7 @@ def changed_scene(
     file = base.copy()
     problems: list[Problem] = []
     for block, name in swaps:
-        found, _ = apply_swap(file, f"{block}={name}")
+        found, _ = apply_swap(file, f"{block}={name}", Path(source).parent)
         problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
     for key, value in sets:
         problems += set_value(file, key, deepcopy(value), source)

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from dsa_des.block.component import SourcedText
 from dsa_des.block.entry_points import registered
+from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.overrides import apply_set
@@ -165,7 +166,10 @@ class _Reader:
         return tuple(flat.items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
-        return tuple((block, str(name)) for block, name in self.table("swap").items())
+        return tuple(
+            (block, str(absolute(name)) if isinstance(name, str) else str(name))
+            for block, name in self.table("swap").items()
+        )
 
     # -- the base scene --------------------------------------------------------------------
 
@@ -271,7 +275,7 @@ class _Reader:
                 self.add(key, "must be the name of a metric, or a table {metric = NAME, ...}", item)
                 continue
             keys = {name: value for name, value in table.items() if name != "metric"}
-            name = str(table["metric"])
+            name = absolute(table["metric"])
             try:
                 cls = find_metric(name)
                 cls.Parameters.model_validate(keys)

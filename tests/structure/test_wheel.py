@@ -1,0 +1,48 @@
+"""What is in the wheel: the packages and the shipped scenes, and nothing else."""
+
+import subprocess
+import sys
+import zipfile
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("dsa_des", "components")
+
+
+def backend_is_there() -> bool:
+    """Whether the wheel can be built without fetching what builds it."""
+    try:
+        return bool(version("hatchling"))
+    except PackageNotFoundError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not backend_is_there(), reason="hatchling is not installed")
+def test_the_wheel_holds_the_packages_and_the_scenes_and_nothing_else(tmp_path: Path) -> None:
+    built = subprocess.run(
+        [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-index", "--no-build-isolation",
+         "--disable-pip-version-check", "--wheel-dir", str(tmp_path), str(ROOT)],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stderr
+    (wheel,) = tmp_path.glob("dsa_des-*.whl")
+    inside = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    code = {
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    configs = ROOT / "configs"
+    scenes = {
+        f"components/configs/{path.relative_to(configs).as_posix()}"
+        for path in configs.rglob("*")
+        if path.is_file()
+    }
+    assert inside == code | scenes
+    assert "components/configs/first_light.toml" in inside
+    assert not any("tests" in name.split("/") for name in inside)
