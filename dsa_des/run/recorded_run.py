@@ -35,8 +35,23 @@ def record_run(
     simulate_everything: bool = False,
     silent: bool = True,
     pacer: Pacer | None = None,
+    told: bool = True,
+    progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
+
+    Parameters
+    ----------
+    loaded : Scene
+    target : Path or OutputFolder
+    simulate_everything : bool
+    silent : bool
+        Whether there is no progress bar.
+    pacer : Pacer, optional
+    told : bool
+        Whether notes are written to standard error.
+    progress : callable, optional
+        Called with the simulated time in s after each window, instead of a bar.
 
     Raises
     ------
@@ -50,7 +65,8 @@ def record_run(
     target.check()
     recorder = Recorder([])
     simulation = Simulation(loaded, recorder=recorder, simulate_everything=simulate_everything)
-    say_if_long(simulation)
+    if told:
+        say_if_long(simulation)
     if pacer is not None:
         simulation.limit_windows(pacer.longest_window_s)
     reports = load_reports()
@@ -66,17 +82,17 @@ def record_run(
         recorder.sinks += [tables, observers]
         started = time.perf_counter()
         try:
-            with _progress(simulation, silent=silent) as progress:
-                outcome = simulation.run(_paced(progress, pacer))
+            with _progress(simulation, silent=silent) as bar:
+                outcome = simulation.run(_paced(progress or bar, pacer))
         finally:
             tables.release()
-        summary = _summary(observers, outcome, target.path, notes)
+        summary = summary_of(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
-        info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
         if notes:
             info["notes"] = list(notes)
         write_run_json(folder, info)
@@ -84,24 +100,25 @@ def record_run(
     # The run has its name: whatever happens while figures are drawn, it is not lost.
     notes += draw_all(reports, simulation, target.path, summary)
     write_run_json(target.path, info)  # with the figures among its files
-    for note in notes:
+    for note in notes if told else ():
         say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary
 
 
-def _summary(
-    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+def summary_of(
+    observers: ObserverSink, outcome: Outcome, target: Path | None, notes: list[str]
 ) -> dict[str, Any]:
+    """Return what a run came to: what observers and blocks say of it."""
     return {
         **observers.result(),
         **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
-        "out": str(target),
+        "out": None if target is None else str(target),
     }
 
 
-def _info(
+def info_of(
     simulation: Simulation,
     recorder: Recorder,
     outcome: Outcome,

@@ -141,7 +141,7 @@ def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
         raise ValueError("a swap takes types of blocks, as texts")
     labels = tuple(str(value) for value in values)
     _refuse_twice(labels)
-    return Axis(key, labels, ((),) * len(labels), tuple(((block, name),) for name in labels))
+    return Axis(key, labels, ((),) * len(labels), tuple(((block, name),) for name in values))
 
 
 def _files(key: str, spec: Mapping[str, Any]) -> Axis:
