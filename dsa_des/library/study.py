@@ -4,8 +4,10 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
@@ -38,14 +40,14 @@ class StudyResult:
     study : Study
     folder : StudyFolder
         With its results.
-    home : TemporaryDirectory, optional
-        Where the folder lies if nobody asked for one; it goes with this object.
+    home : Path, optional
+        Where the folder lies if none was asked for; it goes with this object.
     """
 
-    def __init__(
-        self, study: Study, folder: StudyFolder, home: "TemporaryDirectory[str] | None" = None
-    ) -> None:
+    def __init__(self, study: Study, folder: StudyFolder, home: Path | None = None) -> None:
         self._study, self._folder, self._home = study, folder, home
+        if home is not None:
+            finalize(self, rmtree, home, ignore_errors=True)
         self._tables = Tables(study, folder)
         self._tables.write()
         if home is None:
@@ -239,8 +241,25 @@ def _run(
 ) -> StudyResult:
     if out is None and resume:
         raise UsageError("resume continues the study in a folder: give out")
-    home = TemporaryDirectory(prefix="dsa_des-") if out is None else None
-    folder = StudyFolder(Path(out) if home is None and out else Path(home.name) / "study")  # type: ignore[union-attr]
+    # Beside nothing of the user's, and on the disk: a study may be larger than memory.
+    home = Path(mkdtemp(prefix="dsa_des-")) if out is None else None
+    try:
+        folder = StudyFolder(home / "study" if home is not None else Path(out or ""))
+        _run_into(folder, study, workers, resume, progress)
+        return StudyResult(study, folder, home)
+    except BaseException:
+        if home is not None:
+            rmtree(home, ignore_errors=True)
+        raise
+
+
+def _run_into(
+    folder: StudyFolder,
+    study: Study,
+    workers: int,
+    resume: bool,
+    progress: Callable[[Progress], None] | None,
+) -> None:
     executor = make_executor("local", workers, None)
     try:
         folder.open(study, resume=resume)
@@ -252,4 +271,3 @@ def _run(
     finally:
         executor.close()
         folder.close()
-    return StudyResult(study, folder, home)
