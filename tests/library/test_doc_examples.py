@@ -63,3 +63,15 @@ def test_types_hold_for_strict_checkers(tmp_path):
     ]
     errors = [line for line in lines if ": error:" in line]
     assert len(errors) == 1 and 'Unexpected keyword argument "owt"' in errors[0]
+
+
+@pytest.mark.slow
+def test_the_snippet_of_the_readme_runs(tmp_path):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    snippet = text.partition("## From Python\n\n```python\n")[2].partition("```")[0]
+    assert "dsa_des.study(" in snippet
+    done = subprocess.run(
+        [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "detections" in done.stdout and not list(tmp_path.iterdir())
