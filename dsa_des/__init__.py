@@ -4,38 +4,103 @@ The package knows no radar. Blocks are found by their registered names (see
 `dsa_des.block.registry`), so this package never imports `components`.
 """
 
-from typing import Any
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 from dsa_des.record.version import __version__
 
+if TYPE_CHECKING:
+    from dsa_des.block.component import Component, Parameters
+    from dsa_des.block.message import Message
+    from dsa_des.block.ports import Input, Output
+    from dsa_des.errors import BlockFailure, OutputError, Problem, SceneError, UsageError
+    from dsa_des.library.runs import run
+    from dsa_des.library.scenes import load_scene
+    from dsa_des.library.study import StudyResult, study
+    from dsa_des.record.run_folder import Run, read_run
+    from dsa_des.run.simulation import Simulation
+    from dsa_des.scene.examples import examples
+    from dsa_des.scene.scene import Scene
+    from dsa_des.studies.runner import Progress
+
 # Names are looked up on first use: `dsa-des --help` must not pay for NumPy or Arrow.
-_PUBLIC = {
-    "read_run": "dsa_des.record.run_folder",
-    "load_scene": "dsa_des.scene.scene",
-    "Simulation": "dsa_des.run.simulation",
+_HOMES = {
+    "BlockFailure": "dsa_des.errors",
     "Component": "dsa_des.block.component",
-    "Parameters": "dsa_des.block.component",
     "Input": "dsa_des.block.ports",
-    "Output": "dsa_des.block.ports",
     "Message": "dsa_des.block.message",
+    "Output": "dsa_des.block.ports",
+    "OutputError": "dsa_des.errors",
+    "Parameters": "dsa_des.block.component",
+    "Problem": "dsa_des.errors",
+    "Progress": "dsa_des.studies.runner",
+    "Run": "dsa_des.record.run_folder",
+    "Scene": "dsa_des.scene.scene",
+    "SceneError": "dsa_des.errors",
+    "Simulation": "dsa_des.run.simulation",
+    "StudyResult": "dsa_des.library.study",
+    "UsageError": "dsa_des.errors",
+    "examples": "dsa_des.scene.examples",
+    "load_scene": "dsa_des.library.scenes",
+    "read_run": "dsa_des.record.run_folder",
+    "study": "dsa_des.library.study",
 }
 
 __all__ = [
+    "BlockFailure",
     "Component",
     "Input",
     "Message",
     "Output",
+    "OutputError",
     "Parameters",
+    "Problem",
+    "Progress",
+    "Run",
+    "Scene",
+    "SceneError",
     "Simulation",
+    "StudyResult",
+    "UsageError",
     "__version__",
+    "examples",
     "load_scene",
     "read_run",
+    "run",
+    "study",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
-        from importlib import import_module
-
-        return getattr(import_module(_PUBLIC[name]), name)
+    if name == "run":
+        return import_module(f"{__name__}.run")
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+class _Run(ModuleType):
+    """The folder ``dsa_des.run``, which is called as well: ``dsa_des.run(scene)``."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """Run a scene; see `dsa_des.library.runs.run`."""
+        from dsa_des.library.runs import run
+
+        return run(*arguments, **options)
+
+
+class _Package(ModuleType):
+    def __setattr__(self, name: str, value: Any) -> None:
+        # Whoever imports something of that folder puts it in the place of the function.
+        if name == "run" and type(value) is ModuleType:
+            value.__class__ = _Run
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

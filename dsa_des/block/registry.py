@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotAllowed, NotImportable, is_ours, load_named, load_point
@@ -47,6 +48,8 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
     UnknownType
         If it cannot be imported or is not a `Component`.
     """
+    if isinstance(type_name, ClassText):
+        return _looked_at(type_name, type_name.cls)
     point = registered().get(type_name)
     if point is None and ":" not in type_name:
         hint = did_you_mean(type_name, registered())
@@ -59,6 +62,11 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
         raise UnknownType(str(error)) from error.__cause__
     if point is not None and is_ours(point):
         return _component(found)
+    return _looked_at(type_name, found)
+
+
+def _looked_at(type_name: str, found: Any) -> type[Component]:
+    """Return a stranger's class if it is a component."""
     try:
         with strangers_code(UnknownType):
             return _component(found)

@@ -6,19 +6,29 @@ A run folder holds ``scene.toml`` (resolved), one Parquet file per table (``dete
 
 import json
 import os
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.manifest import RUN_JSON, with_files
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_names import new_folder_name
+from dsa_des.record.picture import Picture, pictures_in
 from dsa_des.text.plain_json import json_text
+from dsa_des.text.safe_text import printable, shortened
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 __all__ = ["RUN_JSON", "Run", "new_folder_name", "read_run", "write_json", "write_run_json"]
+
+
+# Of what a run is shown as in Python.
+_WIDTH, _MOST_LINES = 84, 6
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -34,25 +44,32 @@ def write_run_json(folder: Path, content: dict[str, Any]) -> None:
     write_json(folder / RUN_JSON, with_files(folder, content))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
-    """A run read back from its folder.
+    """A run, kept in memory or read back from its folder.
 
     ``run["detections"]`` or ``run.detections`` is a ``pyarrow.Table``.
 
     Parameters
     ----------
-    path : Path
+    path : Path or None
+        Its folder, if it has one.
     info : dict
         The content of ``run.json``: seed, versions, resolution, scene hash, counts, summary, and
         ``files``, every file of the folder with a digest.
     tables : dict
         Table name → ``pyarrow.Table``.
+    scene : str
+        The resolved scene, as TOML text.
+    draw : callable
+        Returns its figures as name → PNG bytes; called when one is asked for.
     """
 
-    path: Path
+    path: Path | None
     info: dict[str, Any]
     tables: "dict[str, pa.Table]"
+    scene: str
+    draw: Callable[[], dict[str, bytes]] = field(compare=False)
 
     def __getitem__(self, table: str) -> "pa.Table":
         if table not in self.tables:
@@ -64,10 +81,44 @@ class Run:
             raise AttributeError(table)
         return self.tables[table]
 
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self.tables])
+
+    def __repr__(self) -> str:
+        title, seconds = self.info.get("title", ""), self.info.get("duration_s", "?")
+        seed = self.info.get("seed", "?")
+        where = "in memory" if self.path is None else f"in {shortened(str(self.path))}"
+        rows = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
+        tables = wrap(printable(rows), _WIDTH) or ["none"]
+        lines = [
+            f"Run of {shortened(repr(title))}, {seconds} s, seed {seed}, {where}",
+            *(f"  {line}" for line in tables[:_MOST_LINES]),
+        ]
+        return "\n".join([*lines, *(["  ..."] if len(tables) > _MOST_LINES else [])])
+
     @property
-    def scene(self) -> str:
-        """The resolved scene, as TOML text."""
-        return (self.path / "scene.toml").read_text(encoding="utf-8")
+    def summary(self) -> dict[str, Any]:
+        """What the run came to, as ``dsa-des run --json`` prints it."""
+        found: dict[str, Any] = self.info.get("summary", {})
+        return found
+
+    @cached_property
+    def figures(self) -> dict[str, Picture]:
+        """All figures by name; those of a run in memory are drawn when they are first asked for."""
+        return {name: Picture(name, png) for name, png in self.draw().items()}
+
+    def figure(self, name: str) -> Picture:
+        """Return one of the figures that the reports draw, for example ``plan``.
+
+        Raises
+        ------
+        UsageError
+            If there is none of this name.
+        """
+        if name not in self.figures:
+            hint = did_you_mean(name, self.figures)
+            raise UsageError(f"the run has no figure {name!r}{hint}")
+        return self.figures[name]
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
@@ -95,4 +146,6 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     info = json.loads((folder / RUN_JSON).read_text(encoding="utf-8"))
     # Each file is opened by itself: a folder name is never taken for a partition.
     tables = {file.stem: pq.ParquetFile(file).read() for file in sorted(folder.glob("*.parquet"))}
-    return Run(folder, info, tables)
+    scene = folder / "scene.toml"
+    text = scene.read_text(encoding="utf-8") if scene.is_file() else ""
+    return Run(folder, info, tables, text, lambda: pictures_in(folder))

@@ -39,11 +39,27 @@ def record_run(
     silent: bool = True,
     warn: bool = False,
     pacer: Pacer | None = None,
+    told: bool = True,
+    progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
-    With `check_rewinding` every window runs twice, see `Simulation`.
-    What blocks warn of is listed in ``run.json``; with `warn` also on standard error.
+    Parameters
+    ----------
+    loaded : Scene
+    target : Path or OutputFolder
+    simulate_everything : bool
+    check_rewinding : bool
+        Whether every window runs twice, see `Simulation`.
+    silent : bool
+        Whether there is no progress bar.
+    warn : bool
+        Whether what blocks warn of, listed in ``run.json``, is written to standard error as well.
+    pacer : Pacer, optional
+    told : bool
+        Whether notes are written to standard error.
+    progress : callable, optional
+        Called with the simulated time in s after each window, instead of a bar.
 
     Raises
     ------
@@ -62,7 +78,8 @@ def record_run(
         simulate_everything=simulate_everything,
         check_rewinding=check_rewinding,
     )
-    say_if_long(simulation)
+    if told:
+        say_if_long(simulation)
     warnings = warnings_of(simulation)
     if warn:
         say_warnings(warnings, "note")
@@ -81,17 +98,17 @@ def record_run(
         recorder.sinks += [tables, observers]
         started = time.perf_counter()
         try:
-            with _progress(simulation, silent=silent) as progress:
-                outcome = simulation.run(_paced(progress, pacer))
+            with _progress(simulation, silent=silent) as bar:
+                outcome = simulation.run(_paced(progress or bar, pacer))
         finally:
             tables.release()
-        summary = _summary(observers, outcome, target.path, notes)
+        summary = summary_of(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         scene_text = to_toml(loaded.resolved())
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
-        info = _info(simulation, recorder, outcome, summary, scene_text, wall_s)
+        info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
         if warnings:
             info["warnings"] = warnings
         if notes:
@@ -105,24 +122,25 @@ def record_run(
     except OSError as error:
         what = f"figures cannot be written: {error.strerror or error}"
         raise OutputError(f"{target.path}: {what}; the run itself is complete") from error
-    for note in notes:
+    for note in notes if told else ():
         say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary
 
 
-def _summary(
-    observers: ObserverSink, outcome: Outcome, target: Path, notes: list[str]
+def summary_of(
+    observers: ObserverSink, outcome: Outcome, target: Path | None, notes: list[str]
 ) -> dict[str, Any]:
+    """Return what a run came to: what observers and blocks say of it."""
     return {
         **observers.result(),
         **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
-        "out": str(target),
+        "out": None if target is None else str(target),
     }
 
 
-def _info(
+def info_of(
     simulation: Simulation,
     recorder: Recorder,
     outcome: Outcome,

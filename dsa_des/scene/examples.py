@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
-from typing import Literal
+from typing import Any, Literal
 
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
@@ -110,10 +110,9 @@ def folders() -> list[Path]:
     """
     found = []
     for point in registered(GROUP).values():
-        folder_of = installed(point)
         try:
             with strangers_code():
-                found.append(Path(folder_of()))
+                found.append(Path(installed(point)()))
         except Left as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__
@@ -137,4 +136,16 @@ def _kind_and_title(path: Path) -> tuple[Literal["scene", "study"], str] | None:
     title = str(data.get("title", path.stem))
     if "scene" in data:
         return "study", title
-    return ("scene", title) if "blocks" in data and "wires" in data else None
+    return ("scene", title) if _is_whole(data) else None
+
+
+def _is_whole(data: dict[str, Any]) -> bool:
+    """Return whether tables are a scene and not a part of one: its wires end at its blocks."""
+    blocks, wires = data.get("blocks"), data.get("wires")
+    if not isinstance(blocks, dict) or not isinstance(wires, list):
+        return False
+    ends: list[str] = []
+    for wire in wires:
+        ends += [str(wire.get(k)) for k in ("from", "to")] if isinstance(wire, dict) else []
+        ends += wire.split("->") if isinstance(wire, str) else []
+    return all(end.partition(".")[0].strip() in blocks for end in ends)

@@ -7,6 +7,7 @@ name, its wires and the parameters the new type knows, and lists those it droppe
 from pathlib import Path
 from typing import Any
 
+from dsa_des.block.class_text import sourced
 from dsa_des.block.component import Component, SourcedText
 from dsa_des.block.registry import NotImported, UnknownType, find
 from dsa_des.errors import Problem, did_you_mean
@@ -110,25 +111,49 @@ def apply_swap(
     parsed = parse_assignment(assignment, "--swap")
     if isinstance(parsed, Problem):
         return [parsed], []
-    name, type_name = parsed[0], SourcedText.of(parsed[1], folder or Path.cwd())
+    return swap_type(scene, *parsed, COMMAND_LINE)
+
+
+def swap_type(
+    scene: SceneFile, name: str, type_name: str, source: str
+) -> tuple[list[Problem], list[str]]:
+    """Put another type into a block of the scene's tables.
+
+    Parameters
+    ----------
+    scene : SceneFile
+    name, type_name : str
+        The block and its new type.
+    source : str
+        Where it was written, for messages.
+
+    Returns
+    -------
+    list of Problem
+        What is wrong with it, with the key ``--swap``.
+    list of str
+        Dotted keys of parameters that the new type lacks.
+    """
+    if not isinstance(type_name, SourcedText):
+        type_name = sourced(type_name, Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
-        return [Problem(COMMAND_LINE, "--swap", f"the scene has no block{hint}", name)], []
+        return [Problem(source, "--swap", f"the scene has no block{hint}", name)], []
     try:
         cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
         blocks[name]["type"] = type_name
-        scene.sources[_type_key(name)] = COMMAND_LINE
+        scene.sources[_type_key(name)] = source
         return [], []
     except UnknownType as error:
-        return [Problem(COMMAND_LINE, f"--swap {name}", str(error), str(type_name))], []
+        return [Problem(source, f"--swap {name}", str(error), str(type_name))], []
     block = blocks[name]
     dropped = sorted(key for key in block if key not in _known_keys(cls))
     for parameter in dropped:
         del block[parameter]
     block["type"] = type_name
-    scene.sources[_type_key(name)] = COMMAND_LINE
+    scene.sources[_type_key(name)] = source
     return [], [f"blocks.{name}.{parameter}" for parameter in dropped]
 
 
@@ -178,7 +203,7 @@ def _wire_table(entry: Any) -> dict[str, str] | None:
 
 def _sourced(value: Any) -> Any:
     if isinstance(value, str):
-        return SourcedText.of(value, Path.cwd())
+        return sourced(value, Path.cwd())
     if isinstance(value, list):
         return [_sourced(item) for item in value]
     if isinstance(value, dict):

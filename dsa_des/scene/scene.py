@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import networkx as nx
@@ -16,6 +17,7 @@ from dsa_des.block.source_file import absolute
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block import Block
+from dsa_des.scene.changeable import Changeable
 from dsa_des.scene.checks import check_activity, check_effects, check_lookalikes, check_times
 from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks
 from dsa_des.scene.options import BlockOptions, split_options, with_latencies
@@ -24,16 +26,19 @@ from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.scene.scene_file import COMMAND_LINE, Key, SceneFile, dotted, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires
+from dsa_des.text.safe_text import printable, shortened
 from dsa_des.time.clock import parse_rational
 
 _TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
 _TOLERANCE = "accuracy"
 _MAX_SEED = 2**63
+# Of what a scene is shown as in Python.
+_WIDTH, _MOST_LINES = 84, 5
 
 
-@dataclass
-class Scene:
-    """A checked scene.
+@dataclass(repr=False)
+class Scene(Changeable):
+    """A checked scene; `set` and `swap` give changed ones.
 
     Parameters
     ----------
@@ -73,6 +78,13 @@ class Scene:
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        return described(self)
+
+    @classmethod
+    def _checked(cls, scene_file: SceneFile, problems: list[Problem]) -> "Scene":
+        return check_scene(scene_file, problems)
 
     @property
     def tolerance(self) -> dict[str, float]:
@@ -252,6 +264,23 @@ def check_scene(scene_file: SceneFile, problems: list[Problem] | None = None) ->
         processors,
         notes=notes,
     )
+
+
+def described(scene: Scene) -> str:
+    """Return a scene in at most ten lines."""
+    length = "as long as its sources" if scene.duration_s is None else f"{scene.duration_s} s"
+    types = ", ".join(f"{name} = {block.type_name}" for name, block in scene.blocks.items())
+    blocks = wrap(printable(types), _WIDTH, break_long_words=True)
+    lines = [
+        f"Scene {shortened(repr(scene.title))} ({shortened(str(scene.path))})",
+        f"  {length}, seed {scene.seed}, {len(scene.blocks)} blocks:",
+        *(f"    {line}" for line in blocks[:_MOST_LINES]),
+    ]
+    if len(blocks) > _MOST_LINES:
+        lines.append("    ...")
+    if scene.dropped:
+        lines.append(f"  dropped by swaps: {shortened(', '.join(scene.dropped), _WIDTH)}")
+    return "\n".join(lines)
 
 
 def _override(scene_file: SceneFile, key: str, value: object) -> None:

@@ -9,11 +9,11 @@ away. Paths are taken from the folder of the file that holds them.
 import os
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import SourcedText
+from dsa_des.block.class_text import sourced
 from dsa_des.errors import Problem, SceneError
 from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
@@ -93,6 +93,31 @@ def read_scene_file(path: Path | str) -> SceneFile:
     return SceneFile(path, data, reader.sources, reader.inheritance.of_other_type)
 
 
+def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
+    """Take tables as a scene with everything they extend; paths are those of the working directory.
+
+    Parameters
+    ----------
+    tables : mapping
+    name : str
+        What messages call them.
+
+    Raises
+    ------
+    SceneError
+        If a file that they extend is missing, is not TOML, or extends itself.
+    """
+    place = Path.cwd() / name
+    problems: list[Problem] = []
+    reader = _Reader(problems)
+    reader.sources[()] = str(place)
+    data = reader.table(tables, place)
+    if problems:
+        raise SceneError(replace(p, source=name) if p.source == str(place) else p for p in problems)
+    sources = {k: name if file == str(place) else file for k, file in reader.sources.items()}
+    return SceneFile(Path(name), data, sources, reader.inheritance.of_other_type)
+
+
 class _Reader:
     def __init__(self, problems: list[Problem]) -> None:
         self.problems = problems
@@ -132,6 +157,9 @@ class _Reader:
         else:
             self.problems.append(Problem(str(path), "", message))
         return {}
+
+    def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
+        return self._table(tables, path, (), (path,))
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values
@@ -176,7 +204,7 @@ class _Reader:
         if isinstance(value, list):
             return [self._value(item, path, (*at, i), chain) for i, item in enumerate(value)]
         if isinstance(value, str):
-            return SourcedText.of(value, path.parent)
+            return sourced(value, path.parent)
         return value
 
 

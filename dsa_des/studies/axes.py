@@ -146,7 +146,7 @@ def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
         key,
         labels,
         ((),) * len(labels),
-        tuple(((block, str(absolute(value))),) for value in values),
+        tuple(((block, absolute(value)),) for value in values),
     )
 
 

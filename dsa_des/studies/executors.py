@@ -7,12 +7,14 @@ gives does not depend on who ran it, so neither do the results.
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any, Protocol
 
 from dsa_des.errors import UsageError
@@ -157,9 +159,13 @@ def not_from_here() -> Iterator[None]:
     """
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
+    # Nor do they run the program again that started the study: it may be a script without a guard.
+    program = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
+        sys.modules["__main__"] = program
         if before is None:
             del os.environ[_SAFE_PATH]
         else:

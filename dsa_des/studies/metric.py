@@ -14,6 +14,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named, load_point
@@ -186,6 +187,8 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
     ValueError
         If there is none of this name, or it cannot be loaded.
     """
+    if isinstance(name, ClassText):
+        return _metric(name, name.cls)
     point = registered(METRICS).get(name)
     if point is None and ":" not in name:
         hint = did_you_mean(name, registered(METRICS))
@@ -196,6 +199,10 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
         )
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
+    return _metric(name, found)
+
+
+def _metric(name: str, found: Any) -> type[Metric]:
     if not (isinstance(found, type) and issubclass(found, Metric)):
         raise ValueError(f"{name} is not a dsa_des.studies.metric.Metric")
     return found

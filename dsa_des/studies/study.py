@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
+from dsa_des.block.class_text import sourced
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem
 from dsa_des.replicas.replicas import Replica
-from dsa_des.scene.overrides import apply_swap, set_value
+from dsa_des.scene.overrides import set_value, swap_type
 from dsa_des.scene.scene import Scene, check_scene
-from dsa_des.scene.scene_file import SceneFile
+from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
@@ -274,7 +275,7 @@ def changed_scene(
     file = base.copy()
     problems: list[Problem] = []
     for block, name in swaps:
-        found, _ = apply_swap(file, f"{block}={name}", Path(source).parent)
+        found, _ = swap_type(file, block, sourced(name, Path(source).parent), COMMAND_LINE)
         problems += [Problem(source, p.key.replace("--swap", "swap"), p.message) for p in found]
     for key, value in sets:
         problems += set_value(file, key, deepcopy(value), source)

@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,32 @@ def study_of_scene(
         "metrics": list(metrics),
     }
     return _Reader(SceneFile(scene, data)).study(swaps)
+
+
+def study_of_tables(
+    tables: dict[str, Any],
+    base: SceneFile,
+    swaps: Sequence[tuple[str, str]],
+    sets: Sequence[tuple[str, Any]],
+) -> Study:
+    """Return a study of a scene that was read already.
+
+    Parameters
+    ----------
+    tables : dict
+        As a study file would hold them, without ``scene``, ``set`` and ``swap``.
+    base : SceneFile
+        The scene's tables.
+    swaps : sequence of (block, type)
+    sets : sequence of (key, value)
+        Made and set in every cell.
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    """
+    return _GivenReader(tables, base, swaps, sets).study(())
 
 
 class _Reader:
@@ -192,6 +218,9 @@ class _Reader:
         except SceneError as error:
             self.problems += error.problems
             return None, None
+        return self.checked(base)
+
+    def checked(self, base: SceneFile) -> tuple[SceneFile | None, Scene | None]:
         for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
@@ -308,3 +337,26 @@ class _Reader:
             self.add(("stop_when", "batch"), "must be a whole number of 2 or more", batch)
             return None
         return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
+
+
+class _GivenReader(_Reader):
+    """Reads a study whose scene, and what is changed in it, are not in its tables."""
+
+    def __init__(
+        self,
+        tables: dict[str, Any],
+        base: SceneFile,
+        swaps: Sequence[tuple[str, str]],
+        sets: Sequence[tuple[str, Any]],
+    ) -> None:
+        super().__init__(SceneFile(Path("study"), tables))
+        self._base, self._swaps, self._sets = base, tuple(swaps), tuple(sets)
+
+    def scene(self) -> tuple[SceneFile | None, Scene | None]:
+        return self.checked(self._base)
+
+    def swaps(self) -> tuple[tuple[str, str], ...]:
+        return self._swaps
+
+    def sets(self) -> tuple[tuple[str, Any], ...]:
+        return self._sets

@@ -1,0 +1,109 @@
+"""Running a scene from Python, in memory or into a folder."""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from dsa_des.errors import UsageError
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.toml_text import to_toml
+from dsa_des.library.scenes import scene_of_any
+from dsa_des.record.picture import pictures_in
+from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
+from dsa_des.record.run_folder import Run, read_run
+from dsa_des.run.recorded_run import info_of, record_run, summary_of
+from dsa_des.run.reports import Report, draw_all, load_reports
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import Scene
+
+
+def run(
+    scene: Scene | str | os.PathLike[str] | Mapping[str, Any],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    simulate_everything: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a scene to its end.
+
+    Parameters
+    ----------
+    scene : Scene, or what `dsa_des.load_scene` takes
+    out : path, optional
+        Folder that the run is written into, as ``dsa-des run --out`` does; without, the run stays
+        in memory.
+    simulate_everything : bool
+        Simulate also the effects that the scene does not call for, where they can be neutral.
+    progress : callable, optional
+        Called with the simulated time in s now and then.
+
+    Returns
+    -------
+    Run
+        Its tables are attributes: ``run.detections`` is a ``pyarrow.Table``. What the command line
+        notes on standard error is in ``run.info["notes"]``.
+
+    Raises
+    ------
+    SceneError
+        With every problem of the scene.
+    BlockFailure
+        If a block raised an exception.
+    UsageError, OutputError
+        If the results cannot go into the folder.
+    """
+    loaded = scene_of_any(scene)
+    if out is None:
+        return _in_memory(loaded, simulate_everything, progress)
+    target = OutputFolder.chosen(os.fspath(out), Path("runs"), loaded.path.stem)
+    record_run(
+        loaded,
+        target,
+        simulate_everything=simulate_everything,
+        told=False,
+        progress=progress,
+    )
+    return read_run(target.path)
+
+
+def _in_memory(
+    scene: Scene, simulate_everything: bool, progress: Callable[[float], None] | None
+) -> Run:
+    tables = MemorySink()
+    recorder = Recorder([tables])
+    simulation = Simulation(scene, recorder=recorder, simulate_everything=simulate_everything)
+    reports = load_reports()
+    notes: list[str] = []
+    observers = ObserverSink(
+        (observer for report in reports for observer in report.observers(simulation)), notes
+    )
+    recorder.sinks.append(observers)
+    started = time.perf_counter()
+    outcome = simulation.run(progress)
+    summary = summary_of(observers, outcome, None, notes)
+    text = to_toml(scene.resolved())
+    info = info_of(simulation, recorder, outcome, summary, text, time.perf_counter() - started)
+    if notes:
+        info["notes"] = notes
+    arrow = tables.tables()
+    return Run(None, info, arrow, text, lambda: _drawn(reports, simulation, arrow, summary))
+
+
+def _drawn(
+    reports: list[Report], simulation: Simulation, tables: dict[str, Any], summary: dict[str, Any]
+) -> dict[str, bytes]:
+    """Return what reports draw of a run in memory: they read its tables from a folder."""
+    import pyarrow.parquet as pq
+
+    with TemporaryDirectory(prefix="dsa_des-") as place:
+        folder = Path(place)
+        for name, table in tables.items():
+            pq.write_table(table, folder / f"{name}.parquet")
+        notes = draw_all(reports, simulation, folder, summary)
+        found = pictures_in(folder)
+    if notes and not found:
+        raise UsageError("; ".join(notes))
+    return found

@@ -1,0 +1,110 @@
+"""Scenes by shipped name, by path or as a table."""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.scene.changeable import Origin
+from dsa_des.scene.examples import examples, find_example
+from dsa_des.scene.overrides import parse_assignment, parse_value
+from dsa_des.scene.python_values import scene_value
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene_file import SceneFile, read_scene_file, read_scene_tables
+
+#: What messages call a scene that is given as a table, and its title where it has none.
+_TABLE = "scene"
+
+
+def load_scene(
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    *,
+    sets: Iterable[str] = (),
+    swaps: Iterable[str] = (),
+    seed: int | None = None,
+    duration_s: object = None,
+) -> Scene:
+    """Read and check a scene.
+
+    Parameters
+    ----------
+    source : str, path or mapping
+        A TOML file, the name of a shipped scene where there is no such file, or tables as a file
+        in the working directory would hold them.
+    sets, swaps : iterable of str
+        Changes as the command line takes them: ``key=value`` and ``block=type``.
+    seed, duration_s : optional
+        Override the scene's own.
+
+    Raises
+    ------
+    SceneError
+        With every problem found.
+    UsageError
+        If an installed package is broken that shipped scenes or sections come from.
+    """
+    problems: list[Problem] = []
+    changes: list[tuple[str, Any]] = []
+    for swap in swaps:
+        parsed = parse_assignment(swap, "--swap")
+        if isinstance(parsed, Problem):
+            problems.append(parsed)
+        else:
+            changes.append((f"swap.{parsed[0]}", scene_value(parsed[1])))
+    for assignment in sets:
+        parsed = parse_assignment(assignment, "--set")
+        if isinstance(parsed, Problem):
+            problems.append(parsed)
+        else:
+            changes.append((parsed[0], parse_value(parsed[1])))
+    if seed is not None:
+        changes.append(("seed", seed))
+    if duration_s is not None:
+        changes.append(("duration_s", duration_s))
+    if problems:
+        raise SceneError(problems)
+    return Scene.of(Origin(_tables_of(source), tuple(changes)))
+
+
+def scene_of_any(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -> Scene:
+    """Return a scene as it is, or load it; see `load_scene`."""
+    return source if isinstance(source, Scene) else load_scene(source)
+
+
+def _tables_of(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
+    if isinstance(source, Mapping):
+        try:
+            return read_scene_tables(scene_value(source), _TABLE)
+        except TypeError as error:
+            raise SceneError([_what_is_wrong(source, str(error))]) from None
+    if not isinstance(source, str | os.PathLike):
+        message = "must be a path, the name of a shipped scene, or a table"
+        raise SceneError([Problem("load_scene", "", message, source)])
+    path = Path(source)
+    if isinstance(source, str) and not os.path.lexists(path):
+        shipped = find_example(source, "scene")
+        if shipped is not None:
+            return read_scene_file(shipped)
+        if path.name == source and not path.suffix:
+            known = [example.name for example in examples() if example.kind == "scene"]
+            message = f"there is no such file and no shipped scene{did_you_mean(source, known)}"
+            raise SceneError([Problem(source, "", message)])
+    return read_scene_file(path)
+
+
+def _what_is_wrong(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
+    """Return which value of some tables is none of a scene."""
+    for name, value in tables.items():
+        inner = f"{key}.{name}" if key else str(name)
+        if isinstance(value, Mapping):
+            try:
+                scene_value(value)
+            except TypeError:
+                return _what_is_wrong(value, message, inner)
+            continue
+        try:
+            scene_value(value)
+        except TypeError as error:
+            return Problem(_TABLE, inner, str(error))
+    return Problem(_TABLE, key, message)

@@ -1,0 +1,273 @@
+"""Running a study from Python."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING, Any
+from weakref import finalize
+
+from dsa_des.block.class_text import classes_in
+from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
+from dsa_des.library.scenes import scene_of_any
+from dsa_des.record.picture import Picture, pictures_in
+from dsa_des.scene.changeable import Origin
+from dsa_des.scene.python_values import scene_value
+from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene_file import SceneFile
+from dsa_des.studies.executors import default_workers, make_executor
+from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.metric import METRICS, Metric
+from dsa_des.studies.output import DIFFERENCES, SUMMARY, Tables
+from dsa_des.studies.runner import Progress, Stopped, run_study
+from dsa_des.studies.study import Study, changed_scene
+from dsa_des.studies.study_file import study_of_tables
+from dsa_des.text.safe_text import shortened
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_MOST_WORKERS = 1024
+
+
+class StudyResult:
+    """What a study came to.
+
+    Parameters
+    ----------
+    study : Study
+    folder : StudyFolder
+        With its results.
+    home : Path, optional
+        Where the folder lies if none was asked for; it goes with this object.
+    """
+
+    def __init__(self, study: Study, folder: StudyFolder, home: Path | None = None) -> None:
+        self._study, self._folder, self._home = study, folder, home
+        if home is not None:
+            finalize(self, rmtree, home, ignore_errors=True)
+        self._tables = Tables(study, folder)
+        self._tables.write()
+        if home is None:
+            _ = self.figures
+
+    @property
+    def path(self) -> Path | None:
+        """Its folder, if one was asked for."""
+        return self._folder.path if self._home is None else None
+
+    @cached_property
+    def summary(self) -> "pa.Table":
+        """One row for every result at every combination of axis values, with its interval."""
+        return self._table(SUMMARY)
+
+    @cached_property
+    def differences(self) -> "pa.Table | None":
+        """Paired differences from the baseline; None for a study that compares nothing."""
+        return self._table(DIFFERENCES) if self._tables.compared else None
+
+    @cached_property
+    def runs(self) -> "pa.Table":
+        """One row for every run: its cell, replica, seed, drawn values and results."""
+        return self._folder.results()
+
+    @cached_property
+    def figures(self) -> dict[str, Picture]:
+        """All figures by name."""
+        self._tables.draw()
+        return {name: Picture(name, png) for name, png in pictures_in(self._folder.path).items()}
+
+    def figure(self, name: str) -> Picture:
+        """Return one of the study's figures.
+
+        Raises
+        ------
+        UsageError
+            If there is none of this name.
+        """
+        if name not in self.figures:
+            raise UsageError(f"the study has no figure {name!r}{did_you_mean(name, self.figures)}")
+        return self.figures[name]
+
+    def _table(self, name: str) -> "pa.Table":
+        table = self._folder.table(name)
+        if table is None:
+            raise UsageError(f"{self._folder.path / name}: is not there or not of this study")
+        return table.replace_schema_metadata(None)
+
+    def __repr__(self) -> str:
+        rows = self._tables.rows
+        where = "in memory" if self._home is not None else f"in {shortened(str(self.path))}"
+        axes = ", ".join(f"{axis.column} ({len(axis.labels)})" for axis in self._study.axes)
+        results = ", ".join(result.name for result in self._tables.results)
+        return "\n".join(
+            [
+                f"Study {shortened(repr(self._study.title))}, {where}",
+                f"  {len(rows.places) + rows.failed} runs, {rows.failed} failed",
+                f"  axes: {shortened(axes or 'none', 200)}",
+                f"  results: {shortened(results, 200)}",
+            ]
+        )
+
+
+def study(
+    scene: Scene | str | os.PathLike[str] | Mapping[str, Any],
+    *,
+    metrics: Sequence[str | type[Metric] | Mapping[str, Any]],
+    axes: Mapping[str, Any] | None = None,
+    draws: Mapping[str, Any] | None = None,
+    replicas: int = 1,
+    seed: int = 0,
+    workers: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+    **more: Any,
+) -> StudyResult:
+    """Run a scene over axes, random draws and replicas.
+
+    Parameters
+    ----------
+    scene : Scene, or what `dsa_des.load_scene` takes
+    metrics : sequence
+        Registered names, ``module:Class``, classes, or tables ``{"metric": NAME, ...}``.
+    axes, draws : mapping, optional
+        Dotted key → values or distribution, as in a study file; ``swap.BLOCK`` → types.
+    replicas, seed : int
+    workers : int, optional
+        Processes. By default one for each processor, and this process alone where a class of the
+        study cannot be imported by others.
+    out : path, optional
+        Folder of the study; without, results stay with what is returned.
+    resume : bool
+        Whether a study that `out` holds is continued.
+    progress : callable, optional
+        Called with a `Progress` whenever some runs are done.
+    **more
+        Further keys of a study file: ``title``, ``compare``, ``over``, ``stop_when``,
+        ``confidence``, ``interval``, ``figures``, ``runs_per_chunk``.
+
+    Returns
+    -------
+    StudyResult
+
+    Raises
+    ------
+    SceneError
+        With every problem of the study and its scene.
+    UsageError
+        If the results cannot go into the folder, or workers cannot import a class.
+    OutputError
+        If results cannot be written; what is finished is kept in `out`.
+    """
+    loaded = scene_of_any(scene)
+    given = {
+        "title": loaded.title,
+        "seed": seed,
+        "replicas": replicas,
+        "axes": axes or {},
+        "draws": draws or {},
+        "metrics": list(metrics),
+        **more,
+    }
+    tables: dict[str, Any] = {}
+    for key, value in given.items():
+        try:
+            tables[key] = scene_value(value, METRICS) if key == "metrics" else scene_value(value)
+        except TypeError as error:
+            raise SceneError([Problem("study", key, str(error))]) from None
+    for key in {"scene", "set", "swap"} & tables.keys():
+        message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
+        raise SceneError([Problem("study", key, message)])
+    described = study_of_tables(tables, *_base_of(loaded.origin))
+    return _run(described, _workers(described, workers), out, resume, progress)
+
+
+def _base_of(
+    origin: Origin,
+) -> tuple[SceneFile, list[tuple[str, str]], list[tuple[str, Any]]]:
+    """Return a scene's tables as read, and its changes as swaps and then values.
+
+    Where that order would give another scene, the changed tables, and no changes.
+    """
+    swaps = [(k.removeprefix("swap."), v) for k, v in origin.changes if k.startswith("swap.")]
+    sets = list({k: v for k, v in origin.changes if not k.startswith("swap.")}.items())
+    file, problems, _ = origin.tables()
+    try:
+        ordered = Origin(
+            origin.file, (*((f"swap.{block}", name) for block, name in swaps), *sets)
+        ).tables()
+        same = not problems and not ordered[1] and ordered[0].data == file.data
+        changed_scene(origin.file, swaps, sets, "study")
+    except SceneError:
+        same = False
+    return (origin.file, swaps, sets) if same else (file, [], [])
+
+
+def _workers(study: Study, workers: int | None) -> int:
+    if workers is not None and not (
+        isinstance(workers, int) and not isinstance(workers, bool) and 1 <= workers <= _MOST_WORKERS
+    ):
+        raise UsageError(f"workers is {workers!r}: it must be a whole number, 1 to {_MOST_WORKERS}")
+    strange = classes_in(
+        [
+            study.base.data,
+            [name for _, name in study.swaps],
+            [axis.swaps for axis in study.axes],
+            [axis.sets for axis in study.axes],
+            [value for _, value in study.sets],
+            [spec.name for spec in study.metrics],
+        ]
+    )
+    if strange and workers is None:
+        return 1
+    if strange and workers != 1:
+        name = str(strange[0])
+        raise UsageError(
+            f"workers is {workers}: other processes cannot import {name}, which is defined in a "
+            "program, a notebook or a function; put it into a module, or take workers=1"
+        )
+    return workers or default_workers()
+
+
+def _run(
+    study: Study,
+    workers: int,
+    out: str | os.PathLike[str] | None,
+    resume: bool,
+    progress: Callable[[Progress], None] | None,
+) -> StudyResult:
+    if out is None and resume:
+        raise UsageError("resume continues the study in a folder: give out")
+    # Beside nothing of the user's, and on the disk: a study may be larger than memory.
+    home = Path(mkdtemp(prefix="dsa_des-")) if out is None else None
+    try:
+        folder = StudyFolder(home / "study" if home is not None else Path(out or ""))
+        _run_into(folder, study, workers, resume, progress)
+        return StudyResult(study, folder, home)
+    except BaseException:
+        if home is not None:
+            rmtree(home, ignore_errors=True)
+        raise
+
+
+def _run_into(
+    folder: StudyFolder,
+    study: Study,
+    workers: int,
+    resume: bool,
+    progress: Callable[[Progress], None] | None,
+) -> None:
+    executor = make_executor("local", workers, None)
+    try:
+        folder.open(study, resume=resume)
+        run_study(study, folder, executor, progress or (lambda _: None))
+    except Stopped as stop:
+        if str(stop) == "interrupted":
+            raise KeyboardInterrupt from None
+        raise OutputError(f"{folder.path}: {stop}") from None
+    finally:
+        executor.close()
+        folder.close()

@@ -1,0 +1,45 @@
+"""Shipped scenes and studies: found by name, and all of them can be read."""
+
+import pytest
+
+import dsa_des
+from dsa_des.scene.examples import examples, find_example
+from dsa_des.studies.study_file import read_study
+
+
+@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+def test_every_example_is_found_by_its_name(example):
+    assert find_example(example.name, example.kind) == example.path
+
+
+def test_scenes_are_whole_and_studies_can_be_read():
+    kinds = {example.kind for example in examples()}
+    assert kinds == {"scene", "study"}
+    for example in examples():
+        if example.kind == "scene":
+            assert dsa_des.load_scene(example.name).title == example.title
+
+
+def test_a_shipped_study_can_be_read():
+    path = find_example("radar_scan_rate")
+    assert (
+        path is not None and read_study(path).title == "Radar scan rate against declaration range"
+    )
+
+
+def test_parts_of_scenes_are_no_examples_but_have_names():
+    names = {example.name for example in examples()}
+    assert "detect_and_sense" not in names and "first_light" in names
+    assert find_example("aircraft/glider") is not None
+
+
+@pytest.mark.parametrize(
+    "name", ["", ".", "..", "../README", "/etc/hosts", "nix", "first_light/", "a\0b"]
+)
+def test_what_is_no_name_of_an_example(name):
+    assert find_example(name) is None or name == "first_light/"
+
+
+def test_a_stem_that_a_scene_and_a_part_share_means_the_scene():
+    path = find_example("oasys", "scene")
+    assert path is not None and path.parent.name == "systems"
