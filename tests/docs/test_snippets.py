@@ -122,6 +122,13 @@ def test_commands_in_running_text_exist_with_their_options(page: str) -> None:
         assert set(options) - {"--help"} <= known, f"{page}: {words}"
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_files_named_in_running_text_exist(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    names = re.findall(r"`((?:tests|components|dsa_des|configs|docs)/[\w./-]+)`", text)
+    assert [name for name in names if not (ROOT / name).exists()] == []
+
+
 def test_the_reading_finds_notes_and_what_is_shortened() -> None:
     page = (
         "<!-- not run: takes a day -->\n```\nsleep 86400\n```\n"
