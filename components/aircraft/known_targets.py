@@ -1,4 +1,4 @@
-"""Which targets will a block see? Offered down the chain before effects are planned."""
+"""The targets that a block will see, offered down the chain before effects are planned."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""How large does a measured aircraft look from a direction? A table over aspect, interpolated."""
+"""The silhouette of a measured aircraft: a table over aspect, interpolated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which table files does an aircraft name, and what is in them?"""
+"""The table files that an aircraft names, and their content."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

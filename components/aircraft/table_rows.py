@@ -1,4 +1,4 @@
-"""What stands in the rows of a table written as CSV, with their line numbers?"""
+"""The rows of a table written as CSV, with their line numbers."""
 
 import csv
 from collections.abc import Iterator, Sequence

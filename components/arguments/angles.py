@@ -1,4 +1,4 @@
-"""Which directions do the optical functions accept?"""
+"""Checks of the directions that the optical functions accept."""
 
 from __future__ import annotations
 

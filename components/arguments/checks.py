@@ -1,4 +1,4 @@
-"""Which arguments do physics functions accept, and how do they become arrays of one shape?"""
+"""Checks of the arguments of physics functions, which become arrays of one shape."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which arguments do the radar functions accept?"""
+"""Checks of the arguments that the radar functions accept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which arguments do the atmosphere's functions accept?"""
+"""Checks of the arguments that the atmosphere's functions accept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does the air attenuate at each altitude? Evaluated once per run."""
+"""Attenuation by the air at each altitude, evaluated once per run."""
 
 from __future__ import annotations
 

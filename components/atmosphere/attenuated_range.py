@@ -1,4 +1,4 @@
-"""How far does a radar still see through attenuating air?"""
+"""The range of a radar in attenuating air."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much do the droplets of fog and cloud attenuate a radio wave?"""
+"""Attenuation of a radio wave by the droplets of fog and cloud."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much do oxygen and water vapour attenuate a radio wave?"""
+"""Attenuation of a radio wave by oxygen and water vapour."""
 
 from __future__ import annotations
 

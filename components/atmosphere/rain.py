@@ -1,4 +1,4 @@
-"""How much does rain attenuate a radio wave?"""
+"""Attenuation of a radio wave by rain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of a radar's power is lost on the way through gas, rain and fog?"""
+"""Loss of a radar's power on the way through gas, rain and fog."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What are pressure, temperature and humidity at an altitude, if nobody has measured them?"""
+"""Pressure, temperature and humidity at an altitude in the standard atmosphere."""
 
 from __future__ import annotations
 

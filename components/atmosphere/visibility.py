@@ -1,4 +1,4 @@
-"""How far can one see through fog and rain?
+"""Visibility through fog and rain.
 
 Visibility is the meteorologists': the range at which a black object's contrast is down to 2 %, so
 extinction per metre is 3.912 / visibility (Koschmieder). What it does to a contrast is computed by

@@ -1,4 +1,4 @@
-"""How wrong can each model of the Earth be? The proofs behind `error_bounds`.
+"""The error of each model of the Earth: the proofs behind `error_bounds`.
 
 The proof, in the order of the code. Let 1 be the observer and 2 the target, with latitudes φ,
 longitudes λ and altitudes h; M and N the meridian and prime vertical radii, r = (N + h) cos φ the

@@ -1,4 +1,4 @@
-"""How wrong can each model of the line of sight be? Upper bounds that are proven, not measured.
+"""Upper bounds of the error of each model of the line of sight, proven, not measured.
 
 The proof for the models of the Earth is at the head of `earth_model_error`. The attitude's error
 (`attitude_error_rad`) adds to theirs. In body axes a direction that is off by e is off in azimuth

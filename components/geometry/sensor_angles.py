@@ -1,4 +1,4 @@
-"""Where in its own axes does the ownship see a target? The thesis's angles p and q."""
+"""The direction of a target in the ownship's body axes: the thesis's angles p and q."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How wrong is each model of the line of sight, by range and latitude? Computed, and drawn."""
+"""Maps of the error of each model of the line of sight over range and latitude."""
 
 import math
 from dataclasses import dataclass

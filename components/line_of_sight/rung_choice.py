@@ -1,4 +1,4 @@
-"""Which model of the line of sight is good enough? The cheapest whose proven error is allowed."""
+"""The choice of a model of the line of sight: the cheapest whose proven error is allowed."""
 
 import math
 from collections.abc import Sequence

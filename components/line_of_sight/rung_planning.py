@@ -1,4 +1,4 @@
-"""Which models does a transform compute with in a scene, and what does `explain` say of it?"""
+"""The models that a transform computes with in a scene, and what `explain` says of them."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How far away can a target truly be that a model of the Earth takes to be in reach?"""
+"""The farthest true range of a target that a model of the Earth takes to be in reach."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What does the ownship believe about its own position and attitude?
+"""The error model of the ownship's own position and attitude, as it believes them.
 
 A constant bias and white noise on what the navigation system reports, as TECVOL simulated it
 (thesis section 2.3.1). Pure functions of standard normal numbers, which the block draws with its

@@ -1,4 +1,4 @@
-"""How much does a target stand out against its background, and how much of that reaches us?"""
+"""The contrast of a target with its background, and the part of it that reaches the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large is the silhouette of fuselage and wing together, where one hides the other?"""
+"""The silhouette area of fuselage and wing together, where one hides the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does a camera frame bring a false alarm, and where in the picture?
+"""False alarms of camera frames, and their places in the picture.
 
 Pure functions of uniform numbers in [0, 1), which the block draws with its own keys.
 """

@@ -1,4 +1,4 @@
-"""How large does an aircraft look to an infrared camera: front, back and exhaust plume?"""
+"""The area of an aircraft to an infrared camera: front, back and exhaust plume."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fast does the line of sight to a target turn?"""
+"""The rate at which the line of sight to a target turns."""
 
 from __future__ import annotations
 

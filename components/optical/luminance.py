@@ -1,4 +1,4 @@
-"""How bright are a painted target and what lies behind it?"""
+"""The luminance of a painted target and of its background."""
 
 from __future__ import annotations
 

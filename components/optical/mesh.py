@@ -1,4 +1,4 @@
-"""How large is the silhouette of a triangle mesh from a direction?"""
+"""The silhouette area of a triangle mesh from a direction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How strong is a target's signature on the image, and is it enough to be detected?"""
+"""The strength of a target's signature on the image, and the threshold of its detection."""
 
 from __future__ import annotations
 

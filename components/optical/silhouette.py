@@ -1,4 +1,4 @@
-"""How large is the area of a target that a camera sees? One call, several rungs."""
+"""The area of a target that a camera sees: one call, several rungs."""
 
 from __future__ import annotations
 

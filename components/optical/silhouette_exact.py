@@ -1,4 +1,4 @@
-"""How large does an aircraft of sphere, cylinder and plate look from a direction, exactly?"""
+"""The exact silhouette area of an aircraft of sphere, cylinder and plate from a direction."""
 
 from __future__ import annotations
 

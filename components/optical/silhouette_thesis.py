@@ -1,4 +1,4 @@
-"""How large does the aircraft look by the thesis's own equations 6 and 9-13?"""
+"""The silhouette area of an aircraft by the thesis's own equations 6 and 9-13."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How bright are the sun, the sky and the ground by day?"""
+"""The brightness of the sun, the sky and the ground by day."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large is each target by its own measured silhouette?"""
+"""The area of each target by its own measured silhouette."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""How large is the mean RCS of each target from where the radar stands?"""
+"""The mean RCS of each target at the aspect that the radar sees."""
 
 import numpy as np
 

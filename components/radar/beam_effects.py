@@ -1,4 +1,4 @@
-"""When within a scan does a radar's beam pass each target, and where is the target then?"""
+"""The beam sweep as an effect: when the beam passes each target, and where that is then."""
 
 from dataclasses import dataclass, replace
 from typing import Any

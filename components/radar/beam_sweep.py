@@ -1,4 +1,4 @@
-"""When within its scan does a sweeping beam look at a given azimuth?
+"""The instant within its scan at which a sweeping beam looks at a given azimuth.
 
 The beam sweeps clockwise over the field of view once per scan, at an even rate, and flies back in
 what is left of the period: it looks one way only.

@@ -1,4 +1,4 @@
-"""How does clutter in the target's cell change detection and false alarms?
+"""Detection and false alarms with clutter in the target's cell.
 
 The model. In one look (the pulses of a coherent interval already added up) the receiver sees the
 complex amplitude ``target + mean clutter + Gaussian``, against the threshold that was set for noise

@@ -1,4 +1,4 @@
-"""What does the ground's echo do to a radar's detections?"""
+"""Ground clutter as an effect on a radar's detections."""
 
 from collections.abc import Callable
 from typing import Any

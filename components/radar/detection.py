@@ -1,4 +1,4 @@
-"""What is the probability that the radar detects, or misses, an echo of a given SNR?"""
+"""The probability that the radar detects, or misses, an echo of a given SNR."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Pd follows from Albersheim's one-line equation for a steady target?"""
+"""Pd of a steady target by Albersheim's one-line equation."""
 
 from __future__ import annotations
 

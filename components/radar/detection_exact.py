@@ -1,4 +1,4 @@
-"""What is the exact probability of detection, or of a miss, of each Swerling model?"""
+"""The exact probability of detection, or of a miss, of each Swerling model."""
 
 from __future__ import annotations
 

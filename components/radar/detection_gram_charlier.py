@@ -1,4 +1,4 @@
-"""What does the thesis's Gram-Charlier series give for Pd, once its lost factor is put back?"""
+"""Pd by the thesis's Gram-Charlier series, with its lost factor put back."""
 
 from __future__ import annotations
 

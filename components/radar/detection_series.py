@@ -1,4 +1,4 @@
-"""How is the detection probability of a fluctuating echo summed without losing a digit?
+"""The series of the detection probability of a fluctuating echo, summed without loss of digits.
 
 Given the echo, the detector's sum is Gamma(n + N, 1) with a random whole N: Poisson for a steady
 echo (Swerling 0), negative binomial with shape K for the others (K = 1, n, 2, 2n for I, II, III,

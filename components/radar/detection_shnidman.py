@@ -1,4 +1,4 @@
-"""What Pd follows from Shnidman's equation, for any Swerling model?"""
+"""Pd by Shnidman's equation, for any Swerling model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How is Pd looked up for many echoes of one radar at a fraction of the exact cost?
+"""A table of Pd, for many echoes of one radar at a fraction of the exact cost.
 
 The table is indexed by the bits of the SNR itself: exponent and leading bits of a double are the
 number of the cell, so there is no logarithm and no search. Each octave of SNR has 64 cells; a cell

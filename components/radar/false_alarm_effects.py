@@ -1,4 +1,4 @@
-"""What does noise alone add to a radar's report?"""
+"""False alarms as an effect: what noise alone adds to a radar's report."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How many false alarms does a radar scan bring, and where?
+"""The number of false alarms of a radar scan, and their places.
 
 Pure functions of uniform numbers in [0, 1), which the block draws with its own keys.
 """

@@ -1,4 +1,4 @@
-"""How wide is a radar's field of view, and which resolution cells fill it?"""
+"""The width of a radar's field of view, and the resolution cells that fill it."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""How strong is the echo of the ground in the cell of a target? Flat terrain, one altitude."""
+"""The echo of the ground in the cell of a target, over flat terrain of one altitude."""
 
 from __future__ import annotations
 

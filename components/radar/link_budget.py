@@ -1,4 +1,4 @@
-"""How strong is the echo of a target of given RCS at a given range?"""
+"""The link budget: the echo of a target of given RCS at a given range."""
 
 from __future__ import annotations
 

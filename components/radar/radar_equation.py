@@ -1,4 +1,4 @@
-"""What SNR does the radar equation give, and closer than what range does it not hold?"""
+"""The SNR that the radar equation gives, and the range below which it does not hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How close may a target come before a radar no longer hears it?"""
+"""The blind range as an effect: how near a radar no longer hears a target."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How large is the radar cross-section: constant, fluctuating, or from a table over aspect?"""
+"""The radar cross-section: constant, fluctuating, or from a table over aspect."""
 
 from __future__ import annotations
 

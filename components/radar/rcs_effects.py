@@ -1,4 +1,4 @@
-"""Which of the targets' radar cross-sections fluctuate, and which depend on the aspect?"""
+"""Fluctuation and aspect of the targets' radar cross-sections as effects."""
 
 from collections.abc import Callable, Iterable
 from typing import Any

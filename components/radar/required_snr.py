@@ -1,4 +1,4 @@
-"""Which SNR does the radar need for a wanted probability of detection?"""
+"""The SNR that a radar needs for a wanted probability of detection."""
 
 from __future__ import annotations
 

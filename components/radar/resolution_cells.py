@@ -1,4 +1,4 @@
-"""How many resolution cells fill a radar's field of view?"""
+"""The number of resolution cells in a radar's field of view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which RCS does a fluctuating target show in one scan?"""
+"""The RCS that a fluctuating target shows in one scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where does the detector put its threshold, and how is the noise spread around it?"""
+"""The threshold of the detector, and the distribution of the noise around it."""
 
 from __future__ import annotations
 

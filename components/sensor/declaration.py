@@ -1,4 +1,4 @@
-"""When is a target declared? After m detections in the last n looks.
+"""Declaration of targets: after m detections in the last n looks.
 
 Looks before the first one count as misses.
 """

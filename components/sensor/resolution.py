@@ -1,4 +1,4 @@
-"""Which grid point does a sensor of finite resolution report?"""
+"""The grid point that a sensor of finite resolution reports."""
 
 from __future__ import annotations
 

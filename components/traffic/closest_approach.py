@@ -1,5 +1,4 @@
-"""When is each target closest to the ownship? Found by halving time, with the largest speeds as
-proof.
+"""The instant of closest approach: time is halved, with the largest speeds as proof.
 
 Distances are compared at given times. A target that is d away at one of them is nowhere nearer
 than d - v·dt up to a time dt before or after it, with v the sum of the two largest speeds: a

@@ -1,4 +1,4 @@
-"""When is each target near the ownship? Found by halving time, with the largest speeds as proof.
+"""Intervals in which targets are near: time is halved, with the largest speeds as proof.
 
 A target whose distance is d at the middle of an interval of length 2h stays farther away than
 d - v·h all through it, and nearer than d + v·h, with v the sum of the two largest speeds. So an

@@ -1,4 +1,4 @@
-"""Which piece of its own path is each aircraft on, for many aircraft at once?"""
+"""The piece of its own path that each aircraft is on, for many aircraft at once."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Which targets may come in reach of an ownship that nobody knows the path of?
+"""The targets that may come in reach of an ownship whose path is not known in advance.
 
 At the start of an epoch of a few seconds the ownship is somewhere. Until its end it and a target
 cannot close in by more than their two largest speeds allow, whatever is steered meanwhile. What a

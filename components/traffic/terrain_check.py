@@ -1,4 +1,4 @@
-"""Is the terrain below the ownship all along its flight?"""
+"""The check that the terrain is below the ownship all along its flight."""
 
 import math
 from typing import Any, Protocol

@@ -1,4 +1,4 @@
-"""Time single calls of the embedding interface: how long does a host wait for an answer?
+"""Times of single calls of the embedding interface: how long a host waits for an answer.
 
 ``python -m components.evidence.benchmark.embedded`` prints one JSON object;
 ``dsa-des benchmark --embed`` starts it anew, so that nothing is warm from elsewhere.

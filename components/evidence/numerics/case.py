@@ -1,4 +1,4 @@
-"""What is a hard case, and how does its number become text?"""
+"""A hard case of the numerics, and how its number becomes text."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How do the hard cases become one page, and does the page still say what is computed?"""
+"""The page of the hard cases, and the check that it says what is computed."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How far is the simple aircraft model from measured or meshed silhouettes (thesis §4.2.1)?"""
+"""The simple aircraft model compared with measured or meshed silhouettes (thesis §4.2.1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""§4.1.1: does the radar detect 5 m² at the specified range, and at which of the two miles?"""
+"""§4.1.1: the radar's detection of 5 m² at the specified range, in either of the two miles."""
 
 from pathlib import Path
 

@@ -1,0 +1,108 @@
+"""The blocks and the metric that docs/extending.md shows do what the page says of them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from snippets import file_of, read_snippets
+
+from dsa_des.block.message import Text
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.replicas import Recorded, Replica
+from dsa_des.run.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.studies.metric import Group, find_metric, wanted_by
+
+MODULE = "blocks_of_the_page"
+
+
+@pytest.fixture(autouse=True)
+def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put the page's module on the path."""
+    parts = [part.text for part in read_snippets("docs/extending.md") if file_of(part)]
+    (tmp_path / f"{MODULE}.py").write_text("\n".join(parts), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+def recorded(scene: Path, **load: Any) -> dict[str, dict[str, Any]]:
+    """Run a scene and return its tables: lists of text, arrays of numbers."""
+    memory = MemorySink()
+    Simulation(load_scene(scene, **load), recorder=Recorder([memory])).run()
+    return {
+        name: {
+            column: values.to_pylist() if values.type == "string" else values.to_numpy()
+            for column, values in zip(table.column_names, map(_plain, table.columns), strict=True)
+        }
+        for name, table in memory.tables().items()
+    }
+
+
+def _plain(column: Any) -> Any:
+    return column.cast("string") if "string" in str(column.type) else column
+
+
+SHORT = ["duration_s=30", "blocks.traffic.intruders[0].north_m=3000"]
+
+
+def test_the_fusion_reports_what_two_sensors_see_at_once(configs: Path) -> None:
+    scene = configs / "first_light.toml"
+    found = recorded(scene, sets=SHORT, swaps=[f"fusion={MODULE}:MyFusion"])
+    seen: dict[tuple[int, str], list[str]] = {}
+    detections = found["detections"]
+    for tick, target, sensor in zip(
+        detections["tick"].tolist(), detections["target"], detections["block"], strict=True
+    ):
+        seen.setdefault((tick, target), []).append(sensor)
+    several = {key: sorted(sensors) for key, sensors in seen.items() if len(sensors) > 1}
+    fused = found["fused"]
+    keys = zip(fused["tick"].tolist(), fused["target"], strict=True)
+    reported = {
+        key: sorted(text.split("+")) for key, text in zip(keys, fused["sensors"], strict=True)
+    }
+    assert 0 < len(several) < len(seen)
+    assert reported == several
+
+
+def test_the_tracker_smooths_and_with_gain_1_holds_what_was_measured(configs: Path) -> None:
+    scene = configs / "first_light.toml"
+    swap = [f"tracker={MODULE}:MyTracker"]
+    stub = recorded(scene, sets=SHORT)["tracks"]
+    exact = recorded(scene, sets=[*SHORT, "blocks.tracker.gain=1"], swaps=swap)["tracks"]
+    for column in ("tick", "range_m", "azimuth_rad", "elevation_rad", "age_s"):
+        np.testing.assert_allclose(exact[column], stub[column], rtol=0, atol=1e-12)
+    assert exact["updated_by"] == stub["updated_by"]
+    smooth = recorded(scene, sets=[*SHORT, "blocks.tracker.gain=0.1"], swaps=swap)["tracks"]
+    assert smooth["tick"].tolist() == stub["tick"].tolist()
+    own = [i for i, name in enumerate(stub["target"]) if name == "head_on"]
+    steps = np.abs(np.diff(stub["elevation_rad"][own])).sum()
+    assert np.abs(np.diff(smooth["elevation_rad"][own])).sum() < steps
+
+
+def test_the_avoidance_turns_once_when_a_track_is_near(configs: Path) -> None:
+    found = recorded(
+        configs / "benchmark/manoeuvres.toml",
+        sets=["duration_s=30"],
+        swaps=[f"avoidance={MODULE}:MyAvoidance"],
+    )
+    tracks, turns = found["tracks"], found["manoeuvres"]
+    near = tracks["tick"][tracks["range_m"] < 5000.0]
+    assert turns["tick"].tolist() == [near.min()]
+    assert np.degrees(turns["turn_rad"]).tolist() == pytest.approx([90.0])
+
+
+def test_the_metric_counts_scans_of_every_replica(configs: Path) -> None:
+    scene = load_scene(configs / "first_light.toml")
+    metric = find_metric(f"{MODULE}:Looks")(None, scene)
+    runs = [
+        Recorded({"scans": {"tick": np.arange(n), "block": radar_rows(n)}}, 10**9, 6.0, dict)
+        for n in (3, 0, 5)
+    ]
+    group = Group(scene, [Replica(k) for k in range(3)], runs, wanted_by([metric]))
+    found = metric.measure(group)
+    assert [result.name for result in metric.results()] == list(found) == ["looks"]
+    assert found["looks"].tolist() == [3.0, 0.0, 5.0]
+
+
+def radar_rows(count: int) -> Text:
+    return Text(np.zeros(count, dtype=np.int64), ("radar",))
