@@ -6,8 +6,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, unflatten
-from components.arguments.frequencies import checked_frequency, within
+from components.arguments.checks import (
+    broadcast_flat,
+    checked_frequency,
+    not_negative,
+    unflatten,
+    within,
+)
 
 HIGHEST_FREQUENCY_HZ = 200e9
 

@@ -7,8 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
-from components.arguments.frequencies import checked_frequency, within
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
+    checked_frequency,
+    not_negative,
+    refuse,
+    unflatten,
+    within,
+)
 from components.atmosphere.recommendation_tables import columns
 
 HIGHEST_FREQUENCY_HZ = 1e12

@@ -9,9 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, not_negative, unflatten
-from components.arguments.detection import one_of
-from components.arguments.frequencies import checked_frequency, within
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
+    checked_frequency,
+    not_negative,
+    one_of,
+    unflatten,
+    within,
+)
 from components.atmosphere.recommendation_tables import rows
 
 HIGHEST_FREQUENCY_HZ = 1e12

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, unflatten
-from components.arguments.frequencies import within
+from components.arguments.checks import broadcast_flat, not_negative, unflatten, within
 from components.atmosphere.recommendation_tables import columns
 
 LOWEST_ALTITUDE_M = -5_000.0

@@ -13,13 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import (
-    as_numbers,
-    broadcast_flat,
-    not_negative,
-    refuse,
-    unflatten,
-)
+from components.arguments.checks import as_numbers, broadcast_flat, not_negative, refuse, unflatten
 
 # ln 50, as meteorologists round it: visibility is where a black object's contrast falls to 2 %.
 KOSCHMIEDER = 3.912

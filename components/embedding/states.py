@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.aircraft.aircraft import Roster
-from components.arguments.positions import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
+from components.arguments.checks import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, common_shape, finite, shaped
+from components.arguments.checks import FloatArray, common_shape, shaped, squarable
 
 TWO_PI = 2.0 * np.pi
 # What the double nearest to 2 pi leaves out of it (6.28318530717958647692528676655900577).
@@ -41,7 +41,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     ValueError
         NaN or infinity.
     """
-    angle = finite("angle_rad", angle_rad)
+    angle = squarable("angle_rad", angle_rad)
     (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
     return wrapped
 
@@ -85,7 +85,7 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     ValueError
         NaN or infinity.
     """
-    angle = finite("angle_rad", angle_rad)
+    angle = squarable("angle_rad", angle_rad)
     flat = np.atleast_1d(angle)
     inside = (flat >= 0.0) & (flat < TWO_PI)
     wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
@@ -189,7 +189,7 @@ def longitude_difference_deg(
     The idea is that of `AngDiff` in GeographicLib (C. F. F. Karney, "Algorithms for geodesics",
     Journal of Geodesy 87, 2013).
     """
-    lon1, lon2 = finite("lon1_deg", lon1_deg), finite("lon2_deg", lon2_deg)
+    lon1, lon2 = squarable("lon1_deg", lon1_deg), squarable("lon2_deg", lon2_deg)
     shape = common_shape(lon1_deg=lon1, lon2_deg=lon2)
     difference, error = _longitude_difference(np.atleast_1d(lon1), np.atleast_1d(lon2))
     difference, error = shaped(shape, difference, error)
@@ -262,7 +262,7 @@ def sincosd(angle_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     ValueError
         NaN or infinity.
     """
-    angle = finite("angle_deg", angle_deg)
+    angle = squarable("angle_deg", angle_deg)
     rest = np.fmod(np.atleast_1d(angle), 360.0)
     quadrant = np.rint(rest / 90.0)
     rest = (rest - 90.0 * quadrant) * RAD_PER_DEG

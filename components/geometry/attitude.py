@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, common_shape, finite, shaped
+from components.arguments.checks import FloatArray, common_shape, shaped, squarable
 from components.geometry.angles import (
     sine_and_cosine,
     wrap_pi,
@@ -316,6 +316,6 @@ def turn_axes(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArr
 
 def checked(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Check named arguments; returns the broadcast shape and arrays of at least one axis."""
-    arrays = {name: finite(name, value) for name, value in values.items()}
+    arrays = {name: squarable(name, value) for name, value in values.items()}
     shape = common_shape(**arrays)
     return shape, [a if a.ndim else a.reshape(1) for a in arrays.values()]

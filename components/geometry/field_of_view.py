@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, common_shape, finite
+from components.arguments.checks import FloatArray, common_shape, squarable
 from components.geometry.angles import TWO_PI, wrap_pi_unchecked
 
 BoolArray = npt.NDArray[np.bool_]
@@ -59,7 +59,7 @@ def inside(
             f"elevation_min_rad is {elevation_min_rad}: it must not exceed elevation_max_rad, "
             f"{elevation_max_rad}"
         )
-    p, q = finite("p_rad", p_rad), finite("q_rad", q_rad)
+    p, q = squarable("p_rad", p_rad), squarable("q_rad", q_rad)
     shape = common_shape(p_rad=p, q_rad=q)
     in_elevation = (q >= elevation_min_rad) & (q <= elevation_max_rad)
     if high - low >= TWO_PI:
@@ -134,7 +134,7 @@ def within_range(
         raise ValueError(
             f"range_max_m is {range_max_m}: it must not be less than range_min_m, {range_min_m}"
         )
-    distance = finite("range_m", range_m)
+    distance = squarable("range_m", range_m)
     if distance.size and distance.min() < 0.0:
         raise ValueError(f"range_m is {distance.min()}: it must not be negative")
     return (distance >= range_min_m) & (distance <= range_max_m)

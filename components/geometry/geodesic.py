@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, positions, shaped
+from components.arguments.checks import FloatArray, positions, shaped
 from components.geometry.angles import RAD_PER_DEG, positive_turn
 
 BACKENDS = ("geographiclib", "pyproj")

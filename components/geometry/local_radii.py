@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, positions, shaped
+from components.arguments.checks import FloatArray, positions, shaped
 from components.geometry.angles import RAD_PER_DEG, longitude_difference_rounded
 from components.geometry.ellipsoid import radii_of_curvature, spherical_from_enu
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.positions import FloatArray, shaped
+from components.arguments.checks import FloatArray, shaped
 from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
     azimuth_off_nose,

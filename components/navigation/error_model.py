@@ -12,8 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, finite, unflatten
-from components.arguments.positions import HIGHEST_ALTITUDE_M, LOWEST_ALTITUDE_M, require_between
+from components.arguments.checks import (
+    HIGHEST_ALTITUDE_M,
+    LOWEST_ALTITUDE_M,
+    FloatArray,
+    broadcast_flat,
+    finite,
+    require_between,
+    unflatten,
+)
 
 _EQUATORIAL_RADIUS_M = 6_378_137.0
 _FLATTENING = 1.0 / 298.257223563

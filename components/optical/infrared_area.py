@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import angle
-from components.arguments.checks import broadcast_flat, not_negative, unflatten
+from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
 from components.optical.silhouette import visible_area
 from components.optical.silhouette_exact import line_of_sight_in_target_axes
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import angle
-from components.arguments.checks import broadcast_flat, positive, unflatten
+from components.arguments.checks import angle, broadcast_flat, positive, unflatten
 
 
 def angle_between(

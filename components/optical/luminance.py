@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import angle
 from components.arguments.checks import (
     FloatArray,
+    angle,
     broadcast_flat,
     finite,
     not_negative,

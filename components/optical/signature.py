@@ -7,8 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import FloatArray
-from components.arguments.checks import broadcast_flat, finite, not_negative, positive, unflatten
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
+    finite,
+    not_negative,
+    positive,
+    unflatten,
+)
 from components.optical.line_of_sight_rate import line_of_sight_rate
 
 __all__ = [

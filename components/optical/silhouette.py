@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import angle
-from components.arguments.checks import FloatArray, broadcast_flat, not_negative, unflatten
+from components.arguments.checks import FloatArray, angle, broadcast_flat, not_negative, unflatten
 from components.optical.convex_hull import union_area
 from components.optical.silhouette_exact import exact_area, line_of_sight_in_target_axes
 from components.optical.silhouette_thesis import thesis_area

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.angles import angle
-from components.arguments.checks import FloatArray, broadcast_flat, refuse, unflatten
+from components.arguments.checks import FloatArray, angle, broadcast_flat, refuse, unflatten
 from components.optical.line_of_sight_rate import angle_between
 
 # Illuminance of the sun's beam outside the atmosphere, lux (IES RP-21, 1984).

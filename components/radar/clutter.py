@@ -36,8 +36,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, not_negative, refuse, unflatten
-from components.arguments.detection import checked_model, checked_probability, one_of
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
+    checked_model,
+    checked_probability,
+    not_negative,
+    one_of,
+    refuse,
+    unflatten,
+)
 from components.radar.detection import detection_probability
 from components.radar.marcum import marcum_q1
 

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, unflatten
-from components.arguments.detection import (
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
     checked_model,
     checked_probability,
     checked_pulses,
     checked_snr,
     one_of,
+    unflatten,
 )
 from components.radar.detection_albersheim import albersheim_probability
 from components.radar.detection_exact import exact_probability

@@ -12,8 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.arguments.checks import FloatArray, as_numbers, broadcast_flat, refuse, unflatten
-from components.arguments.detection import checked_probability, checked_pulses
+from components.arguments.checks import (
+    FloatArray,
+    as_numbers,
+    broadcast_flat,
+    checked_probability,
+    checked_pulses,
+    refuse,
+    unflatten,
+)
 from components.radar.resolution_cells import MOST_CELLS, ResolutionCells
 from components.radar.threshold import detection_threshold
 

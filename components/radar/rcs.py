@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    checked_model,
     finite,
     not_negative,
     positive,
     refuse,
     unflatten,
 )
-from components.arguments.detection import checked_model
 
 
 def m2_to_dbsm(rcs_m2: ArrayLike) -> Any:

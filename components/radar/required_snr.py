@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.arguments.detection import checked_model, checked_probability, checked_pulses
+from components.arguments.checks import checked_model, checked_probability, checked_pulses
 from components.radar.detection_exact import exact_probability
 
 # Every round evaluates this many points at once and keeps the interval between two of them.

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from components.arguments.checks import FloatArray
-from components.arguments.detection import checked_model
+from components.arguments.checks import FloatArray, checked_model
 from components.radar.rcs import fluctuating_rcs
 
 

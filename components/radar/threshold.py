@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, unflatten
-from components.arguments.detection import checked_probability, checked_pulses
+from components.arguments.checks import (
+    FloatArray,
+    broadcast_flat,
+    checked_probability,
+    checked_pulses,
+    unflatten,
+)
 from components.radar.poisson_terms import poisson
 
 

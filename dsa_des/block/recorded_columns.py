@@ -158,15 +158,17 @@ class DerivedColumns:
         columns: Columns,
         counts: IntArray | None = None,
     ) -> Columns:
+        dicts = []
         for item in filled:
-            if item.many:
+            if item.many:  # after the others, whose names they may not take
+                dicts.append(item)
                 continue
-            values = item.of(message)
-            columns[item.name] = _repeated(values, counts) if item.in_entries else values
-        for item in filled:
-            if not item.many:
-                continue
-            held = item.of(message)
+            values = getattr(message, item.field) if item.value is None else item.value(message)
+            if item.in_entries and counts is not None:
+                values = _repeated(values, counts)
+            columns[item.name] = values
+        for item in dicts:
+            held = getattr(message, item.field) if item.value is None else item.value(message)
             if not columns.keys().isdisjoint(held):
                 twice = sorted(columns.keys() & held.keys())[0]
                 raise ValueError(
@@ -184,16 +186,10 @@ class _Filled:
         self.field, self.many, self.in_entries = field_name, how.many, how.in_entries
         self.kinds = {name or field_name: kind for name, kind in how.kinds.items()}
         self.name = next(iter(self.kinds))
-        self._value = how.value
-
-    def of(self, message: Any) -> Any:
-        """Return what is recorded of the field."""
-        return getattr(message, self.field) if self._value is None else self._value(message)
+        self.value = how.value
 
 
-def _repeated(values: Any, counts: IntArray | None) -> Any:
-    if counts is None:
-        return values
+def _repeated(values: Any, counts: IntArray) -> Any:
     if isinstance(values, Text):
         return Text(np.repeat(values.codes, counts), values.names)
     return np.repeat(values, counts)

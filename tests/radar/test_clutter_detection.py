@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.arguments.detection import MODELS
+from components.arguments.checks import MODELS
 from components.radar.clutter import (
     KINDS,
     clutter_detection_probability,
