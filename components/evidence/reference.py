@@ -62,10 +62,11 @@ def page() -> str:
         rows_of = [(name, kind, *COLUMNS[table][name]) for name, kind in columns.items()]
         parts += [f"### {table}\n", _table(heads, rows_of)]
     parts += ["## Traffic files\n", "### CSV (`traffic.csv`)\n"]
-    heads = ("quantity", "accepted names", "unit unless the header says another", "needed")
-    parts.append(_table(heads, csv_columns()))
+    names = ("quantity", "accepted names")
+    unit = "unit unless the header says another"
+    parts.append(_table((*names, unit, "needed"), csv_columns()))
     parts += ["### DAIDALUS (`traffic.daa_file`, `.daa` and `.xyz`)\n"]
-    parts.append(_table((*heads[:2], "unit unless the row of units says another"), daa_columns()))
+    parts.append(_table((*names, "unit unless the row of units says another"), daa_columns()))
     return "\n".join(parts)
 
 

@@ -1,6 +1,9 @@
 """What a scene file may hold beside its blocks' own parameters: keys, units, defaults, meaning."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
+
+from pydantic import BaseModel
 
 from dsa_des.block.sections import section_models
 from dsa_des.commands.parameter_rows import parameter_rows
@@ -54,12 +57,12 @@ def scene_tables() -> Mapping[str, tuple[str, Callable[[], list[Row]]]]:
     }
     for name, model in section_models().items():
         doc = (model.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
-        known[name] = (f"Keys of [{name}]: {doc}", lambda model=model: _rows(model))  # type: ignore[misc]
+        known[name] = (f"Keys of [{name}]: {doc}", partial(_rows, model))
     return known
 
 
-def _rows(model: object) -> list[Row]:
+def _rows(model: type[BaseModel]) -> list[Row]:
     return [
-        (name.strip(), *rest)
-        for name, *rest in parameter_rows(model)  # type: ignore[arg-type, misc]
+        (name.strip(), kind, unit, default, meaning)
+        for name, kind, unit, default, meaning in parameter_rows(model)
     ]
