@@ -24,7 +24,7 @@ from components.traffic.units import ALL_TOKENS, clean_token
 __all__ = ["TrafficFile", "TrafficFileError", "read_csv"]
 
 # Earlier names win where a file has several.
-_HEADERS = {
+HEADERS = {
     "id": (
         "id",
         "name",
@@ -51,8 +51,8 @@ _HEADERS = {
     "vy": ("vy",),
     "vz": ("vz",),
 }
-_REQUIRED = ("time", "id", "lat", "lon", "alt")
-_DEFAULT_UNITS = {"time": "s", "alt": "m", "gs": "m/s", "vs": "m/s"} | dict.fromkeys(
+REQUIRED = ("time", "id", "lat", "lon", "alt")
+DEFAULT_UNITS = {"time": "s", "alt": "m", "gs": "m/s", "vs": "m/s"} | dict.fromkeys(
     ("vx", "vy", "vz"), "m/s"
 )
 
@@ -132,12 +132,12 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
     parsed = [_name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
     found: dict[str, Column] = {}
-    ours = {alias for aliases in _HEADERS.values() for alias in aliases}
+    ours = {alias for aliases in HEADERS.values() for alias in aliases}
     shown = shown_columns(headers, not ours.isdisjoint(names))
-    for quantity, aliases in _HEADERS.items():
+    for quantity, aliases in HEADERS.items():
         index = next((names.index(alias) for alias in aliases if alias in names), None)
         if index is None:
-            if quantity in _REQUIRED:
+            if quantity in REQUIRED:
                 hint = did_you_mean(quantity, names).replace("did you mean", "is it")
                 problems.add(
                     f"there is no column {quantity!r} among {shown}{hint}; accepted names are "
@@ -145,7 +145,7 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
                     line=line,
                 )
             continue
-        unit = parsed[index][1] or _DEFAULT_UNITS.get(quantity, "deg")
+        unit = parsed[index][1] or DEFAULT_UNITS.get(quantity, "deg")
         factor = 1.0
         if quantity in UNITS:
             factor = unit_factor(problems, quantity, unit, line=line, header=headers[index])

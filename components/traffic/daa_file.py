@@ -28,7 +28,7 @@ from components.traffic.units import ALL_TOKENS, clean_token
 
 __all__ = ["TrafficFile", "TrafficFileError", "read_daa"]
 
-_HEADERS = {
+HEADERS = {
     "name": ("name", "id", "aircraft", "acid", "callsign", "ident"),
     "time": ("time", "t", "clock"),
     "lat": ("lat", "latitude"),
@@ -45,7 +45,7 @@ _HEADERS = {
     "vz": ("vz",),
 }
 # What DAIDALUS itself assumes where a file has no row of units.
-_DEFAULT_UNITS = {
+DEFAULT_UNITS = {
     "time": "s",
     "lat": "deg",
     "lon": "deg",
@@ -142,7 +142,7 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
     """Find which column holds what; a missing required one ends the reading."""
     plain = [header.lower() for header in headers]
     places: dict[str, int] = {}
-    for quantity, names in _HEADERS.items():
+    for quantity, names in HEADERS.items():
         for name in names:
             if name in plain and quantity not in places:
                 places[quantity] = plain.index(name)
@@ -180,7 +180,7 @@ def _find_units(
     notes: list[str],
 ) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
     """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
-    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in _DEFAULT_UNITS.items()}
+    defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in DEFAULT_UNITS.items()}
     if not lines:
         problems.fail("there are no samples after the row of column names")
     line, text = lines[0]
@@ -188,7 +188,7 @@ def _find_units(
     bracketed = "[" in text
     known = sum(clean_token(token) in ALL_TOKENS for token in row)
     if not bracketed and known < max(2, len(row) // 2):
-        used = [f"{headers[places[q]]} [{u}]" for q, u in _DEFAULT_UNITS.items() if q in places]
+        used = [f"{headers[places[q]]} [{u}]" for q, u in DEFAULT_UNITS.items() if q in places]
         notes.append(f"there is no row of units; assumed {', '.join(used)}")
         return defaults, lines
     if len(row) != len(headers):

@@ -1,14 +1,9 @@
 """``dsa-des components``: what blocks there are, and everything about one of them."""
 
 import inspect
-import types
 import typing
-from fractions import Fraction
 from typing import Any
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 from rich.table import Table
 from rich.text import Text
 
@@ -16,15 +11,11 @@ from dsa_des.block.component import Component
 from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
+from dsa_des.commands.parameter_rows import parameter_rows
+from dsa_des.commands.scene_tables import scene_tables
 from dsa_des.errors import UsageError
 from dsa_des.terminal import terminal
 from dsa_des.text.safe_text import printable
-
-_UNITS = {
-    "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",
-    "db": "dB", "dbsm": "dBsm", "m2": "m²", "mps": "m/s", "w": "W", "ppm": "ppm",
-    "deg_s": "deg/s", "mm_h": "mm/h", "pixels": "pixels",
-}  # fmt: skip
 
 
 def show_components(name: str | None) -> None:
@@ -33,10 +24,15 @@ def show_components(name: str | None) -> None:
     if name is None:
         _list(console)
         return
+    table = scene_tables().get(name)
+    if table is not None:
+        _describe_table(console, name, *table)
+        return
     try:
         cls = find(name)
     except UnknownType as error:
-        raise UsageError(f"{name}: {error}") from error
+        tables = f"; or a table of scenes: {', '.join(scene_tables())}"
+        raise UsageError(f"{name}: {error}{tables}") from error
     _describe(console, name, cls)
 
 
@@ -54,6 +50,21 @@ def _list(console: Any) -> None:
     console.print(table)
     console.print()
     console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
+    console.print(
+        "So are tables of scenes: scene, extends, blocks, wires, processors, weather, ..."
+    )
+
+
+def _describe_table(
+    console: Any, name: str, what: str, rows: typing.Callable[[], list[typing.Any]]
+) -> None:
+    console.print(Text.assemble((name, "bold"), f"  {what}"))
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("  name", "type", "unit", "default", "meaning"):
+        table.add_column(heading)
+    for first, *rest in rows():
+        table.add_row(Text(f"  {first}"), *map(Text, rest))
+    console.print(table, highlight=False)
 
 
 def _ports(ports: typing.Mapping[str, Any]) -> str:
@@ -125,86 +136,3 @@ def _describe_ladder(console: Any, ladder: Ladder) -> None:
         reference = " (reference)" if rung.name == ladder.reference else ""
         table.add_row(f"  {rung.name}{reference}", rung.type_name or "as it is", rung.what)
     console.print(table, highlight=False)
-
-
-def parameter_rows(
-    model: type[BaseModel], prefix: str = ""
-) -> list[tuple[str, str, str, str, str]]:
-    """Return name, type with bounds, unit, default and meaning of every parameter."""
-    rows = []
-    for name, info in model.model_fields.items():
-        nested = _nested(info.annotation)
-        kind = "table" if nested else _type_name(info.annotation)
-        if nested and typing.get_origin(info.annotation) is list:
-            kind = "list of tables"
-        default = _default(info)
-        if nested and default not in ("required", "-", "[]", "{}"):
-            default = "see below"
-        bounds = _bounds(info)
-        rows.append(
-            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name), default,
-             info.description or "")
-        )  # fmt: skip
-        for inner in nested:
-            rows += parameter_rows(inner, f"{prefix}{name}.")
-    return rows
-
-
-def _nested(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    found: list[type[BaseModel]] = []
-    for argument in typing.get_args(annotation):
-        found += [model for model in _nested(argument) if model not in found]
-    return found
-
-
-def _type_name(annotation: Any) -> str:
-    if annotation is Fraction:
-        return "number or fraction"
-    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is typing.Annotated:
-        return _type_name(arguments[0])
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join(_type_name(a) for a in arguments if a is not type(None))
-    if origin is typing.Literal:
-        return " | ".join(str(value) for value in arguments)
-    if origin is tuple:
-        return f"[{', '.join(_type_name(a) for a in arguments)}]"
-    if origin is not None:
-        return f"{origin.__name__} of {', '.join(_type_name(a) for a in arguments)}"
-    names = {float: "number", int: "whole number", str: "text", bool: "true or false"}
-    return names.get(annotation, getattr(annotation, "__name__", str(annotation)).lower())
-
-
-def _bounds(info: FieldInfo) -> str:
-    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-    found = [
-        f"{sign} {getattr(item, attribute):g}"
-        for item in info.metadata
-        for attribute, sign in signs.items()
-        if isinstance(getattr(item, attribute, None), int | float)
-    ]
-    return ", ".join(found)
-
-
-def _default(info: FieldInfo) -> str:
-    if info.default is PydanticUndefined:
-        return "required" if info.is_required() else "-"
-    value = info.default
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return str(list(value))
-    return str(value)
-
-
-def _unit(name: str) -> str:
-    parts = name.split("_")
-    for length in (2, 1):
-        suffix = "_".join(parts[-length:])
-        if len(parts) > length and suffix in _UNITS:
-            return _UNITS[suffix]
-    return ""

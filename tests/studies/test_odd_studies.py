@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from dsa_des.block.component import SourcedText
 from dsa_des.cli import main
 from dsa_des.studies.draws import parse_draw
 from dsa_des.studies.study import Cells
+from dsa_des.studies.study_tables import resolved
 
 STUDY = """
 scene = "small.toml"
@@ -136,3 +138,12 @@ def test_cells_are_counted_like_a_product() -> None:
     assert cells[-1] == every[-1] and len(Cells(())) == 1 and Cells(())[0] == ()
     with pytest.raises(IndexError):
         cells[24]
+
+
+@pytest.mark.parametrize("value", ["what?", "a*b", "[c]"])
+def test_text_that_looks_like_a_pattern_of_files_stays_text(tmp_path: Path, value: str) -> None:
+    (tmp_path / "a*b").mkdir()
+    tables = {"axes": {"title": [SourcedText.of(value, tmp_path)]}}
+    assert resolved(tables, []) == {"axes": {"title": [value]}}
+    files = {"axes": {"file": {"files": SourcedText.of("a*.daa", tmp_path)}}}
+    assert resolved(files, [])["axes"]["file"]["files"] == str(tmp_path.resolve() / "a*.daa")

@@ -1,0 +1,87 @@
+"""What every column of a run folder's tables means, its unit and its frame.
+
+Beside the messages' ``recorded``, which has the types; a test sees that none is missing.
+"""
+
+from collections.abc import Mapping
+
+_BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
+_NED = "north-east-down at the ownship"
+_WGS84 = "WGS 84"
+
+#: Unit, frame, meaning.
+Column = tuple[str, str, str]
+
+#: Columns with which every table begins.
+LEADING: Mapping[str, Column] = {
+    "block": ("", "", "block that sent the message"),
+    "tick": ("ticks", "", "instant, in the scene's ticks (`ticks_per_s` of run.json)"),
+    "time_s": ("s", "", "the same instant since the start of the run"),
+}
+
+_MEASURED: Mapping[str, Column] = {
+    "azimuth_rad": ("rad", _BODY, "measured azimuth"),
+    "elevation_rad": ("rad", _BODY, "measured elevation"),
+    "range_m": ("m", "", "measured slant range; null where none is measured"),
+}
+_TRUE: Mapping[str, Column] = {
+    "true_azimuth_rad": ("rad", _BODY, "true azimuth"),
+    "true_elevation_rad": ("rad", _BODY, "true elevation"),
+    "true_range_m": ("m", "", "true slant range"),
+}
+
+COLUMNS: Mapping[str, Mapping[str, Column]] = {
+    "scans": {
+        "scan": ("", "", "number of the scan, from 0"),
+        "evaluated": ("targets", "", "targets whose physics was evaluated"),
+        "detected": ("", "", "detections, false alarms included"),
+        "skipped_absent": ("targets", "", "left out: not there"),
+        "skipped_off": ("targets", "", "left out: the sensor is off"),
+        "skipped_field_of_view": ("targets", "", "left out: outside the field of view"),
+        "skipped_range": ("targets", "", "left out: beyond the range"),
+        "skipped_culled": ("targets", "", "left out: too far away for any sensor"),
+    },
+    "detections": {
+        "scan": ("", "", "number of the scan"),
+        "target": ("", "", "name of the target; null for a false alarm"),
+        **_MEASURED,
+        "confidence": ("dB or signature", "", "margin of the detection, by the kind of sensor"),
+        **_TRUE,
+        "snr_db": ("dB", "", "signal-to-noise ratio of a radar"),
+        "detection_probability": ("", "", "probability with which the detection was drawn"),
+        "pixels": ("pixels", "", "pixels that the target covers in a camera"),
+        "declared": ("", "", "whether the target has enough detections to be declared"),
+        "illuminated_s": ("s", "", "when a sweeping beam lit the target"),
+        "ned_azimuth_rad": ("rad", _NED, "azimuth from north, by the believed attitude"),
+        "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
+        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be: latitude"),
+        "own_lon_deg": ("deg", _WGS84, "its longitude"),
+        "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+    },
+    "fused": {
+        "target": ("", "", "name of the target"),
+        "sensors": ("", "", "sensors that were fused, joined by +"),
+        **_MEASURED,
+        "angle_source": ("", "", "sensor that the angles are of"),
+        "range_source": ("", "", "sensor that the range is of; null without one"),
+        **_TRUE,
+    },
+    "tracks": {
+        "target": ("", "", "name of the target"),
+        **_MEASURED,
+        "age_s": ("s", "", "time since the target's last update"),
+        "updated_by": ("", "", "sensors of that update, joined by +"),
+    },
+    "manoeuvres": {
+        "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
+        "rate_rad_s": ("rad/s", "", "rate of that turn"),
+    },
+    "processing": {
+        "processor": ("", "", "shared processor"),
+        "entered_s": ("s", "", "when the message came to the processor"),
+        "started_s": ("s", "", "when work on it began; null if never"),
+        "age_s": ("s", "", "from the instant it is about to its delivery"),
+        "queue_length": ("messages", "", "messages in line when it came"),
+        "outcome": ("", "", "whether it was done, dropped or skipped"),
+    },
+}
