@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from dsa_des.block.limits import refuse_extremes
-from dsa_des.files.input_files import read_input_text
+from dsa_des.files.input_files import InputFileError, read_input_text
 
 
 def table_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
@@ -17,12 +17,14 @@ def table_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
 
     Raises
     ------
-    InputFileError
-        If the file cannot be read, or is not UTF-8 text.
     ValueError
-        If a cell is longer than any number, naming the line.
+        If the file cannot be read or is not UTF-8 text, or a cell is longer than any number,
+        naming the line.
     """
-    text = read_input_text(Path(path))
+    try:
+        text = read_input_text(Path(path))
+    except InputFileError as error:
+        raise ValueError(f"{path}: {error}") from None
     for number, line in enumerate(text.replace("\r", "\n").split("\n"), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue

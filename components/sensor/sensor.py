@@ -203,7 +203,8 @@ class Sensor(Component):
             if len(place) == 1 == len(decision.reason) and place[0] == 0:
                 return rows, decision.reason
             if place.min(initial=0) >= 0:
-                if len(place) == len(decision.reason) and place[0] == 0:
+                # All in order need no copy; where messages were lost, others stand for them.
+                if len(place) == len(decision.reason) and bool((place[1:] > place[:-1]).all()):
                     return rows, decision.reason
                 return rows, decision.reason[place]
         part = targets.take(rows)

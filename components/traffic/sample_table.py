@@ -50,6 +50,11 @@ _LIMITS = {
 # simulate the years in between.
 _LONGEST_SILENCE_S = 86400.0
 
+# Samples closer than this are one instant, written twice.
+_SHORTEST_STEP_S = 1e-6
+# No aircraft, and no spacecraft, flies so far from one sample to the next, m/s.
+_FASTEST_MPS = 1e6
+
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
 
@@ -175,6 +180,12 @@ class SampleTable:
             columns["time"] = elapsed_times(columns["time"], start)
             geodetic = to_geodetic(columns)
             made[name] = self._trajectory(name, geodetic)
+            if (speed_mps := made[name].max_speed_mps) > _FASTEST_MPS:
+                self._problems.add(
+                    f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
+                    f"most {_FASTEST_MPS:g} m/s can be meant"
+                )
+        self._problems.raise_if_any()
         intruders = [trajectory for name, trajectory in made.items() if name != own]
         return TrafficFile(made[own], intruders, start, self.notes)
 
@@ -222,16 +233,16 @@ class SampleTable:
         order = np.argsort(times, kind="stable")
         if np.any(order[1:] < order[:-1]):
             self.notes.append(f"{name}: rows were not in the order of time and have been sorted")
-        same = np.flatnonzero(np.diff(times[order]) == 0.0)
-        for i in same:
+        header = self._columns["time"].header
+        gaps = np.diff(times[order])
+        for i in np.flatnonzero(gaps < _SHORTEST_STEP_S):
             first, second = rows.lines[order[i]], rows.lines[order[i + 1]]
-            header = self._columns["time"].header
-            self._problems.add(
-                f"{name} already has a sample at {times[order[i]]:.15g} s, in line {first}: an "
-                "aircraft may have only one at a time",
-                line=second,
-                column=header,
-            )
+            what = f"{name} already has a sample at {times[order[i]]:.15g} s, in line {first}: "
+            if gaps[i] == 0.0:
+                what += "an aircraft may have only one at a time"
+            else:
+                what += f"the next one must be at least {_SHORTEST_STEP_S:g} s later"
+            self._problems.add(what, line=second, column=header)
         return {key: values[order] for key, values in columns.items()}
 
     def _refuse_long_silence(self) -> None:

@@ -98,6 +98,7 @@ class TrafficSource(Component):
     fleet: Fleet
     targets: Sequence[Trajectory]
     roster: Roster
+    _offered: KnownTraffic | None = None
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -106,8 +107,15 @@ class TrafficSource(Component):
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
     def offer(self, port: str) -> KnownTraffic:
-        """Say what the targets are, and where they can be."""
-        return KnownTraffic(self.roster, None if self.context.producers else self._envelope)
+        """Say what the targets are, and where they can be.
+
+        It is the same word for all who ask: whether somebody went by where the targets can be
+        must show when replicas compare what their traffic says.
+        """
+        if self._offered is None:
+            envelope = None if self.context.producers else self._envelope
+            self._offered = KnownTraffic(self.roster, envelope)
+        return self._offered
 
     def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s

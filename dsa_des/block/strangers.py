@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
+from dsa_des.terminal.interruption import Terminated
+
 
 def is_ours_to_obey(error: BaseException) -> bool:
     """Return whether an exception is no stranger's error but means that we have to stop.
@@ -56,7 +58,7 @@ def strangers_code(*expected: type[Exception]) -> Iterator[None]:
         try:
             yield
         except BaseException as error:
-            if isinstance(error, (Left, *expected)):
+            if isinstance(error, (Left, Terminated, *expected)):
                 raise
             pressed = isinstance(error, KeyboardInterrupt) and interrupted()
             if pressed or isinstance(error, GeneratorExit):

@@ -4,7 +4,6 @@ import hashlib
 import io
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,11 @@ from dsa_des.commands.study import (
     tell_crashed,
 )
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.files.output_folder import new_folder
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
-from dsa_des.studies.folder_names import claim_folder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
@@ -65,15 +64,12 @@ def compare_command(
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    if out is not None:
-        _check_new(Path(out))
     studies = [_study_at(Path(path), replicas) for path in paths]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
         known_results(record.results_list(), results)
-    home = Path(out) if out is not None else claim_folder(_HOME, "compare")
-    try:
-        by_place: dict[Path, Tables] = {}  # what is named twice is run once
+    by_place: dict[Path, Tables] = {}  # what is named twice is run once
+    with new_folder(out, _HOME, "compare") as home:
         for path, study in zip(paths, studies, strict=True):
             place = Path(path).resolve()
             if place not in by_place:
@@ -82,19 +78,7 @@ def compare_command(
         for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(found) == 2 else f"scatter-{number}"
             _compare(found[0], other, (paths[0], path), results, home / stem)
-    finally:
-        with suppress(OSError):
-            home.rmdir()  # if nothing came to be in it
     tell_crashed(list(by_place.values()), _ANEW)
-
-
-def _check_new(home: Path) -> None:
-    try:
-        there = os.path.lexists(home) and (not home.is_dir() or any(home.iterdir()))
-    except OSError as error:
-        raise UsageError(f"--out {home}: cannot be read: {error.strerror}") from error
-    if there:
-        raise UsageError(f"--out {home}: is there already; a new folder is needed")
 
 
 def _compare_swap(
@@ -121,8 +105,8 @@ def _compare_swap(
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
     known_results(results_of(study), results)
-    home = Path(out) if out is not None else lambda: claim_folder(_HOME, "compare")
-    folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
+    with new_folder(out, _HOME, "compare") as home:
+        folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
     tables = finish(study, folder, only=results)
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)

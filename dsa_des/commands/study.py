@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.files.output_names import claim_folder, named
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
-from dsa_des.studies.folder_names import claim_folder, latest_folder
+from dsa_des.studies.folder_names import latest_folder
 from dsa_des.studies.metric import Result
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import show
@@ -64,7 +65,7 @@ def _target(study: Study, out: str | None, resume: bool) -> "Path | Callable[[],
     """Return the study's folder, or how to make a new one when all is well."""
     stem = study.path.stem
     if out is not None:
-        return Path(out)
+        return named(out)
     if resume:
         earlier = latest_folder(_HOME, stem)
         if earlier is None:
@@ -107,7 +108,8 @@ def _quoted(word: str) -> str:
 
 
 def _stopped(reason: str, again: str, code: int) -> NoReturn:
-    say(f"stopped: {reason}; what is finished is kept, continue with\n  {again}", err=True)
+    say(f"stopped: {reason}; what is finished is kept, continue with", err=True)
+    say(f"  {again}", err=True)
     sys.exit(code)
 
 
@@ -118,9 +120,10 @@ def tell_crashed(found: Sequence[Tables], again: str) -> None:
         runs = sum(_count(tables) for tables in found)
         say(
             f"{crashed} of {runs} runs crashed: the process that ran them died each time; "
-            f"try them again with\n  {again}",
+            "try them again with",
             err=True,
         )
+        say(f"  {again}", err=True)
         sys.exit(1)
 
 

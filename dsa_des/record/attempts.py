@@ -4,7 +4,13 @@ from collections.abc import Callable
 from typing import Any
 
 
-def attempt(what: str, notes: list[str], call: Callable[..., Any], *arguments: Any) -> Any:
+def attempt(
+    what: str,
+    notes: list[str],
+    call: Callable[..., Any],
+    *arguments: Any,
+    unless: type[Exception] = BrokenPipeError,
+) -> Any:
     """Return what a call gives; if it raises, add a note that says so and return None.
 
     Parameters
@@ -16,10 +22,12 @@ def attempt(what: str, notes: list[str], call: Callable[..., Any], *arguments: A
     call : callable
     *arguments
         Of the call.
+    unless : type of exception
+        What is raised all the same; by default, that the reader of our output went away.
     """
     try:
         return call(*arguments)
-    except BrokenPipeError:  # the reader of our output went away
+    except unless:
         raise
     except Exception as error:  # MemoryError is one of them
         notes.append(f"{what} failed: {_reason(error)}")

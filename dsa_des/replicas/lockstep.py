@@ -240,7 +240,7 @@ class LockStep(Simulation):
         except BlockFailure as failure:
             raise _unwrapped(failure) from None
         for block in self.split.values():
-            block.close()
+            block.close(len(self._scenes))
         # Nobody speaks for all replicas: a shared block has seen the rows of every one.
         return replace(outcome, components={})
 

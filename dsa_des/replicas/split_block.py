@@ -47,6 +47,7 @@ class SplitBlock:
         self._outputs = tuple(outputs)
         self.make, self._finished = make, finished
         self._instances: dict[int, Component] = {}
+        self._made: set[int] = set()
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Let every replica's instance handle its rows."""
@@ -58,15 +59,29 @@ class SplitBlock:
             if number not in self._instances:
                 self._let_go(number)
                 self._instances[number] = self.make(number)
+                self._made.add(number)
             result = self._instances[number].run(_part(wake, slice(first, end), number))
             for port, message in by_output(result, self._outputs).items():
                 shift = number * wake.span_ticks
                 sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
         return {port: _joined(parts) for port, parts in sent.items()} or None
 
-    def close(self) -> None:
-        """Let the last instances go."""
+    def close(self, replicas: int) -> None:
+        """Let the last instances go, and have those that never ran say their word as well.
+
+        Parameters
+        ----------
+        replicas : int
+            How many there are.
+
+        Raises
+        ------
+        NotInLockStep
+            If an instance that never ran would have told its neighbours something else.
+        """
         self._let_go(None)
+        for number in sorted(set(range(replicas)) - self._made):
+            self._finished(number, self.make(number))
 
     def _let_go(self, before: int | None) -> None:
         for number in sorted(self._instances):

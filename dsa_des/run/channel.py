@@ -84,7 +84,9 @@ class Channel:
             if len(kept) == 0:
                 return arrivals
         if self._replicas is not None and self.delay_ticks:
-            in_time = arrivals % self._replicas.span_ticks < self._replicas.end_tick
+            # Seen from the start of the replica that sent it: a long delay leads past the next one.
+            start = ticks - ticks % self._replicas.span_ticks
+            in_time = arrivals - start < self._replicas.end_tick
             arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
             if len(arrivals) == 0:
                 return arrivals

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from dsa_des.errors import OutputError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_text import to_toml
@@ -98,8 +99,12 @@ def record_run(
         write_run_json(folder, info)
     summary["out"] = str(target.path)
     # The run has its name: whatever happens while figures are drawn, it is not lost.
-    notes += draw_all(reports, simulation, target.path, summary)
-    write_run_json(target.path, info)  # with the figures among its files
+    try:
+        notes += draw_all(reports, simulation, target.path, summary)
+        write_run_json(target.path, info)  # with the figures among its files
+    except OSError as error:
+        what = f"figures cannot be written: {error.strerror or error}"
+        raise OutputError(f"{target.path}: {what}; the run itself is complete") from error
     for note in notes if told else ():
         say(f"note: {note}; the run itself is complete in {target.path}", err=True)
     return summary

@@ -96,8 +96,13 @@ def draw_all(
     """Let every report draw its figures of a finished run, and return what went wrong.
 
     A figure that fails takes nothing with it: the run is complete without.
+
+    Raises
+    ------
+    OSError
+        If a figure cannot be written.
     """
     notes: list[str] = []
     for report in reports:
-        attempt("drawing", notes, report.draw, simulation, folder, summary)
+        attempt("drawing", notes, report.draw, simulation, folder, summary, unless=OSError)
     return notes

@@ -32,7 +32,7 @@ _LONGEST_CHAIN = 32
 # one twice would double them at every step.
 _MOST_VALUES = 20_000_000
 # What a file counts for, however short it is.
-_VALUES_PER_FILE = 20
+_VALUES_PER_FILE = 200
 
 
 def dotted(key: Key) -> str:

@@ -10,6 +10,7 @@ A wire names blocks, and ports where a block has several that fit::
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -110,19 +111,21 @@ def read_wires(
             if unsure is not None:
                 unsure.update(classes)  # whom it meant to feed cannot be told
             continue
+        told: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
             try:
                 wire = _connect(source, target, options, classes)
             except _WireError as error:
                 problem = scene.problem(key, str(error), *error.value)
-                if problem not in problems:
-                    problems.append(problem)
+                if problem not in told:
+                    told.append(problem)
                 wire = None
             if wire is not None:
                 wires.append(wire)
             elif unsure is not None:
                 name = target.partition(".")[0]
                 unsure.add(name if name in classes else nearest(name, classes) or name)
+        problems += told
     _two_writers(scene, wires, classes, problems)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
@@ -240,7 +243,7 @@ def _two_writers(
     for (target, input_name), found in sorted(writers.items()):
         ends = [f"{w.source}.{w.output}" for w in found]
         if len(set(ends)) < len(ends):
-            twice = sorted({end for end in ends if ends.count(end) > 1})
+            twice = sorted(end for end, count in Counter(ends).items() if count > 1)
             message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
             problems.append(scene.problem(("wires",), message))
         elif len(found) > 1 and not classes[target].inputs[input_name].many:

@@ -1,32 +1,7 @@
-"""Names of folders that count up: a new one that nobody else gets, and the latest there is."""
+"""The latest of folders whose names count up."""
 
-import os
 import re
 from pathlib import Path
-
-from dsa_des.errors import UsageError
-
-
-def claim_folder(parent: Path, stem: str) -> Path:
-    """Make the first of ``parent/stem-001``, ``-002``, ... that is free; nobody else gets it.
-
-    Raises
-    ------
-    UsageError
-        If no folder can be made there.
-    """
-    number = 1
-    while True:
-        path = parent / f"{stem}-{number:03d}"
-        try:
-            path.mkdir(parents=True)
-            return path
-        except FileExistsError as error:
-            if not os.path.lexists(path):
-                raise UsageError(f"{parent}: cannot be written: {error.strerror}") from None
-            number += 1
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be made: {error.strerror}") from None
 
 
 def latest_folder(parent: Path, stem: str) -> Path | None:

@@ -60,8 +60,11 @@ def plain_ending() -> Iterator[None]:
 
 def _say(what: str) -> None:
     with suppress(OSError, ValueError):  # nobody can read it any more
-        # A terminal has just shown ^C.
-        print("\n" * sys.stderr.isatty() + f"stopped: {what}", file=sys.stderr, flush=True)
+        from dsa_des.terminal.terminal import say
+
+        if sys.stderr.isatty():  # it has just shown ^C
+            say(err=True)
+        say(f"stopped: {what}", err=True)
 
 
 @contextmanager

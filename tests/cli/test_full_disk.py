@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from dsa_des import read_run
+
 CODE = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -33,7 +35,6 @@ def limited(limit: int, *words: object, start: str = MAIN) -> subprocess.Complet
     [
         (0, ["run", "{scene}", "--duration", "1", "--out", "o"]),  # not even a lock
         (1000, ["run", "{scene}", "--duration", "20", "--out", "o"]),
-        (30_000, ["run", "{scene}", "--duration", "20", "--out", "o"]),  # figures
         (100_000, ["run", "{scene}", "--set", "blocks.radar.scan_rate_hz=1000"]),  # while it runs
         (2000, ["cost", "{scene}", "--block", "transform", "--repeats", "1", "--duration", "1"]),
         (2000, ["graph", "{scene}", "--png", "--out", "o.png"]),
@@ -50,6 +51,21 @@ def test_a_full_disk(
     assert done.stderr.startswith("error: ") and len(done.stderr.splitlines()) == 1, done.stderr
     assert "cannot be written: File too large" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_whose_figures_do_not_fit_is_kept(
+    tmp_path: Path, configs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = limited(
+        30_000, "run", configs / "first_light.toml", "--duration", "20", "--quiet", "--out", "o"
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "error: o: figures cannot be written: File too large; the run itself is complete\n"
+    )
+    assert read_run("o").detections.num_rows > 0
+    assert not list(Path("o").glob("*.png"))
 
 
 def test_an_earlier_run_stays_when_its_replacement_does_not_fit(

@@ -28,7 +28,6 @@ def run(configs, out, *options):
     [
         (MemoryError(), "out of memory"),
         (ValueError("no such colour"), "ValueError: no such colour"),
-        (OSError(28, "No space left on device"), "No space left on device"),
     ],
 )
 def test_a_figure_that_fails_leaves_the_run(configs, tmp_path, monkeypatch, error, said):
@@ -43,6 +42,20 @@ def test_a_figure_that_fails_leaves_the_run(configs, tmp_path, monkeypatch, erro
     assert len(result.stderr.splitlines()) == 1
     assert set(dsa_des.read_run(tmp_path / "kept").tables) == TABLES
     assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+
+
+def test_a_figure_that_cannot_be_written_leaves_the_run(configs, tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(figures, "draw", fail)
+    result = run(configs, tmp_path / "kept", "--quiet")
+    assert result.exit_code == 1
+    assert result.stderr == (
+        f"error: {tmp_path / 'kept'}: figures cannot be written: No space left on device; the run "
+        "itself is complete\n"
+    )
+    assert set(dsa_des.read_run(tmp_path / "kept").tables) == TABLES
 
 
 def test_the_run_is_complete_before_a_figure_is_begun(configs, tmp_path, monkeypatch):
@@ -87,7 +100,7 @@ def test_a_block_whose_report_fails_leaves_the_run(configs, tmp_path, monkeypatc
     monkeypatch.setattr(TrafficSource, "report", fail)
     result = run(configs, tmp_path / "kept")
     assert result.exit_code == 0
-    assert "out of memory: Unable to allocate 7.3 GiB" in result.stderr
+    assert "Unable to allocate 7.3 GiB; the run itself is complete" in result.stderr
     assert (tmp_path / "kept" / "plan.png").exists()
 
 

@@ -17,7 +17,7 @@ STUDY: dict[str, Any] = {
     "scene": "base.toml",
     "replicas": 2,
     "seed": 3,
-    "metrics": ["first_detection", {"metric": "detection_share", "sensor": "radar"}],
+    "metrics": ["first_detection", {"metric": "detection_share", "sensors": ["radar"]}],
     "set": {"duration_s": 1},
     "axes": {"blocks.radar.scan_rate_hz": [2, 5]},
 }
@@ -48,8 +48,12 @@ def study_case(rng: random.Random, case: Case) -> Case:
     if rng.random() < 0.06:
         return _shown(rng, case)
     study = copy.deepcopy(STUDY)
-    for _ in range(rng.choice((1, 1, 2, 3))):
+    if rng.random() < 0.4:
+        _vary(rng, study, scene)
+    for _ in range(rng.choice((0, 0, 1, 2)) if "draws" in study else rng.choice((1, 1, 2, 3))):
         _mutate(rng, study, scene)
+    if isinstance(study.get("set"), dict):
+        study["set"]["duration_s"] = 1  # many long runs are no fault, and no case either
     case.files["scene.toml"] = _bytes(rng, study)
     if rng.random() < 0.05:
         extending(rng, case)
@@ -60,6 +64,17 @@ def study_case(rng: random.Random, case: Case) -> Case:
         text = f"{rng.choice((*KEYS, *KEYS_OF_A_STUDY))}={fuzz_values.raw(rng)}"
         case.argv += ["--set", text.replace("\0", "").encode("utf-8", "replace").decode()]
     return case
+
+
+def _vary(rng: random.Random, study: dict[str, Any], scene: dict[str, Any]) -> None:
+    """Give an axis and a draw to parameters of the scene, with values that may be allowed."""
+    for table in ("axes", "draws"):
+        key = set_parameter(rng, copy.deepcopy(scene), 0) or "duration_s"
+        numbers = sorted(
+            fuzz_values.plausible(rng) if rng.random() < 0.7 else fuzz_values.number(rng)
+            for _ in range(2)
+        )
+        study[table] = {key: numbers if table == "axes" else {"uniform": numbers}}
 
 
 def _mutate(rng: random.Random, study: dict[str, Any], scene: dict[str, Any]) -> None:

@@ -54,7 +54,7 @@ CASES = {
         {"a.toml": 'extends = "loop"', "@loop": "loop"}, ["check", "a.toml"], "symbolic links",
     ),
     "doubling extends": (
-        extending(25, 'extends = ["{next}", "{next}"]'), ["check", "c0.toml"], "than 2,000,000",
+        extending(25, 'extends = ["{next}", "{next}"]'), ["check", "c0.toml"], "than 20,000,000",
     ),
     "long chain": (extending(1200, 'extends = "{next}"'), ["check", "c0.toml"], "at most 32"),
     "a device": ({"a.toml": 'extends = "/dev/zero"'}, ["check", "a.toml"], "is a device"),
@@ -155,7 +155,7 @@ def test_long_values_and_keys_are_shown_by_their_beginning(tmp_path):
     numbers = ", ".join(["1"] * 50_000)
     path.write_text(f'"{"k" * 100_000}" = 1\ntitle = [{numbers}]\nblocks = "{"v" * 100_000}"\n')
     output = CliRunner().invoke(main, ["check", str(path)]).output
-    assert "title = [1, 1, 1" in output and "kkk...: unknown key" in output
+    assert "title = [1, 1, 1" in output and "kkk…: unknown key" in output
     assert len(output) < 2000
 
 

@@ -390,3 +390,27 @@ def test_csv_ownship_that_is_not_there(tmp_path):
     path.write_text(CSV)
     with pytest.raises(TrafficFileError, match="no aircraft 'z': it must be one of a, b"):
         read_csv(path, ownship="z")
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (A0 + B0 + A1.replace("11\n", "10.0000001\n"), "must be at least 1e-06 s later"),
+        (A0 + B0 + A1.replace("45,", "46,").replace("11\n", "10.01\n"), "A flies at up to 1.1"),
+        (
+            A0 + B0 + B1.replace("11\n", "86411\n"),
+            "may not be without a sample for more than 86400",
+        ),
+    ],
+)
+def test_times_that_cannot_be_meant(tmp_path, rows, message):
+    path = tmp_path / "t.daa"
+    path.write_text(H + U + rows)
+    with pytest.raises(TrafficFileError, match=message):
+        read_daa(path)
+
+
+def test_a_day_of_silence_is_still_read(tmp_path):
+    path = tmp_path / "t.daa"
+    path.write_text(H + U + A0 + B0 + B1.replace("11\n", "86410\n"))
+    assert read_daa(path).intruders[0].interval_present()[1] == 86400.0

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pyarrow.compute as pc
@@ -118,6 +119,83 @@ def test_aircraft_that_differ_are_refused_not_mixed():
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
     _, alone = recorded(Simulation, scenes[1])
     assert len(outcomes[1].tables["detections"]["tick"]) == alone["detections"].num_rows
+
+
+def test_a_message_that_comes_after_the_end_comes_in_no_replica():
+    """A wire may take longer than the run and the gap to the next replica together."""
+    for delay_s in (2, 3, 4.3, 5, 9, 20):
+        scene = load_scene(FIRST_LIGHT, duration_s="2", sets=[f"blocks.radar.latency_s={delay_s}"])
+        replicas = [Replica(seed) for seed in range(4)]
+        assert_equal_to_separate_runs([scene_of(scene, replica) for replica in replicas])
+
+
+def test_a_block_that_never_runs_has_its_say():
+    """The radar never scans; but switched on it asks for farther targets than the others do."""
+    far = [
+        "blocks.radar.offset_s=100", "blocks.radar.range_km=30", "blocks.ir.range_km=3",
+        "blocks.eo.range_km=3", "blocks.traffic.intruders[0].north_m=9000",
+    ]  # fmt: skip
+    scene = load_scene(FIRST_LIGHT, duration_s="5", sets=far)
+    for first in (True, False):
+        changes = [{"blocks.radar.enabled": first}, {"blocks.radar.enabled": not first}]
+        replicas = [Replica(1, change) for change in changes]
+        scenes = [scene_of(scene, replica) for replica in replicas]
+        with pytest.raises(NotInLockStep, match="block radar asks for something else"):
+            recorded(LockStep, scenes)
+        # They run all the same, one by one; and what they count differs.
+        culled = []
+        for one, outcome in zip(scenes, run_replicas(scene, replicas), strict=True):
+            _, alone = recorded(Simulation, one)
+            counts = outcome.tables["scans"]["skipped_culled"]
+            assert counts.tolist() == alone["scans"]["skipped_culled"].to_pylist()
+            culled.append(counts.sum())
+        assert culled[0] != culled[1]
+
+
+def test_a_block_that_never_runs_reports():
+    scene = load_scene(FIRST_LIGHT, duration_s="5")
+    for key in ("radar", "eo", "ir"):
+        scene = scene_of(scene, Replica(1, {f"blocks.{key}.offset_s": 100}))
+    change = {"blocks.traffic.ownship.heading_deg": 3.0}
+    scenes = [scene_of(scene, Replica(seed, change if seed == 3 else {})) for seed in (1, 2, 3)]
+    found = {}
+    LockStep(scenes, report=lambda number, report: found.update({number: report})).run()
+    for number, one in enumerate(scenes):
+        alone = Simulation(one).run().report
+        assert found[number]["targets"] == alone["targets"]
+
+
+def test_replicas_whose_line_of_sight_rests_on_where_their_own_traffic_is(tmp_path):
+    """[accuracy] lets the transform choose by the traffic's envelope, which the seed decides."""
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        f"""
+        extends = "{Path(FIRST_LIGHT).resolve()}"
+        duration_s = 3
+        accuracy = {{ angle_deg = 0.03, range_m = 20 }}
+        blocks.radar.range_km = 3
+        blocks.eo.range_km = 1
+        blocks.ir.range_km = 1
+        [blocks.traffic]
+        type = "traffic.random"
+        intruders = 2
+        radius_km = 3
+        ownship = {{ lat_deg = 60, lon_deg = 4, alt_m = 1000, speed_mps = 50 }}
+        altitude_spread_m = 2000
+        """
+    )
+    scene = load_scene(path)
+    replicas = [Replica(seed) for seed in range(8)]
+    outcomes = run_replicas(scene, replicas)
+    models, rows = set(), 0
+    for replica, outcome in zip(replicas, outcomes, strict=True):
+        simulation, alone = recorded(Simulation, scene_of(scene, replica))
+        models.add(simulation.components["transform"].rung.earth)
+        wanted = alone["detections"]["true_azimuth_rad"].to_pylist()
+        assert outcome.tables["detections"]["true_azimuth_rad"].tolist() == wanted
+        rows += len(wanted)
+    assert len(models) > 1
+    assert rows > 0
 
 
 def test_a_bad_replica_leaves_the_others_alone():

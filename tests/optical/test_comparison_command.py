@@ -82,7 +82,7 @@ BAD = [
     ({"--step-deg": "7"}, "step_deg is 7"),
     ({"--reference": None}, "--reference and --mesh are missing"),
     ({"--reference": "none.csv"}, "none.csv"),
-    ({"--areas": None, "--aircraft": "sensors/oasys.toml"}, "has no eo.front_m2"),
+    ({"--areas": None, "--aircraft": "sensors/oasys.toml"}, "has no number eo.front_m2"),
 ]
 
 

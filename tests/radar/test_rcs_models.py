@@ -160,9 +160,9 @@ def test_symmetric_table_mirrors():
     [
         ("az_deg,el_deg,dbsm\n0,0,1\n90,0,1\n0,10,1\n", "hole: no value at az_deg 90, el_deg 10"),
         ("az_deg,el_deg,dbsm\n0,0,1\n360,0,2\n", "dbsm is 2 and 1 at az_deg 0, el_deg 0"),
-        ("az_deg,el_deg,area\n0,0,1\n", "it must have dbsm"),
-        ("az_deg,el_deg,dbsm\n0,0,loud\n", "line 2 is '0,0,loud'"),
-        ("az_deg,el_deg,dbsm\n0,0\n", "line 2 is '0,0'"),
+        ("az_deg,el_deg,area\n0,0,1\n", "is dbsm; it must have az_deg, el_deg, dbsm"),
+        ("az_deg,el_deg,dbsm\n0,0,loud\n", "line 2: it must have a number"),
+        ("az_deg,el_deg,dbsm\n0,0\n", "line 2: it must have a number"),
         ("az_deg,el_deg,dbsm\n0,0,nan\n", "dbsm is nan"),
         ("az_deg,el_deg,dbsm\n0,95,1\n", "elevation_deg is 95"),
         ("az_deg,el_deg,dbsm\n", "is empty"),

@@ -216,10 +216,10 @@ def test_windows_do_not_change_a_bit(configs, tmp_path, rcs_file):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, "No such file"),
+        (None, "rcs.csv: there is no such file"),
         ("az_deg,el_deg,dbsm\n0,0,1\n90,0,1\n0,10,1\n", "hole: no value at az_deg 90, el_deg 10"),
         ("az_deg,el_deg,dbsm\n0,0,nan\n", "dbsm is nan"),
-        (b"\xff\xfe\x00", "not UTF-8"),
+        (b"\xff\xfe\x00", "not a text file in UTF-8"),
     ],
 )
 def test_a_bad_table_is_a_problem_of_the_scene(configs, tmp_path, text, message):

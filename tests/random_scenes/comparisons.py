@@ -14,7 +14,7 @@ from dice import Dice
 from random_scene import Case
 
 from dsa_des.block.message import Text
-from dsa_des.errors import SceneError
+from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.replicas.lockstep import LockStep, NotInLockStep
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, scene_of
@@ -183,23 +183,24 @@ def _replicas_differ(case: Case, scene: Scene, dice: Dice) -> str:
     """Compare replicas run together with the same ones run by themselves."""
     replicas = random_changes.replicas(case.tables, dice)
     case.features |= dice.features
-    window = dice.pick(1, 3, 40)
+    window, tables, failure = dice.pick(1, 3, 40), None, ""
     try:
         tables = _in_lock_step([scene_of(scene, one) for one in replicas], window)
         case.features.add("replicas in lock step")
     except NotInLockStep:
         case.features.add("replicas one by one")
-        tables = None
-    except SceneError:
-        case.features.add("replica that is refused")
-        tables = None
-    if tables is None and dice.chance(0.8):
-        return ""  # together they run as they do by themselves
+        if dice.chance(0.8):
+            return ""  # together they run as they do by themselves
+    except (SceneError, BlockFailure) as error:
+        case.features.add("replica that fails")
+        failure = str(error)
     how = f"replicas {[(one.seed, dict(one.changes)) for one in replicas]}"
     apart = [run_replicas(scene, [replica])[0] for replica in replicas]
     for number, (one, other) in enumerate(zip(apart, run_replicas(scene, replicas), strict=True)):
         if found := _outcomes_differ(one, other):
             return f"{how}: number {number}: {found}"
+    if failure and not any(isinstance(one, Failed) for one in apart):
+        return f"{how}: only together: {failure}"
     if tables is None:
         return ""
     for number, one in enumerate(apart):

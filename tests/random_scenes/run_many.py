@@ -155,6 +155,9 @@ def main() -> None:
         kinds[verdict.kind] += 1
         features.update(has)
         refused.update(reasons)
+        done = sum(kinds.values())
+        if done % 250 == 0:
+            print(f"{done} of {options.count} done", file=sys.stderr, flush=True)
         if verdict.kind != "same":
             print(f"{seed} {verdict.kind}: {verdict.detail}", flush=True)
             _keep(seed, options.out)

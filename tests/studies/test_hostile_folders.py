@@ -10,8 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
+from dsa_des.files.output_names import claim_folder
 from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.folder_names import claim_folder, latest_folder
+from dsa_des.studies.folder_names import latest_folder
 from dsa_des.studies.output import safe_name
 from dsa_des.studies.study_file import read_study
 

@@ -21,7 +21,7 @@ from components.evidence.silhouettes.comparison import (
 )
 from components.optical.silhouette import visible_area
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.input_files import LARGEST_TOML_BYTES, read_input_text
+from dsa_des.files.input_files import LARGEST_TOML_BYTES, InputFileError, read_input_text
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.output_names import named
 from dsa_des.files.toml_input import parse_toml
@@ -109,7 +109,10 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
     if options.reference is not None:
         from components.aircraft.silhouette_table import read_aspect_table
 
-        table = read_aspect_table(options.reference)
+        try:
+            table = read_aspect_table(options.reference)
+        except InputFileError as error:
+            raise ValueError(f"--reference {options.reference}: {error}") from None
         references["table"] = _silhouette(model="aspect_table", table=table)
     if options.mesh is not None:
         from components.optical.mesh import load_mesh
