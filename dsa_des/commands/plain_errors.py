@@ -12,7 +12,7 @@ from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.terminal import say, say_lines
 
 # Who may end a command; whoever else does is a stranger's code in a place not foreseen.
-_OURS = ("dsa_des", "components", "click")
+_OURS = ("dsa_des", "components", "click", "rich")
 
 
 def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
