@@ -24,7 +24,7 @@ def show(console: Any, summary: dict[str, Any]) -> None:
             ("sensor", "scans>", "detections>", "", "time [s]>", "true range>", "target"),
             _sensor_rows(summary["sensors"]),
         )
-        for line in unseen_lines(summary["sensors"]):
+        for line in cut_off_lines(summary["sensors"]) + unseen_lines(summary["sensors"]):
             _print_line(console, line)
         alarms = [
             f"{name} {entry['false_alarms']:,}"
@@ -78,13 +78,10 @@ def _sensor_rows(sensors: dict[str, Any]) -> list[tuple[str, ...]]:
         for which in ("first", "last"):
             seen = entry[f"{which}_detection"]
             place = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
-            censored = f" (at {_SHORT_ENDS.get(seen['at'], seen['at'])})" if seen.get("at") else ""
-            rows.append((*start, which + censored, *place))
+            rows.append((*start, which + ("*" if seen.get("at") else ""), *place))
             start = ("", "", "")
     return rows
 
-
-_SHORT_ENDS = {"the start": "start", "the end of the run": "end"}
 
 #: Why a target was not looked at, by the name of the count.
 _WHY_NOT_SEEN = {
@@ -94,6 +91,23 @@ _WHY_NOT_SEEN = {
     "range": "beyond its range",
     "culled": "too far away to be looked at",
 }
+
+
+def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
+    """Say what the asterisk means behind the first and last detections that the run cut off.
+
+    Parameters
+    ----------
+    sensors : dict
+        As of `SensorSummary.result`.
+    """
+    ends = {
+        f"{which} at {seen['at']}"
+        for entry in sensors.values()
+        for which in ("first", "last")
+        if (seen := entry[f"{which}_detection"]) is not None and seen.get("at")
+    }
+    return [f"* cut off by the run: {', '.join(sorted(ends))}"] if ends else []
 
 
 def unseen_lines(sensors: dict[str, Any]) -> list[str]:

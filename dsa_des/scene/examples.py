@@ -111,7 +111,7 @@ def folders() -> list[Path]:
     found = []
     for point in registered(GROUP).values():
         try:
-            with strangers_code():
+            with strangers_code(UsageError):
                 found.append(Path(installed(point)()))
         except Left as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"

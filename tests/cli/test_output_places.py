@@ -160,7 +160,7 @@ def test_a_folder_that_is_removed_in_mid_run_is_one_error(
             shutil.rmtree(folder)
 
     monkeypatch.setattr("dsa_des.record.recording.ObserverSink.close", remove)
-    result = call("run", first_light, "--duration", 1, "--out", "a/b/run")
+    result = call("run", first_light, "--duration", 1, "--quiet", "--out", "a/b/run")
     assert result.exit_code == 1
     assert result.stderr.splitlines() == [
         "error: a/b/run: the results cannot be written: No such file or directory"

@@ -128,6 +128,7 @@ def test_censored_values_are_marked():
         }
     )
     lines = [" ".join(line.split()) for line in text.splitlines()]
-    assert any(line.startswith("eo 1 1 first (at start) 60.013") for line in lines)
+    assert any(line.startswith("eo 1 1 first* 60.013") for line in lines)
     assert "a 9.000 800.0 m at the end of the run" in lines
-    assert sum("(at " in line for line in lines) == 1
+    assert "* cut off by the run: first at the start" in lines
+    assert sum("*" in line for line in lines) == 2

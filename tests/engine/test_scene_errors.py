@@ -90,7 +90,7 @@ def only(lab, blocks=CHAIN, wires=WIRES, **load):
         (
             "no_such_module:Radar",
             "blocks.a.type = 'no_such_module:Radar': there is no module 'no_such_module' in the "
-            "working directory or on the Python path",
+            "working directory, in FOLDER or on the Python path",
         ),
         (
             "traffic.skripted",
@@ -100,7 +100,7 @@ def only(lab, blocks=CHAIN, wires=WIRES, **load):
     ],
 )
 def test_a_block(lab, block, text):
-    assert only(lab, {**CHAIN, "a": block}) == text
+    assert only(lab, {**CHAIN, "a": block}) == text.replace("FOLDER", str(lab.folder))
 
 
 @pytest.mark.parametrize(
