@@ -4,9 +4,7 @@ The package knows no radar. Blocks are found by their registered names (see
 `dsa_des.block.registry`), so this package never imports `components`.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dsa_des.record.version import __version__
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
     from dsa_des.library.scenes import load_scene
     from dsa_des.library.study import StudyResult, study
     from dsa_des.record.run_folder import Run, read_run
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
     from dsa_des.scene.examples import examples
     from dsa_des.scene.scene import Scene
     from dsa_des.studies.runner import Progress
@@ -39,12 +37,13 @@ _HOMES = {
     "Run": "dsa_des.record.run_folder",
     "Scene": "dsa_des.scene.scene",
     "SceneError": "dsa_des.errors",
-    "Simulation": "dsa_des.run.simulation",
+    "Simulation": "dsa_des.running.simulation",
     "StudyResult": "dsa_des.library.study",
     "UsageError": "dsa_des.errors",
     "examples": "dsa_des.scene.examples",
     "load_scene": "dsa_des.library.scenes",
     "read_run": "dsa_des.record.run_folder",
+    "run": "dsa_des.library.runs",
     "study": "dsa_des.library.study",
 }
 
@@ -74,8 +73,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name == "run":
-        return import_module(f"{__name__}.run")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -83,24 +80,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-class _Run(ModuleType):
-    """The folder ``dsa_des.run``, which is called as well: ``dsa_des.run(scene)``."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """Run a scene; see `dsa_des.library.runs.run`."""
-        from dsa_des.library.runs import run
-
-        return run(*arguments, **options)
-
-
-class _Package(ModuleType):
-    def __setattr__(self, name: str, value: Any) -> None:
-        # Whoever imports something of that folder puts it in the place of the function.
-        if name == "run" and type(value) is ModuleType:
-            value.__class__ = _Run
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

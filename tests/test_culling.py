@@ -15,7 +15,7 @@ from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints
 from components.traffic.trajectory import SampledTrajectory
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 OWN = ScriptedTrajectory("own", lat_deg=52.0, lon_deg=4.0, alt_m=1000, speed_mps=50)

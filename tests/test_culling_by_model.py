@@ -15,7 +15,7 @@ from components.line_of_sight.transform import LINES_OF_SIGHT
 from components.line_of_sight.true_reach import true_reach_m
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # Two rings of slow targets about the radar's 15 km: flat Earth sees some of them half a per cent

@@ -10,8 +10,8 @@ from components.radar.swerling import SwerlingParameters, SwerlingRadar
 from dsa_des.block.component import Context
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
-from dsa_des.run.effect_plan import plan
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.effect_plan import plan
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 
 def draw(

@@ -12,7 +12,7 @@ from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 MOST_POINTS = 30_000
 """Points of all tracks together."""

@@ -20,7 +20,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.record.drawing import drawing, figure_text
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 MOST_NAMED = 8
 # Inches around the map.

@@ -8,10 +8,10 @@ from components.display.change import share_that_differs
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.recording import Observer
-from dsa_des.run.reports import Change, Difference
+from dsa_des.running.reports import Change, Difference
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 
 class DetectAndSenseReport:

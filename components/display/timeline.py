@@ -15,7 +15,7 @@ from components.display.thinning import by_target, evenly, staggered
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]
 

@@ -17,7 +17,7 @@ from dsa_des.block.registry import find
 from dsa_des.commands.parameter_rows import parameter_rows
 from dsa_des.commands.scene_tables import scene_tables
 from dsa_des.files.output_file import write_file
-from dsa_des.run.processors import Processing
+from dsa_des.running.processors import Processing
 from dsa_des.terminal.interruption import plain_ending
 
 _HEAD = """# Reference

@@ -16,7 +16,7 @@ from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
-from dsa_des.run.reports import load_reports
+from dsa_des.running.reports import load_reports
 from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.terminal.terminal import say, say_json
 

@@ -6,8 +6,8 @@ from functools import partial
 from typing import Any
 
 from dsa_des.commands.loading import load
-from dsa_des.run.effect_plan import Planned
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.effect_plan import Planned
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
 from dsa_des.text.safe_text import shortened

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from dsa_des.commands.loading import load
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.run.pacing import Pacer, parse_factor
-from dsa_des.run.recorded_run import record_run
-from dsa_des.run.reports import load_reports
+from dsa_des.running.pacing import Pacer, parse_factor
+from dsa_des.running.recorded_run import record_run
+from dsa_des.running.reports import load_reports
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say_json
 

@@ -20,7 +20,7 @@ from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.drawing import drawing, figure_text
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 MOST = 200

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dsa_des.run.reports import Change, Difference, Report
+from dsa_des.running.reports import Change, Difference, Report
 
 _NOTHING = Difference("what differs", "share of what differs", lambda changes: 0.0)
 

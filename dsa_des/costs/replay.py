@@ -15,7 +15,7 @@ from typing import Any
 from dsa_des.block.component import Component
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 # Slow rungs are timed fewer times: all passes of one rung together take about this long at most.

@@ -11,7 +11,7 @@ from dsa_des.costs.front import allowed_error, on_front
 from dsa_des.costs.replay import RungRun, median_and_spread, run_rung, time_interleaved
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 #: Compares the recorded tables of the reference's run and of a rung's run.
 Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]

@@ -24,7 +24,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.errors import BlockFailure, Problem, SceneError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, parse_rational

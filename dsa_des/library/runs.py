@@ -14,9 +14,9 @@ from dsa_des.library.scenes import scene_of_any
 from dsa_des.record.picture import pictures_in
 from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
 from dsa_des.record.run_folder import Run, read_run
-from dsa_des.run.recorded_run import info_of, record_run, summary_of
-from dsa_des.run.reports import Report, draw_all, load_reports
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.recorded_run import info_of, record_run, summary_of
+from dsa_des.running.reports import Report, draw_all, load_reports
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
 

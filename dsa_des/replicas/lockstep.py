@@ -17,9 +17,9 @@ from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.replicas.watched_parameters import WatchedParameters
-from dsa_des.run.effect_plan import plan, unspent
-from dsa_des.run.node import Node
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.effect_plan import plan, unspent
+from dsa_des.running.node import Node
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.randomness import Streams

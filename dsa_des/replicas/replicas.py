@@ -16,7 +16,7 @@ from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.replicas.lockstep import LockStep, NotInLockStep
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.block import Block
 from dsa_des.scene.checks import check_times
 from dsa_des.scene.options import BlockOptions, with_latencies

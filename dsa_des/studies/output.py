@@ -223,7 +223,7 @@ class Tables:
 
     def _draw_run(self, cell: int, replica: int) -> list[Path]:
         """Run one replica of a cell again and draw it as ``dsa-des run`` does."""
-        from dsa_des.run.recorded_run import record_run
+        from dsa_des.running.recorded_run import record_run
 
         if self.study is None:  # nothing of the folder's is imported, so nothing is run
             return []

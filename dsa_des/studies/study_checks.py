@@ -6,7 +6,7 @@ from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.replicas.replicas import Replica, scene_of
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.steps import key_in

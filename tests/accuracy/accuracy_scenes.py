@@ -12,7 +12,7 @@ from components.geometry.sensor_angles import sensor_angles
 from components.messages.reach import EVALUATE
 from components.messages.targets import GatedTargets, TrafficStates
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"

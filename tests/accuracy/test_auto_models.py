@@ -13,7 +13,7 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.replicas.lockstep import LockStep
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # Of 500 (seeds 0 to 499, run once by hand): none off by more than allowed, 83 % cheaper.

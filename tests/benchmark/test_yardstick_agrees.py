@@ -5,7 +5,7 @@ import pytest
 from components.evidence.benchmark import yardstick
 from components.evidence.benchmark.cases import CASES, replicas_of, scene_of
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 SHORT = {
     "thesis": "300", "clocks": "60", "hundred": "60", "ten_thousand": "2", "sparse": "2",

@@ -102,7 +102,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next_one_and_a_living_one_is_n
     (at_work,) = os.listdir(tmp_path / "runs")
     assert left != at_work
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("dsa_des.run.recorded_run.load_reports", list)  # figures take long
+    monkeypatch.setattr("dsa_des.running.recorded_run.load_reports", list)  # figures take long
     plain = ["run", str(configs / "first_light.toml"), "--duration", "1", "--quiet"]
     assert CliRunner().invoke(main, plain, catch_exceptions=False).exit_code == 0
     assert sorted(os.listdir(tmp_path / "runs")) == [at_work, "first_light-001"]
@@ -134,7 +134,7 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
     ("where", "words"),
     [
         ("dsa_des.commands.run.load", ["run", "{scene}"]),
-        ("dsa_des.run.recorded_run.to_toml", ["run", "{scene}", "--duration", "1"]),
+        ("dsa_des.running.recorded_run.to_toml", ["run", "{scene}", "--duration", "1"]),
         ("dsa_des.commands.check.load", ["check", "{scene}"]),
         ("dsa_des.commands.graph._layout", ["graph", "{scene}", "--png"]),
         ("dsa_des.commands.explain.load", ["explain", "{scene}"]),

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
 from dsa_des.files.unfinished import PREFIX
-from dsa_des.run import recorded_run as run_module
+from dsa_des.running import recorded_run as run_module
 
 
 def call(*arguments: object) -> Result:
@@ -95,7 +95,7 @@ def test_bad_places_are_refused_before_anything_runs(
         "reproduce": ["reproduce", "table-4.1"],
     }[command]
     for place in (
-        "dsa_des.run.simulation.Simulation.run",
+        "dsa_des.running.simulation.Simulation.run",
         "dsa_des.commands.cost.climb",
         "components.line_of_sight.error_map.draw_error_map",
         "components.evidence.thesis.reproduce.make",

@@ -9,7 +9,7 @@ from components.optical.projection import fuselage_length_m
 from components.optical.sampled_silhouette import body_mesh, sampled_table
 from components.optical.silhouette import visible_area
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/first_light.toml"

@@ -14,7 +14,7 @@ from components.display.scan_times import SensorScans, read_scans
 from components.display.timeline import find_close_up
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import ObserverSink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 HEAD = """

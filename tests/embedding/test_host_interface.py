@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from dsa_des.cli import main
 from dsa_des.embed import HostDriven, Simulator
 from dsa_des.errors import BlockFailure, SceneError, UsageError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 OWN = (0.9, 0.07, 1000.0)

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
-from dsa_des.run.pacing import Pacer, parse_factor
+from dsa_des.running.pacing import Pacer, parse_factor
 
 
 class Clock:

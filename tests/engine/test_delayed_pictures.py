@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 

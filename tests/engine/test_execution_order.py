@@ -416,7 +416,7 @@ def test_a_window_must_hold_a_scan(lab):
 
 
 def test_progress_ends_at_the_end(lab):
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
     from dsa_des.scene.scene import load_scene
 
     seen = []

@@ -12,7 +12,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 

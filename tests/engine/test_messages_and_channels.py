@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsa_des.block.message import Message, Text
-from dsa_des.run.channel import Channel
+from dsa_des.running.channel import Channel
 
 RAGGED_ROWS = st.lists(st.lists(st.integers(0, 99), max_size=4), min_size=1, max_size=12)
 

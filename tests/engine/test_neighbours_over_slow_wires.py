@@ -4,7 +4,7 @@ import pytest
 
 from components.traffic.source import TrafficSource
 from dsa_des.errors import SceneError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # Names in an order that is not that of the chain: among blocks of one depth names decide.

@@ -14,7 +14,7 @@ from dsa_des.block.message import per_entry
 from dsa_des.block.ports import Output
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import ColumnSink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 

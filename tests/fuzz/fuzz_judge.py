@@ -161,9 +161,9 @@ def _simulate(argv: list[str]) -> None:
         from dsa_des.commands.loading import load
         from dsa_des.files.toml_text import to_toml
         from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
-        from dsa_des.run.long_run import say_if_long
-        from dsa_des.run.reports import load_reports
-        from dsa_des.run.simulation import Simulation
+        from dsa_des.running.long_run import say_if_long
+        from dsa_des.running.reports import load_reports
+        from dsa_des.running.simulation import Simulation
         from dsa_des.text.plain_json import json_text
 
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]

@@ -99,13 +99,13 @@ def test_errors_are_those_of_the_command_line(short, tmp_path, own):
         dsa_des.run("nix.toml")
 
 
-def test_the_folder_of_runs_can_be_called_however_it_was_imported():
+def test_run_is_a_function_and_importing_it_costs_nothing_heavy():
     code = (
         "import sys, dsa_des\n"
         "heavy = {'numpy', 'pyarrow', 'scipy', 'matplotlib', 'pydantic', 'simpy'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
         "assert callable(dsa_des.run)\n"
-        "from dsa_des.run.simulation import Simulation\n"
+        "from dsa_des.running.simulation import Simulation\n"
         "assert callable(dsa_des.run) and dsa_des.Simulation is Simulation\n"
         "assert {'Scene', 'run', 'study'} <= set(dir(dsa_des))\n"
         "assert all(hasattr(dsa_des, name) for name in dsa_des.__all__)\n"

@@ -8,7 +8,7 @@ import pytest
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.replicas.lockstep import LockStep
 from dsa_des.replicas.replicas import Replica, scene_of
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 
 def tables_of(kind, scenes, **options):

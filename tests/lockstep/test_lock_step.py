@@ -12,7 +12,7 @@ from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.replicas.lockstep import LockStep, NotInLockStep
 from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas, scene_of
 from dsa_des.replicas.streams import ReplicaStreams
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import first_scan

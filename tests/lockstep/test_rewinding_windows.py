@@ -4,8 +4,8 @@ import pytest
 
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.rewind import cut_loops
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.rewind import cut_loops
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
 

@@ -12,7 +12,7 @@ from dsa_des.replicas.lockstep import LockStep, NotInLockStep
 from dsa_des.replicas.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
 from dsa_des.replicas.split_block import SplitBlock, _part
 from dsa_des.replicas.watched_parameters import WatchedParameters
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"

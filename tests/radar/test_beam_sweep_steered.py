@@ -10,7 +10,7 @@ from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.traffic.steered_flight import SteeredFlight
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # A manoeuvre arrives 0.7 s after a scan begins and one scan lasts a second: most turns begin while

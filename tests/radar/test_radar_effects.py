@@ -7,7 +7,7 @@ import pytest
 
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 INTRUDERS = """

@@ -4,7 +4,7 @@ import pytest
 
 from components.atmosphere.attenuated_range import attenuated_range_m
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 SCENE = """

@@ -18,7 +18,7 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.replicas.lockstep import LockStep, NotInLockStep
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, scene_of
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 
 #: Table → column → values as plain arrays.

@@ -16,7 +16,7 @@ from dice import Dice
 
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_text import to_toml
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"

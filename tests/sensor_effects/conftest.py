@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 SCENE = """

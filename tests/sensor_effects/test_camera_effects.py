@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 CAMERAS = [

@@ -3,7 +3,7 @@
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 # The intruder comes into the radar's 5 km after about half of the run, at 300 m/s.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 SCENE = """

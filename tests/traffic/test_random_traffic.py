@@ -5,7 +5,7 @@ import pytest
 
 from components.geometry.ellipsoid import line_of_sight
 from dsa_des.errors import SceneError
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 SCENE = "configs/benchmark/hundred.toml"

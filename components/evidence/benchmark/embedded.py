@@ -13,7 +13,7 @@ import numpy as np
 
 from components.evidence.benchmark.cases import SCENES
 from dsa_des.embed import Simulator
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.terminal.terminal import say_json
 

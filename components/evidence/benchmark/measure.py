@@ -20,7 +20,7 @@ from components.evidence.benchmark import yardstick
 from components.evidence.benchmark.cases import Case, chosen, replicas_of, scene_of
 from dsa_des.record.recording import MemorySink, Recorder, Sink
 from dsa_des.replicas.lockstep import LockStep
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say_json
 

@@ -25,7 +25,7 @@ from components.evidence.benchmark.scalar_motion import (
     straight_flight,
 )
 from components.radar.threshold import detection_threshold
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 #: Latitude, longitude, altitude and yaw, and pitch and roll.
 OwnState = tuple[Position, tuple[float, float]]

@@ -14,7 +14,7 @@ from dsa_des.block.message import Columns, Text
 from dsa_des.errors import UsageError
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.replicas.replicas import Failed, Replica, run_replicas
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 
 

@@ -12,7 +12,7 @@ from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import Recording, flights_of, monte_carlo, scene
 from components.geometry.ellipsoid import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 
 REPLICAS = 100
 _EDGES_KM = np.arange(0.0, 10.5, 1.0)

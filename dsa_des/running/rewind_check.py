@@ -13,7 +13,7 @@ from dsa_des.block.component import Component
 from dsa_des.block.message import by_output
 from dsa_des.block.wake import Wake
 from dsa_des.errors import BlockFailure
-from dsa_des.run.fingerprint import message_fingerprints, state_fingerprints
+from dsa_des.running.fingerprint import message_fingerprints, state_fingerprints
 
 #: What a block sent in one call: fingerprints by output and field.
 Sent = dict[str, bytes]

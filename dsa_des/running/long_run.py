@@ -1,6 +1,6 @@
 """A run that will take long says so before it starts."""
 
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.terminal.terminal import say
 
 # Half a minute of the processor, for most scenes.

@@ -17,11 +17,11 @@ from dsa_des.record.attempts import attempt
 from dsa_des.record.recording import ObserverSink, Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.version import __version__
-from dsa_des.run.long_run import say_if_long
-from dsa_des.run.pacing import Pacer
-from dsa_des.run.reports import draw_all, load_reports
-from dsa_des.run.simulation import Outcome, Simulation
-from dsa_des.run.warnings import say_warnings, warnings_of
+from dsa_des.running.long_run import say_if_long
+from dsa_des.running.pacing import Pacer
+from dsa_des.running.reports import draw_all, load_reports
+from dsa_des.running.simulation import Outcome, Simulation
+from dsa_des.running.warnings import say_warnings, warnings_of
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say

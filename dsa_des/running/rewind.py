@@ -16,9 +16,9 @@ import numpy as np
 
 from dsa_des.block.component import Component
 from dsa_des.record.recording import Recorder
-from dsa_des.run.channel import Channel
-from dsa_des.run.rewind_check import Witness
-from dsa_des.run.run_state import RewindableRun, RunningBlock
+from dsa_des.running.channel import Channel
+from dsa_des.running.rewind_check import Witness
+from dsa_des.running.run_state import RewindableRun, RunningBlock
 from dsa_des.scene.graph import in_cycles, window_order
 
 # At the start, and after something came back, a window has this part of its full length.

@@ -12,7 +12,7 @@ import numpy as np
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Message
-from dsa_des.run.wire_faults import WireFaults
+from dsa_des.running.wire_faults import WireFaults
 from dsa_des.time.timeline import ReplicaTime
 
 

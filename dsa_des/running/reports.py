@@ -15,7 +15,7 @@ from dsa_des.record.attempts import attempt
 from dsa_des.record.recording import Observer
 
 if TYPE_CHECKING:
-    from dsa_des.run.simulation import Simulation
+    from dsa_des.running.simulation import Simulation
 
 REPORTS = "dsa_des.reports"
 

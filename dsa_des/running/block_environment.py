@@ -6,8 +6,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from dsa_des.block.wake import Wake
-from dsa_des.run.events import Bell, WakeUp
-from dsa_des.run.run_state import RunState
+from dsa_des.running.events import Bell, WakeUp
+from dsa_des.running.run_state import RunState
 
 
 class OwnProcess(Protocol):

@@ -1,7 +1,7 @@
 """What blocks say of their own values before a run: defaults that decide, what cannot be meant."""
 
 from dsa_des.record.attempts import attempt
-from dsa_des.run.simulation import Simulation
+from dsa_des.running.simulation import Simulation
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shortened
 

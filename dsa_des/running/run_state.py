@@ -9,8 +9,8 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
-from dsa_des.run.channel import Channel
-from dsa_des.run.rewind_check import Witness
+from dsa_des.running.channel import Channel
+from dsa_des.running.rewind_check import Witness
 
 
 class RunningBlock(Protocol):

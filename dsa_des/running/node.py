@@ -18,11 +18,11 @@ from dsa_des.block.component import Component
 from dsa_des.block.message import Message, by_output
 from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.run.block_environment import BlockEnvironment
-from dsa_des.run.channel import Channel
-from dsa_des.run.events import Bell, WakeUp
-from dsa_des.run.processors import Processor
-from dsa_des.run.run_state import RunState
+from dsa_des.running.block_environment import BlockEnvironment
+from dsa_des.running.channel import Channel
+from dsa_des.running.events import Bell, WakeUp
+from dsa_des.running.processors import Processor
+from dsa_des.running.run_state import RunState
 from dsa_des.time.clock import MAX_TICK, ScanClock
 from dsa_des.time.timeline import ReplicaTime
 

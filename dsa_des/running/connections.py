@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from dsa_des.errors import Problem, SceneError
-from dsa_des.run.channel import Channel
-from dsa_des.run.node import Demand, Node
-from dsa_des.run.wire_faults import WireFaults
+from dsa_des.running.channel import Channel
+from dsa_des.running.node import Demand, Node
+from dsa_des.running.wire_faults import WireFaults
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK

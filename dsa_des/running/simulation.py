@@ -24,14 +24,14 @@ from dsa_des.block.message import Message
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, Problem, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
-from dsa_des.run.connections import check_reach, connect
-from dsa_des.run.effect_plan import Planned, plan, unspent
-from dsa_des.run.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
-from dsa_des.run.pinpoint import pinpoint
-from dsa_des.run.processors import Processing, Processor
-from dsa_des.run.rewind import cannot_rewind, cut_loops, rewinding_windows, telling_order
-from dsa_des.run.rewind_check import Witness
-from dsa_des.run.run_state import RunningBlock
+from dsa_des.running.connections import check_reach, connect
+from dsa_des.running.effect_plan import Planned, plan, unspent
+from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
+from dsa_des.running.pinpoint import pinpoint
+from dsa_des.running.processors import Processing, Processor
+from dsa_des.running.rewind import cannot_rewind, cut_loops, rewinding_windows, telling_order
+from dsa_des.running.rewind_check import Witness
+from dsa_des.running.run_state import RunningBlock
 from dsa_des.scene.graph import depths, in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, ScanClock

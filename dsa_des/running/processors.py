@@ -16,7 +16,7 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Columns, Message, Text, static
-from dsa_des.run.events import Bell, WakeUp
+from dsa_des.running.events import Bell, WakeUp
 from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.time.randomness import Stream, key_of
 
