@@ -198,7 +198,7 @@ def mentioned(tree: ast.Module) -> set[str]:
 def test_the_engine_names_no_column_of_a_message_of_components():
     sensors = words_of(messages_of(f"{BLOCKS}.messages"))
     sensors -= (
-        words_of(messages_of(f"{ENGINE}.block") + messages_of(f"{ENGINE}.run")) | COMMON_WORDS
+        words_of(messages_of(f"{ENGINE}.block") + messages_of(f"{ENGINE}.running")) | COMMON_WORDS
     )
     assert {"azimuth_rad", "detections", "snr_db", "true_range_m"} <= sensors
     found = {
