@@ -30,8 +30,8 @@ _SCAN_BITS = 48
 
 class _Navigation(Effect):
     name = "navigation"
-    # Without it there is nothing to tell: the columns are null.
     neutral = False
+    outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[navigation]``."""

@@ -18,8 +18,8 @@ class Background(Effect):
     lockstep = True
     name = "background and sun"
     acts_on = "contrast"
-    # There is no sun under which every target's contrast against its background is exactly 1.
     neutral = False
+    outside_the_proof = "no sun leaves every target's contrast exactly as it is"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``background``."""

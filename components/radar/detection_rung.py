@@ -19,6 +19,7 @@ class ExactDetection(Effect):
     name = "exact Pd"
     acts_on = "method of Pd"
     neutral = False
+    outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""

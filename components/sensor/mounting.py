@@ -104,8 +104,8 @@ class Mounting(Effect):
     lockstep = True
     name = "mounting"
     acts_on = "axes"
-    # Rotating by 0 and back rounds the last bits.
     neutral = False
+    outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``mount_*_deg`` and ``misalignment_deg``."""

@@ -39,6 +39,8 @@ class Effect:
     acts_on: ClassVar[str]
     #: Whether it can be built when the scene does not call for it, without changing a bit.
     neutral: ClassVar[bool] = True
+    #: Of an effect that is not neutral: why nothing can be built that changes no bit.
+    outside_the_proof: ClassVar[str] = ""
     #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
     #: of different replicas may come in one call.
     lockstep: ClassVar[bool] = False

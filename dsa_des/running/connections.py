@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Channel
 from dsa_des.running.node import Demand, Node
+from dsa_des.running.timing_effects import may_be_late
 from dsa_des.running.wire_faults import WireFaults
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
@@ -13,7 +14,13 @@ from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import ReplicaTime
 
 
-def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | None = None) -> None:
+def connect(
+    scene: Scene,
+    nodes: Mapping[str, Node],
+    replicas: ReplicaTime | None = None,
+    *,
+    everything: bool = False,
+) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
 
     Parameters
@@ -23,6 +30,8 @@ def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | Non
         Running blocks by name.
     replicas : ReplicaTime, optional
         For replicas in lock step.
+    everything : bool
+        Draw loss and jitter also for wires that have none.
 
     Raises
     ------
@@ -32,7 +41,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | Non
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
-        channel = Channel(wire.source, delay, _faults(scene, wire), replicas)
+        channel = Channel(wire.source, delay, _faults(scene, wire, everything), replicas)
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             try:
@@ -96,8 +105,8 @@ def _problem(scene: Scene, key: str, message: str) -> Problem:
     return Problem(str(scene.path), key, message)
 
 
-def _faults(scene: Scene, wire: Wire) -> WireFaults | None:
-    if not wire.jitter_s and not wire.drop_probability:
+def _faults(scene: Scene, wire: Wire, everything: bool) -> WireFaults | None:
+    if not may_be_late(wire, everything):
         return None
     streams = Streams(scene.seed)
     return WireFaults(

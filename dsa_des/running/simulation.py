@@ -32,6 +32,7 @@ from dsa_des.running.processors import Processing, Processor
 from dsa_des.running.rewind import cannot_rewind, cut_loops, rewinding_windows, telling_order
 from dsa_des.running.rewind_check import Witness
 from dsa_des.running.run_state import RunningBlock
+from dsa_des.running.timing_effects import timing_plan
 from dsa_des.scene.graph import depths, in_cycles, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, ScanClock
@@ -140,6 +141,7 @@ class Simulation:
         #: The instants of the call in which a block failed.
         self.failed_at = np.empty(0, dtype=np.int64)
         self._window = window
+        self._everything = simulate_everything
         self._has_run = False
         self.cuts = sorted(cuts)
         self._depth = depths(scene.graph)
@@ -163,7 +165,7 @@ class Simulation:
         if self.witness is not None:
             for node in self.nodes.values():
                 node.runner = self.witness.runner(node.component)
-        connect(scene, self.nodes, self.replicas)
+        connect(scene, self.nodes, self.replicas, everything=simulate_everything)
         if self.replicas is None:  # replicas in lock step were judged one by one
             check_reach(scene, self.nodes, self.end_tick)
             self._refuse_endless_work()
@@ -332,7 +334,12 @@ class Simulation:
         spec = component.clock_of(component.p)
         if spec is None:
             return None
-        return ScanClock(spec, self.ticks_per_s, self.streams.scan_normals(name, "clock jitter"))
+        return ScanClock(
+            spec,
+            self.ticks_per_s,
+            self.streams.scan_normals(name, "clock jitter"),
+            always_draws=self._everything,
+        )
 
     def _build_processors(self) -> dict[str, Processor]:
         """Start the shared processors of the scene."""
@@ -352,6 +359,11 @@ class Simulation:
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
             self.recorder.record(block, message)
+
+    @property
+    def timing_plan(self) -> list[Planned]:
+        """Which effects of time exist in this run: latencies, wires, clocks, processors."""
+        return timing_plan(self.scene, everything=self._everything)
 
     @property
     def scans(self) -> float:
