@@ -65,16 +65,18 @@ class Channel:
         """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
         return min(self._pushed) if self._pushed else None
 
-    def push(self, message: Message, sent: int | None = None) -> IntArray:
+    def push(self, message: Message, sent: int | IntArray | None = None) -> IntArray:
         """Deposit a message and return the ticks at which its rows arrive, in order.
 
         Parameters
         ----------
         message : Message
-        sent : int, optional
-            The tick at which it was sent, when that is later than the rows' own.
+        sent : int or array of int, optional
+            The tick at which it was sent, or each of its rows, when that is later than their own.
         """
-        ticks = message.tick if sent is None else np.full(len(message), sent, dtype=np.int64)
+        ticks = message.tick
+        if sent is not None:
+            ticks = np.full(len(message), sent, dtype=np.int64)
         arrivals = ticks + self.delay_ticks if self.delay_ticks else ticks
         if self._faults is not None:
             kept = np.flatnonzero(self._faults.kept(message.tick))

@@ -23,6 +23,7 @@ from dsa_des.running.channel import Channel
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.run_state import RunState
+from dsa_des.running.windowed_queue import WindowedQueue
 from dsa_des.time.clock import MAX_TICK, ScanClock
 from dsa_des.time.timeline import ReplicaTime
 
@@ -76,7 +77,7 @@ class Node:
     clock: ScanClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
-    processor: Processor | None = None
+    processor: Processor | WindowedQueue | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
@@ -159,6 +160,8 @@ class Node:
 
     def open_window(self, start: int, end: int) -> None:
         """Schedule everything this block's clock asks for in [start, end)."""
+        if self.processor is not None:
+            self.processor.open_window(start, end)
         if self.windowed:
             self.wake_at(start)
             return
@@ -308,9 +311,9 @@ class Node:
             if self.processor is None:
                 self._deliver(port, message)
             else:
-                self.processor.submit(self.name, partial(self._deliver, port, message))
+                self.processor.submit(self.name, message, partial(self._deliver, port))
 
-    def _deliver(self, port: str, message: Message, sent: int | None = None) -> None:
+    def _deliver(self, port: str, message: Message, sent: int | IntArray | None = None) -> None:
         for channel, node, target_port in self.subscribers.get(port, []):
             arrivals = channel.push(message, sent)
             if node.component.inputs[target_port].mode == "sampled":

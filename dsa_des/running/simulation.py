@@ -28,12 +28,13 @@ from dsa_des.running.connections import check_reach, connect
 from dsa_des.running.effect_plan import Planned, plan, unspent
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Abort, Node
 from dsa_des.running.pinpoint import pinpoint
-from dsa_des.running.processors import Processing, Processor
+from dsa_des.running.processors import Processing, Processor, Service
 from dsa_des.running.rewind import cannot_rewind, cut_loops, rewinding_windows, telling_order
 from dsa_des.running.rewind_check import Witness
 from dsa_des.running.run_state import RunningBlock
 from dsa_des.running.timing_effects import timing_plan
-from dsa_des.scene.graph import depths, in_cycles, window_order
+from dsa_des.running.windowed_queue import WindowedQueue
+from dsa_des.scene.graph import depths, in_cycles, queue_key, window_order
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import MAX_TICK, ScanClock
 from dsa_des.time.randomness import Streams
@@ -312,8 +313,10 @@ class Simulation:
         windowed = set() if window == 1 else self.scene.look_ahead_blocks()
         if self._rewinds:
             windowed = set(self.components)
-        order = window_order(graph, windowed, self.cut_edges)
-        processors = self._build_processors()
+        at_once = set() if window == 1 else self.scene.windowed_queues()
+        queues = {name: self.scene.queues[name] for name in at_once}
+        order = window_order(graph, windowed, self.cut_edges, queues)
+        processors = self._build_processors(order)
         shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
         nodes = {}
         for number, (name, component) in enumerate(sorted(self.components.items())):
@@ -341,18 +344,31 @@ class Simulation:
             always_draws=self._everything,
         )
 
-    def _build_processors(self) -> dict[str, Processor]:
-        """Start the shared processors of the scene."""
+    def _build_processors(self, order: Mapping[str, int]) -> dict[str, Processor | WindowedQueue]:
+        """Start the shared processors of the scene: in `order` those that serve windows."""
         streams = Streams(self.scene.seed)
-        processors = {}
-        for name, parameters in self.scene.processors.items():
-            stream = streams.stream(name, "service time")
+        processors: dict[str, Processor | WindowedQueue] = {}
+        for name, p in self.scene.processors.items():
             try:
-                processors[name] = Processor(
-                    name, parameters, self.env, self.ticks_per_s, stream, self._record
-                )
+                service = Service(name, p, self.ticks_per_s, streams.stream(name, "service time"))
             except ValueError as error:
                 raise SceneError([self._problem("processors", error)]) from error
+            depth = order.get(queue_key(name))
+            if depth is None:
+                processors[name] = Processor(
+                    name, p, service, self.env, self.ticks_per_s, self._record
+                )
+            else:
+                processors[name] = WindowedQueue(
+                    name,
+                    service,
+                    p.when_busy == "drop_oldest",
+                    self.env,
+                    self.ticks_per_s,
+                    self.end_tick,
+                    self._record,
+                    WINDOW_PRIORITY + depth,
+                )
             processors[name].start()
         return processors
 

@@ -19,7 +19,7 @@ from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block import Block
 from dsa_des.scene.changeable import Changeable
 from dsa_des.scene.checks import check_activity, check_effects, check_lookalikes, check_times
-from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks
+from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks, windowed_queues
 from dsa_des.scene.options import BlockOptions, split_options, with_latencies
 from dsa_des.scene.overrides import apply_set, apply_swap, drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
@@ -99,8 +99,23 @@ class Scene(Changeable):
 
     def look_ahead_blocks(self) -> set[str]:
         """Return the blocks that may run in look-ahead windows."""
-        queued = [name for name, block in self.blocks.items() if block.options.processor]
+        apart = set(self.queues) - self.windowed_queues()
+        queued = [block for name in apart for block in self.queues[name]]
         return windowed_blocks(self.graph, self.classes, queued)
+
+    @property
+    def queues(self) -> dict[str, list[str]]:
+        """The blocks that line up at each shared processor, by its name."""
+        found: dict[str, list[str]] = {name: [] for name in sorted(self.processors)}
+        for name, block in sorted(self.blocks.items()):
+            if block.options.processor:
+                found[block.options.processor].append(name)
+        return found
+
+    def windowed_queues(self) -> set[str]:
+        """Return the shared processors that serve a look-ahead window at once."""
+        able = {n: b for n, b in self.queues.items() if self.processors[n].when_busy != "skip"}
+        return windowed_queues(self.graph, self.classes, able) if self.processors else set()
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""
