@@ -64,7 +64,7 @@ def point(axis: str, value: float, folder: Path) -> dict[str, Any]:
     scene, scenes = _scenes(axis, value)
     to_disk = axis in ("simulated time, s", "replicas")
     runs = [engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)]
-    cpu_s, units = min(runs)
+    cpu_s, units = min((run_s, units) for _, run_s, units in runs)
     return {
         "axis": axis,
         "value": value,
