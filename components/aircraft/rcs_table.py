@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.geometry.wrapping import past
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9
@@ -97,8 +98,7 @@ class AspectTable:
         beyond = np.abs(degrees) > _POLE_DEG
         refuse("elevation_rad", elevation, beyond, "lie in [-pi/2, pi/2]")
         first = self.azimuth_deg[0]
-        turned = np.mod(azimuth * (180.0 / np.pi) - first, 360.0)
-        turned = np.where(turned >= 360.0, 0.0, turned)  # -1e-20 mod 360 rounds to 360
+        turned = past(azimuth * (180.0 / np.pi) - first, 360.0)
         nodes = np.append(self.azimuth_deg - first, 360.0)
         left = np.searchsorted(nodes, turned, side="right") - 1
         right = np.where(left + 2 == nodes.size, 0, left + 1)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.geometry.wrapping import past
 
 _SQUARE_FOOT_M2 = 0.3048**2
 
@@ -117,10 +118,7 @@ class AspectTable:
             azimuth_rad=finite("azimuth_rad", azimuth_rad), elevation_rad=elevation
         )
         first = self.azimuth_deg[0]
-        # Turn into [first node, first node + 360); rounding may land on the far end, which is the
-        # first node again.
-        turned = np.mod(np.degrees(azimuth) - first, 360.0)
-        turned = np.where(turned >= 360.0, 0.0, turned)
+        turned = past(np.degrees(azimuth) - first, 360.0)
         offsets = self.azimuth_deg - first
         left = np.searchsorted(offsets, turned, side="right") - 1
         right = np.where(left + 1 == offsets.size, 0, left + 1)
@@ -161,8 +159,7 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
     elevation = finite("elevation_deg", elevation_deg).ravel()
     area = finite("area_m2", area_m2).ravel()
     refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
-    turned = np.mod(azimuth, 360.0)
-    turned = np.where(turned >= 360.0, 0.0, turned)
+    turned = past(azimuth, 360.0)
     nodes: dict[tuple[float, float], float] = {}
     for az, el, value in zip(turned.tolist(), elevation.tolist(), area.tolist(), strict=True):
         if nodes.setdefault((az, el), value) != value:

@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, common_shape, shaped, squarable
-from components.geometry.angles import (
-    sine_and_cosine,
-    wrap_pi,
-)
+from components.geometry.angles import sine_and_cosine
+from components.geometry.wrapping import wrap_pi
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
 

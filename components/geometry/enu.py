@@ -10,13 +10,10 @@ from components.geometry.ellipsoid import (
     FLATTENING,
     SEMI_MAJOR_AXIS_M,
     line_of_sight_ned,
-)
-from components.geometry.normals import (
-    FloatArray,
-    local_axes,
     radii_of_curvature,
-    wrap_longitude_deg,
 )
+from components.geometry.normals import FloatArray, local_axes
+from components.geometry.wrapping import wrap_longitude_deg
 
 LARGEST_OFFSET_M = 5e6
 """Offsets are refused beyond this: a tangent plane that long has left the Earth."""
@@ -124,7 +121,7 @@ def _first_guess(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bowring's one-step latitude, in the reference meridian's plane."""
     sin0, cos0 = np.sin(np.radians(lat0)), np.cos(np.radians(lat0))
-    n0 = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin0 * sin0)
+    n0 = radii_of_curvature(lat0)[1]
     outward = (n0 + alt0) * cos0 - north * sin0 + up * cos0
     z = (n0 * (1.0 - ECCENTRICITY_SQUARED) + alt0) * sin0 + north * cos0 + up * sin0
     to_axis = np.hypot(outward, east)

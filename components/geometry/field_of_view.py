@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, common_shape, squarable
-from components.geometry.angles import TWO_PI, wrap_pi_unchecked
+from components.geometry.wrapping import TWO_PI, wrap_pi_unchecked
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -140,12 +140,20 @@ def within_range(
     return (distance >= range_min_m) & (distance <= range_max_m)
 
 
+def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
+    """Give a sector's bounds with the upper one a turn on where it was below the lower one."""
+    return low_rad, high_rad + TWO_PI if high_rad < low_rad else high_rad
+
+
+def sector_width_rad(low_rad: float, high_rad: float) -> float:
+    """Give the angle clockwise from the first azimuth to the second, in (0, 2 pi] and rounding."""
+    return high_rad - low_rad if high_rad > low_rad else high_rad - low_rad + TWO_PI
+
+
 def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
     _require("azimuth_min_rad", azimuth_min_rad, TWO_PI, "[-2 pi, 2 pi]")
     _require("azimuth_max_rad", azimuth_max_rad, TWO_PI, "[-2 pi, 2 pi]")
-    low, high = float(azimuth_min_rad), float(azimuth_max_rad)
-    if high < low:
-        high += TWO_PI
+    low, high = rising_sector(float(azimuth_min_rad), float(azimuth_max_rad))
     if high < low:
         raise ValueError(
             f"azimuth_min_rad is {azimuth_min_rad}: it must be at most one turn above "

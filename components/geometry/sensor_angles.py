@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, shaped
-from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
+from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.attitude import (
     azimuth_off_nose,
     body_angles,
@@ -20,6 +20,7 @@ from components.geometry.attitude import (
     unit_vector,
     unit_vector_unchecked,
 )
+from components.geometry.wrapping import wrap_pi_unchecked
 
 MODELS = ("exact", "small_angle")
 

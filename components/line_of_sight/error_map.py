@@ -9,7 +9,9 @@ import numpy as np
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.attitude import unit_vector
+from components.geometry.directions import angle_of_chord, chord_between
 from components.geometry.enu import enu_to_geodetic
+from components.geometry.wrapping import wrap_by_sines
 from dsa_des.arrays.types import FloatArray
 
 ALTITUDE_M = 1000.0
@@ -109,10 +111,10 @@ def error_maps(
     for name, model in _MODELS.items():
         azimuth, elevation, slant_range = model(*pairs)
         turn = azimuth - truth[name][0]
-        chord = np.array(unit_vector(azimuth, elevation)) - np.array(unit_vector(*truth[name][:2]))
+        chord = chord_between(unit_vector(azimuth, elevation), unit_vector(*truth[name][:2]))
         errors = (
-            2.0 * np.arcsin(np.minimum(1.0, 0.5 * np.sqrt((chord**2).sum(axis=0)))),
-            np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
+            angle_of_chord(chord),
+            np.abs(wrap_by_sines(turn)),
             np.abs(elevation - truth[name][1]),
             np.abs(slant_range - truth[name][2]),
         )

@@ -15,9 +15,9 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
-from components.geometry.angles import wrap_pi_unchecked
 from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
+from components.geometry.wrapping import wrap_pi_unchecked
 from components.line_of_sight.ladder import ATTITUDE, EARTH
 from components.line_of_sight.rung_choice import REFERENCE
 from components.line_of_sight.rung_planning import Rung, pick_rung

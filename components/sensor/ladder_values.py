@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import wrap_pi
+from components.geometry.directions import angle_between_vectors
+from components.geometry.wrapping import wrap_pi
 from components.messages.reach import RANGE
 from components.messages.targets import RelativeTargets
 from components.sensor.look import Cells
@@ -14,17 +15,9 @@ from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.wake import Wake
 
 
-def direction(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArray:
-    """Return unit vectors, components along the last axis."""
-    level = np.cos(elevation_rad)
-    parts = (level * np.cos(azimuth_rad), level * np.sin(azimuth_rad), np.sin(elevation_rad))
-    return np.stack(parts, axis=-1)
-
-
 def angle_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
     """Return the angle between unit vectors, mrad; accurate however small it is."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return 1e3 * np.arctan2(across, (one * other).sum(axis=-1))
+    return 1e3 * angle_between_vectors(one, other)
 
 
 def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:

@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.geometry.angles import wrap_pi
+from components.geometry.field_of_view import rising_sector
+from components.geometry.wrapping import TWO_PI, past, wrap_pi
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
@@ -256,24 +257,23 @@ class Sensor(Component):
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
         """The field of view with its upper edge at or above its lower one."""
-        low, high = self.reach.azimuth_rad
-        return low, high + 2.0 * math.pi if high < low else high
+        return rising_sector(*self.reach.azimuth_rad)
 
     @cached_property
     def _azimuth_grid(self) -> Grid:
         low, high = self._azimuth_sector
-        if high - low >= 2.0 * math.pi:
+        if high - low >= TWO_PI:
             return _grid(self.azimuth_step_rad)
         return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
     def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
         low, high = self._azimuth_sector
-        if high - low >= 2.0 * math.pi:
+        if high - low >= TWO_PI:
             return wrap_pi(self._azimuth_grid.round(p_rad))
         if low >= -math.pi and high <= math.pi:
             return self._azimuth_grid.round(p_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
+        unwrapped = np.clip(low + past(p_rad - low, TWO_PI), low, high)
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 

@@ -15,6 +15,7 @@ from components.geometry.ellipsoid import (
     SEMI_MAJOR_AXIS_M,
     line_of_sight,
 )
+from components.geometry.wrapping import wrap_by_sines
 from components.messages.reach import REACH_MARGIN
 from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.legs import ScriptedTrajectory
@@ -117,7 +118,7 @@ def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
     if isinstance(trajectory, SampledTrajectory):
         # Between samples both change evenly, roll by the shorter way round.
         turned = np.diff(trajectory.roll_rad)
-        after = trajectory.roll_rad[:-1] + np.arctan2(np.sin(turned), np.cos(turned))
+        after = trajectory.roll_rad[:-1] + wrap_by_sines(turned)
         roll = np.concatenate((trajectory.roll_rad, after))
         return float(np.max(np.abs(trajectory.pitch_rad))), float(np.max(np.abs(roll)))
     if isinstance(trajectory, ScriptedTrajectory):

@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry.angles import direction_angle, slope_angle
-from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
-from components.geometry.normals import (
-    DEG_PER_RAD,
-    FloatArray,
+from components.geometry.ellipsoid import (
+    ECCENTRICITY_SQUARED,
+    FLATTENING,
+    SEMI_MAJOR_AXIS_M,
     radii_of_curvature,
-    wrap_heading_rad,
-    wrap_longitude_deg,
 )
+from components.geometry.normals import DEG_PER_RAD, FloatArray
+from components.geometry.wrapping import wrap_heading_rad, wrap_longitude_deg
 
 # Rows of the parameter table of one straight leg.
 GEODESIC_ROWS = 20

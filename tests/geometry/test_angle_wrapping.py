@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.angles import longitude_difference_deg, sincosd, wrap_pi, wrap_two_pi
+from components.geometry.angles import longitude_difference_deg, sincosd
+from components.geometry.wrapping import (
+    TWO_PI,
+    heading_from_deg,
+    past,
+    wrap_by_sines,
+    wrap_difference_rad,
+    wrap_heading_rad,
+    wrap_longitude_deg,
+    wrap_pi,
+    wrap_two_pi,
+)
 
 fast = settings(derandomize=True, deadline=None, max_examples=100)
 any_angle = st.floats(-1e6, 1e6) | st.floats(-10, 10) | st.floats(-1e150, 1e150)
@@ -100,3 +111,36 @@ def test_bits_do_not_depend_on_shape(function):
     assert np.array_equal(whole.reshape(*whole.shape[:-1], 60, 50), np.swapaxes(grid, -1, -2))
     for i in range(0, 3000, 97):
         assert np.array_equal(whole[..., i], np.asarray(function(angles[i])))
+
+
+few_turns = st.floats(-30.0, 30.0)
+
+
+@fast
+@given(few_turns)
+def test_the_cheap_forms_agree_with_the_exact_ones_within_a_few_turns(angle):
+    one = np.array([angle, 0.5])
+    assert abs(wrap_pi(wrap_difference_rad(one)[0] - wrap_pi(angle))) < 1e-14
+    assert abs(wrap_pi(wrap_by_sines(one)[0] - wrap_pi(angle))) < 1e-14
+    assert abs(wrap_pi(wrap_heading_rad(one)[0] - wrap_two_pi(angle))) < 1e-14
+    assert abs(wrap_pi(past(one, TWO_PI)[0] - wrap_two_pi(angle))) < 1e-14
+    assert np.abs(wrap_difference_rad(one)).max() <= np.pi
+    for inside in (wrap_heading_rad(one), past(one, TWO_PI)):
+        assert (inside >= 0.0).all()
+        assert (inside < TWO_PI).all()
+
+
+def test_what_rounds_up_to_a_whole_turn_is_none():
+    tiny = np.array([-1e-20, 0.0, 1e-20])
+    assert past(tiny, 360.0).tolist() == [0.0, 0.0, 1e-20]
+    assert past(tiny, TWO_PI).tolist() == [0.0, 0.0, 1e-20]
+    assert wrap_heading_rad(tiny).tolist() == [0.0, 0.0, 1e-20]
+    assert heading_from_deg(-143.0) == np.radians(217.0)
+
+
+@fast
+@given(st.integers(-4000, 4000), st.integers(0, 1023))
+def test_longitudes_wrap_exactly(whole, parts):
+    lon = whole + parts / 1024
+    wrapped = wrap_longitude_deg(np.array([lon, 180.0]))
+    assert wrapped.tolist() == [(lon + 180.0) % 360.0 - 180.0, -180.0]
