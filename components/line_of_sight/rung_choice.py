@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 
-from components.geometry.error_bounds import EARTH_MODELS, Envelope, ErrorBound, error_bound
+from components.geometry.error_bounds import Envelope, ErrorBound, error_bound
+from components.geometry.line_of_sight import EARTH_MODELS
 from components.messages.reach import REACH_MARGIN
 
 # CPU time per line of sight in blocks of 10,000, relative to flat earth; only the order matters.
