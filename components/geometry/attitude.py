@@ -133,10 +133,10 @@ def body_angles(
 
     Returns
     -------
-    p_rad : ndarray
+    body_azimuth_rad : ndarray
         Azimuth from the nose towards the right wing, in (-pi, pi]; 0 within 9e-16 rad of
         straight up and straight down (where only rounding would be left) and for a zero vector.
-    q_rad : ndarray
+    body_elevation_rad : ndarray
         Elevation above the plane of the wings, in [-pi/2, pi/2].
 
     Raises

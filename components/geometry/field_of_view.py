@@ -18,8 +18,8 @@ _WRAP_TOLERANCE_RAD = 8.0 * _EPS
 
 
 def inside(
-    p_rad: npt.ArrayLike,
-    q_rad: npt.ArrayLike,
+    azimuth_rad: npt.ArrayLike,
+    elevation_rad: npt.ArrayLike,
     *,
     azimuth_min_rad: float,
     azimuth_max_rad: float,
@@ -30,7 +30,7 @@ def inside(
 
     Parameters
     ----------
-    p_rad, q_rad : array_like
+    azimuth_rad, elevation_rad : array_like
         Azimuth and elevation in the sensor's body axes, broadcast. Any number of turns of azimuth.
     azimuth_min_rad, azimuth_max_rad : float
         The field runs clockwise from min to max, each in [-2 pi, 2 pi]. It may be wider than pi
@@ -59,8 +59,8 @@ def inside(
             f"elevation_min_rad is {elevation_min_rad}: it must not exceed elevation_max_rad, "
             f"{elevation_max_rad}"
         )
-    p, q = squarable("p_rad", p_rad), squarable("q_rad", q_rad)
-    shape = common_shape(p_rad=p, q_rad=q)
+    p, q = squarable("azimuth_rad", azimuth_rad), squarable("elevation_rad", elevation_rad)
+    shape = common_shape(azimuth_rad=p, elevation_rad=q)
     in_elevation = (q >= elevation_min_rad) & (q <= elevation_max_rad)
     if high - low >= TWO_PI:
         return np.array(np.broadcast_to(in_elevation, shape))[()]
@@ -93,15 +93,15 @@ class FieldOfView:
         self._lowest, self._highest = elevation_rad
         self._turns = bool(_turns(self._low, self._high))
 
-    def holds(self, p_rad: FloatArray, q_rad: FloatArray) -> BoolArray:
+    def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
         """Tell which directions lie inside, as `inside` does."""
-        found = q_rad >= self._lowest
-        found &= q_rad <= self._highest
+        found = elevation_rad >= self._lowest
+        found &= elevation_rad <= self._highest
         if self._high - self._low < TWO_PI:
-            within = p_rad >= self._low
-            within &= p_rad <= self._high
+            within = azimuth_rad >= self._low
+            within &= azimuth_rad <= self._high
             if self._turns:
-                within = _at_other_turns(p_rad, p_rad, self._low, self._high, within)
+                within = _at_other_turns(azimuth_rad, azimuth_rad, self._low, self._high, within)
             found &= within
         return found
 

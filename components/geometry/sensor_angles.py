@@ -54,9 +54,9 @@ def sensor_angles(
 
     Returns
     -------
-    p_rad : ndarray
+    body_azimuth_rad : ndarray
         Azimuth from the nose, clockwise seen from above, in (-pi, pi].
-    q_rad : ndarray
+    body_elevation_rad : ndarray
         Elevation, in [-pi/2, pi/2]. Where elevation - pitch passes straight up or down, the
         direction comes down on the other side: q becomes ±pi - q, and p turns by pi.
 
@@ -125,7 +125,7 @@ def sensor_angles_of_offsets(
 
     Returns
     -------
-    p_rad, q_rad : ndarray
+    body_azimuth_rad, body_elevation_rad : ndarray
         As from `sensor_angles`, to the last digit or two; at a third to half of its cost, because
         the direction need not be taken apart into angles first.
     """

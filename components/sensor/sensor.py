@@ -230,7 +230,7 @@ class Sensor(Component):
         return rows, reason
 
     def measure(
-        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray
+        self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
 
@@ -239,8 +239,8 @@ class Sensor(Component):
         azimuth_rad, elevation_rad, range_m : arrays
             Range is NaN when the sensor measures none.
         """
-        azimuth = self._round_azimuth(p_rad)
-        elevation = self._elevation_grid.round(q_rad)
+        azimuth = self._round_azimuth(azimuth_rad)
+        elevation = self._elevation_grid.round(elevation_rad)
         if not self.measures_range:
             return azimuth, elevation, np.full(len(range_m), np.nan)
         return azimuth, elevation, self._range_grid.round(range_m)
@@ -266,14 +266,14 @@ class Sensor(Component):
             return _grid(self.azimuth_step_rad)
         return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
-    def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
+    def _round_azimuth(self, azimuth_rad: FloatArray) -> FloatArray:
         low, high = self._azimuth_sector
         if high - low >= TWO_PI:
-            return wrap_pi(self._azimuth_grid.round(p_rad))
+            return wrap_pi(self._azimuth_grid.round(azimuth_rad))
         if low >= -math.pi and high <= math.pi:
-            return self._azimuth_grid.round(p_rad)
+            return self._azimuth_grid.round(azimuth_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + past(p_rad - low, TWO_PI), low, high)
+        unwrapped = np.clip(low + past(azimuth_rad - low, TWO_PI), low, high)
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 

@@ -99,9 +99,9 @@ def test_bad_bounds_are_named(name, value):
 def test_other_bad_input_is_named():
     with pytest.raises(ValueError, match=r"azimuth_min_rad is 6\.2: it must be at most one turn"):
         inside(0, 0, **(GOOD | {"azimuth_min_rad": 6.2, "azimuth_max_rad": -1.0}))
-    with pytest.raises(ValueError, match="p_rad is nan"):
+    with pytest.raises(ValueError, match="azimuth_rad is nan"):
         inside(np.nan, 0, **GOOD)
-    with pytest.raises(ValueError, match="q_rad is inf"):
+    with pytest.raises(ValueError, match="elevation_rad is inf"):
         inside(0, np.inf, **GOOD)
     with pytest.raises(ValueError, match=r"range_m is -1\.0: it must not be negative"):
         within_range([5, -1.0], range_max_m=3.0)
