@@ -30,7 +30,7 @@ _WIDEST_STEP_TO_NEIGHBOUR = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class AspectTable:
+class SilhouetteTable:
     """Hold a projected area over the direction of the observer in the target's body axes.
 
     Azimuth 0 and elevation 0 is nose-on; azimuth grows towards the right wing (90 = from the
@@ -148,7 +148,7 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
 
     Returns
     -------
-    AspectTable
+    SilhouetteTable
 
     Raises
     ------
@@ -176,19 +176,19 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
                     f"the table has a hole: no area for the node az_deg {az:g}, el_deg {el:g}; "
                     "every azimuth needs every elevation"
                 )
-    return AspectTable(
+    return SilhouetteTable(
         np.array(azimuths),
         np.array(elevations),
         np.array([[nodes[az, el] for az in azimuths] for el in elevations]),
     )
 
 
-def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
+def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
     """Read a table from CSV with the columns az_deg, el_deg and an area.
 
     The area column carries its unit in its name: `area_m2`, `a_m2` or plain `area` are square
     metres, `area_ft2`, `a_ft2` and `a_ft` square feet. Other columns, blank lines and lines that
-    start with # are ignored. See `AspectTable` for the axes.
+    start with # are ignored. See `SilhouetteTable` for the axes.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
 
     Returns
     -------
-    AspectTable
+    SilhouetteTable
 
     Raises
     ------
@@ -220,7 +220,7 @@ def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
         raise ValueError(f"{path} is empty: it must hold a header and one row per direction")
     nodes = np.array(rows)
     try:
-        table: AspectTable = table_from_nodes(nodes[:, 0], nodes[:, 1], nodes[:, 2])
+        table: SilhouetteTable = table_from_nodes(nodes[:, 0], nodes[:, 1], nodes[:, 2])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     return table

@@ -53,7 +53,7 @@ class Sighting:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class EncounterResult:
     """What one call of `simulate` came to; sightings by plane name or position.
 
     Parameters

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from components.aircraft.aircraft import Aircraft
 from components.embedding.host_scene import load_for_host, planes_known_to, source_of, with_host
 from components.embedding.planes import FixedPath, number_of, plane_of
-from components.embedding.result import Result, Sighting, sightings_of
+from components.embedding.result import EncounterResult, Sighting, sightings_of
 from components.embedding.states import checked_rows, traffic_states
 from components.messages.detections import Detections, FusedDetections
 from dsa_des.embed import HostDriven, Step
@@ -189,7 +189,7 @@ class Simulator:
         time_s: object,
         *,
         plane: str | int | None = None,
-    ) -> Result:
+    ) -> EncounterResult:
         """Say where the planes are detected at an instant, by which sensors and how surely.
 
         Parameters
@@ -209,7 +209,7 @@ class Simulator:
 
         Returns
         -------
-        Result
+        EncounterResult
 
         Raises
         ------
@@ -278,12 +278,12 @@ class Simulator:
             rows[place] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
         return rows
 
-    def _result(self, step: Step, everybody: Sequence[int], ticks_per_s: int) -> Result:
+    def _result(self, step: Step, everybody: Sequence[int], ticks_per_s: int) -> EncounterResult:
         messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
         reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
         seen, false = sightings_of(messages.get(self._fusion), reported)
         sightings = tuple(seen.get(number) or self._unseen[number] for number in everybody)
-        return Result(
+        return EncounterResult(
             step.tick / ticks_per_s,
             sightings,
             () if self._plane_by_plane else false,

@@ -60,7 +60,7 @@ class Allowance:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ModelChoice:
     """What was chosen, with its bound, and why each cheaper one was not.
 
     Parameters
@@ -82,7 +82,7 @@ def choose(
     attitudes: tuple[str, ...],
     envelopes: Sequence[Envelope],
     allowed: Allowance,
-) -> Choice:
+) -> ModelChoice:
     """Return the cheapest pair of models whose proven error is allowed.
 
     Parameters
@@ -109,7 +109,7 @@ def choose(
     else:
         earth, attitude = max(earths, key=EARTH_MODELS.index), min(attitudes)
         bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
-    return Choice(earth, attitude, bound, tuple(refused.values()))
+    return ModelChoice(earth, attitude, bound, tuple(refused.values()))
 
 
 def _worst(bounds: Sequence[ErrorBound]) -> ErrorBound:

@@ -18,7 +18,7 @@ from components.geometry.line_of_sight import LineOfSight
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.line_of_sight.ladder import ATTITUDE, EARTH
 from components.line_of_sight.rung_choice import REFERENCE
-from components.line_of_sight.rung_planning import Rung, pick_rung
+from components.line_of_sight.rung_planning import PickedModels, pick_rung
 from components.line_of_sight.true_reach import true_reach_m
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
@@ -72,7 +72,7 @@ class Transform(Component):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.rung: Rung | None = None
+        self.rung: PickedModels | None = None
 
     def setup(self) -> None:
         """Take what the ownship believes of itself, and the models to compute with."""

@@ -30,12 +30,12 @@ class FrameFalseAlarms(Effect):
         share = block.p.false_alarms_per_frame
         return Verdict(share > 0, f"false_alarms_per_frame is {share:g}")
 
-    def build(self, block: Any) -> "FalseAlarms":
+    def build(self, block: Any) -> "AddedFalseAlarms":
         """Return what adds the false alarms to the report."""
-        return FalseAlarms(block, block.p.false_alarms_per_frame if block.p.enabled else 0.0)
+        return AddedFalseAlarms(block, block.p.false_alarms_per_frame if block.p.enabled else 0.0)
 
 
-class FalseAlarms:
+class AddedFalseAlarms:
     """Draws the false alarms of a camera, keyed by its scans.
 
     A false alarm is reported on the pixel grid, like a target; its confidence is 0, just at the

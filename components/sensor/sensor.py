@@ -19,7 +19,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
-from components.sensor.declaration_rule import Declaration
+from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes, Mounting
 from components.sensor.parameters import SensorParameters
@@ -36,7 +36,7 @@ _FEW_COLUMNS = 8
 
 
 #: Effects that every sensor has, after its own.
-SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
+SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), DeclarationRule(), NavigationReport())
 
 _BODY_AXES = BodyAxes()
 

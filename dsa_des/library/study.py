@@ -12,7 +12,7 @@ from weakref import finalize
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.picture import Picture, pictures_in
+from dsa_des.record.picture import PictureFile, pictures_in
 from dsa_des.scene.changeable import Origin
 from dsa_des.scene.python_values import scene_value
 from dsa_des.scene.scene import Scene
@@ -74,12 +74,14 @@ class StudyResult:
         return self._folder.results()
 
     @cached_property
-    def figures(self) -> dict[str, Picture]:
+    def figures(self) -> dict[str, PictureFile]:
         """All figures by name."""
         self._tables.draw()
-        return {name: Picture(name, png) for name, png in pictures_in(self._folder.path).items()}
+        return {
+            name: PictureFile(name, png) for name, png in pictures_in(self._folder.path).items()
+        }
 
-    def figure(self, name: str) -> Picture:
+    def figure(self, name: str) -> PictureFile:
         """Return one of the study's figures.
 
         Raises
