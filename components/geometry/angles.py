@@ -25,7 +25,7 @@ def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     Parameters
     ----------
     angle_rad : ndarray
-        Contiguous, at least one axis. The pitch and the roll of whoever flies straight and level.
+        Contiguous, at least one axis. Pitch and roll are the same in level flight, for example.
 
     Returns
     -------

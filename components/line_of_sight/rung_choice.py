@@ -90,7 +90,7 @@ def choose(
     earths, attitudes : tuple of str
         What there is to choose from; if nothing is good enough, the exact one of each.
     envelopes : sequence of Envelope
-        One for each sensor; none where nobody looks.
+        One for each sensor; none where no sensor looks.
     allowed : Allowance
         The error of the two models together must stay within it.
     """

@@ -83,7 +83,7 @@ class Transform(Component):
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that somebody downstream may look at, by their true ranges."""
+        """Ask for the targets that a sensor downstream may look at, by their true ranges."""
         look = farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
         return replace(look, range_m=true_reach_m(self.context, earth, look))

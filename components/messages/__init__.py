@@ -20,7 +20,7 @@ __all__ = [
     "TrafficStates",
 ]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Detections": "components.messages.detections",
     "FusedDetections": "components.messages.detections",

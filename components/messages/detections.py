@@ -44,7 +44,7 @@ EXTRAS = {
 
 @dataclass(frozen=True)
 class SensorOffer:
-    """What a sensor says of its detections to whoever receives them.
+    """What a sensor says of its detections to the blocks that receive them.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Detections(Message):
 
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
-        # A sensor without a rule declares what it detects; nobody is behind a false alarm.
+        # A sensor without a rule declares what it detects; no target is behind a false alarm.
         return {"declared": self.target >= 0, **self.extras}
 
 

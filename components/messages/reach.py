@@ -88,12 +88,12 @@ class Reach:
 
 @dataclass(frozen=True)
 class FarthestLook:
-    """What a block asks of the traffic: targets up to this range; farther ones matter to nobody.
+    """What a block asks of the traffic: targets up to this range; farther ones do not matter.
 
     Parameters
     ----------
     range_m : float
-        Infinite where somebody has no limit.
+        Infinite where a sensor has no limit.
     views : tuple of (range, elevation)
         For each sensor its range in m and the largest size of an elevation in body axes at which
         it looks.

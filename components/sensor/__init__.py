@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Cells", "Look", "Sensor", "SensorParameters"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Cells": "components.sensor.look",
     "Look": "components.sensor.look",

@@ -68,11 +68,11 @@ def over_cells(
         return {}
     targets, rows = sensor.seen(*held)
     cells, reason = sensor.cells(targets, rows, wake)
-    everybody = len(targets.roster)
+    on_roster = len(targets.roster)
     found: dict[str, Any] = {}
     for name, of_cell in values(cells).items():
         # Targets that were not even moved were too far away for every sensor.
-        wide = np.full((len(wake), everybody), out_of_range)
+        wide = np.full((len(wake), on_roster), out_of_range)
         part = np.full(reason.shape, np.nan)
         part[reason == RANGE] = out_of_range
         wide[:, targets.columns] = part

@@ -41,7 +41,7 @@ class MountedAxes(BodyAxes):
     ----------
     true_rad, believed_rad : (azimuth, elevation, roll)
         Rotation from body axes to the sensor's, about z, y and x in that order: as it is, and as
-        whoever converts its measurements believes it to be.
+        the conversion of its measurements believes it to be.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class MountedAxes(BodyAxes):
         )
 
     def __call__(self, body_azimuth_rad: FloatArray, body_elevation_rad: FloatArray) -> Angles:
-        """Rotate by the true mounting: physics does not care what anyone believes."""
+        """Rotate by the true mounting: physics does not know beliefs."""
         azimuth, elevation = sensor_angles(body_azimuth_rad, body_elevation_rad, *self.true_rad)
         return azimuth, elevation
 
@@ -103,7 +103,7 @@ class MountedReach(Reach):
 
 
 class Mounting(Effect):
-    """Boresight and roll of the sensor, and an error of them that nobody knows of."""
+    """Boresight and roll of the sensor, and an error of them that is not known to the ownship."""
 
     lockstep = True
     name = "mounting"

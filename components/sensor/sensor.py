@@ -86,7 +86,7 @@ class Sensor(Component):
         self._idle: Look | None = None
 
     def request(self, port: str) -> Any:
-        """Ask whoever feeds us for the targets in our reach."""
+        """Ask the block that feeds us for the targets in our reach."""
         slack, because = self.range_slack(), self.exact_because()
         return replace(self._reach_from_body, range_slack=slack, exact_because=because)
 
@@ -288,7 +288,7 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 
 def _counted(
-    reason: ReasonArray, everybody: int, culled: IntArray | None
+    reason: ReasonArray, on_roster: int, culled: IntArray | None
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return how many targets were evaluated at each scan, and skipped by reason.
 
@@ -301,7 +301,7 @@ def _counted(
     else:
         of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    left_out = everybody - reason.shape[1]
+    left_out = on_roster - reason.shape[1]
     if culled is None:
         culled = np.zeros(len(reason), dtype=np.int64) + left_out
     else:

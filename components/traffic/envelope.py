@@ -68,7 +68,7 @@ def traffic_envelope(
         All targets.
     duration_s : float
     reach_m : float
-        Infinite where somebody looks at everything.
+        Infinite where a sensor has no limit.
     """
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
     intervals = max(1, math.ceil(count))

@@ -245,7 +245,7 @@ def geodesic_state(
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
     climbed = table[_CLIMB] * elapsed
     # Ground speed is flown at altitude: over the ellipsoid it is slower by R / (R + h), with h
-    # the mean altitude so far. The bound only matters when someone dives to the Earth's core.
+    # the mean altitude so far. The bound only matters in a dive to the Earth's core.
     below = 0.5 * climbed
     below += table[_CENTRE_DISTANCE]
     np.maximum(below, 0.5 * table[_RADIUS], out=below)

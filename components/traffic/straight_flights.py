@@ -83,7 +83,7 @@ class Starts:
 
 
 class StraightFlights(Sequence[ScriptedTrajectory]):
-    """Flights without legs; an item is made when somebody asks for it.
+    """Flights without legs; an item is made when it is asked for.
 
     Parameters
     ----------

@@ -243,11 +243,11 @@ class Component:
         return cls.ladders
 
     def request(self, port: str) -> Any:
-        """Return what this block asks of whoever feeds `port`, or None."""
+        """Return what this block asks of the block that feeds `port`, or None."""
         return None
 
     def offer(self, port: str) -> Any:
-        """Return what this block says of the output `port` to whoever it feeds, or None."""
+        """Return what this block says of the output `port` to the blocks it feeds, or None."""
         return None
 
     def setup(self) -> None:

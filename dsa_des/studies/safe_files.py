@@ -1,4 +1,4 @@
-"""Files of a folder that somebody else may have filled: no link is followed, no pipe is waited for.
+"""Files of a folder that others may have filled: no link is followed, no pipe is waited for.
 
 A folder of results can come from a stranger. Its names may be links to files elsewhere, so writing
 never opens a name that is there: a new file is made beside it and takes its name.

@@ -206,7 +206,7 @@ class _StudyReader:
             return None, None
         try:
             path = Path(str(name)).expanduser()
-        except RuntimeError as error:  # the ~ of nobody
+        except RuntimeError as error:  # the ~ of an unknown user
             self.add(("scene",), str(error), name)
             return None, None
         if not path.is_absolute():
