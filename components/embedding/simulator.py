@@ -232,14 +232,14 @@ class Simulator:
         moved = checked_rows("intruder", lla_intruder, att_intruder, len(free))
         tick = chain.tick_of(time_s)
         step = chain.due(tick)
-        wanted = range(len(self._planes)) if chosen is None else chosen
+        planes_asked = range(len(self._planes)) if chosen is None else chosen
         if step.scans:
             rows = moved
-            if len(free) != len(wanted):
-                rows = self._placed(moved, free, wanted, tick / chain.ticks_per_s)
+            if len(free) != len(planes_asked):
+                rows = self._placed(moved, free, planes_asked, tick / chain.ticks_per_s)
             traffic: Any = chain.components[self._source]
             chain.run(step, traffic_states(own, rows, tick, traffic.roster, chosen))
-        return self._result(step, wanted, chain.ticks_per_s)
+        return self._result(step, planes_asked, chain.ticks_per_s)
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -270,19 +270,21 @@ class Simulator:
             step = chain.due(chain.tick_of(chain.next_scan_s()))
             chain.run(step, traffic_states(own, rows, step.tick, traffic.roster, None))
 
-    def _placed(self, moved: Any, free: list[int], wanted: Sequence[int], time_s: float) -> Any:
+    def _placed(
+        self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
+    ) -> Any:
         """Return the rows of all planes: what the host said, and the fixed ones."""
-        rows = np.empty((len(wanted), 6))
-        for place, number in enumerate(wanted):
+        rows = np.empty((len(planes_asked), 6))
+        for place, number in enumerate(planes_asked):
             fixed = self._fixed.get(number)
             rows[place] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
         return rows
 
-    def _result(self, step: Step, wanted: Sequence[int], ticks_per_s: int) -> EncounterResult:
+    def _result(self, step: Step, planes_asked: Sequence[int], ticks_per_s: int) -> EncounterResult:
         messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
         reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
         seen, false = sightings_of(messages.get(self._fusion), reported)
-        sightings = tuple(seen.get(number) or self._unseen[number] for number in wanted)
+        sightings = tuple(seen.get(number) or self._unseen[number] for number in planes_asked)
         return EncounterResult(
             step.tick / ticks_per_s,
             sightings,
