@@ -158,36 +158,3 @@ def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatA
             over, difference - np.where(difference > 0.0, 360.0, -360.0), difference
         )
     return difference, rest
-
-
-def sincosd(angle_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Take sine and cosine of an angle in degrees, reduced to one quadrant before rounding.
-
-    Parameters
-    ----------
-    angle_deg : array_like
-        Any shape, degrees, any size.
-
-    Returns
-    -------
-    sine, cosine : ndarray
-        The same shape. Exactly 0 and ±1 at whole quadrants; near a zero all digits are kept
-        (the cosine of 89.9999999999999 degrees, where radians keep one digit).
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
-    """
-    angle = squarable("angle_deg", angle_deg)
-    rest = np.fmod(np.atleast_1d(angle), 360.0)
-    quadrant = np.rint(rest / 90.0)
-    rest = (rest - 90.0 * quadrant) * RAD_PER_DEG
-    sine, cosine = np.sin(rest), np.cos(rest)
-    turn = quadrant.astype(np.int64) & 3
-    odd = (turn & 1).astype(bool)
-    # + 0.0 turns a negative zero into zero.
-    sin_out = np.where(odd, cosine, sine) * np.where(turn >= 2, -1.0, 1.0) + 0.0
-    cos_out = np.where(odd, sine, cosine) * np.where((turn == 1) | (turn == 2), -1.0, 1.0) + 0.0
-    sin_out, cos_out = shaped(angle.shape, sin_out, cos_out)
-    return sin_out, cos_out

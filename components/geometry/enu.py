@@ -87,35 +87,6 @@ def enu_to_geodetic(
     return lat.reshape(shape)[()], lon.reshape(shape)[()], alt.reshape(shape)[()]
 
 
-def geodetic_to_enu(
-    lat_deg: npt.ArrayLike,
-    lon_deg: npt.ArrayLike,
-    alt_m: npt.ArrayLike,
-    *,
-    reference_lat_deg: float,
-    reference_lon_deg: float,
-    reference_alt_m: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find east, north and up of a geodetic position in a reference point's tangent frame.
-
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m : array_like
-        Degrees and metres; they broadcast.
-    reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        The reference point.
-
-    Returns
-    -------
-    east_m, north_m, up_m : ndarray
-        Metres; accurate to 1e-12 m + 1e-13 of the distance (`geometry.ellipsoid`).
-    """
-    north, east, down = line_of_sight_ned(
-        reference_lat_deg, reference_lon_deg, reference_alt_m, lat_deg, lon_deg, alt_m
-    )
-    return east, north, -down
-
-
 def _first_guess(
     east: FloatArray, north: FloatArray, up: FloatArray, lat0: float, lon0: float, alt0: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -106,40 +106,6 @@ class FieldOfView:
         return found
 
 
-def within_range(
-    range_m: npt.ArrayLike, *, range_min_m: float = 0.0, range_max_m: float = math.inf
-) -> BoolArray:
-    """Tell which ranges lie between a sensor's nearest and farthest range, bounds included.
-
-    Parameters
-    ----------
-    range_m : array_like
-        Slant range, metres, not negative.
-    range_min_m, range_max_m : float
-        Metres; the farthest may be infinite.
-
-    Returns
-    -------
-    ndarray of bool
-        The shape of `range_m`.
-
-    Raises
-    ------
-    ValueError
-        A range that is negative or not finite, or bounds that are negative or out of order.
-    """
-    if not 0.0 <= range_min_m < math.inf:
-        raise ValueError(f"range_min_m is {range_min_m}: it must be finite and not negative")
-    if not range_max_m >= range_min_m:
-        raise ValueError(
-            f"range_max_m is {range_max_m}: it must not be less than range_min_m, {range_min_m}"
-        )
-    distance = squarable("range_m", range_m)
-    if distance.size and distance.min() < 0.0:
-        raise ValueError(f"range_m is {distance.min()}: it must not be negative")
-    return (distance >= range_min_m) & (distance <= range_max_m)
-
-
 def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
     """Give a sector's bounds with the upper one a turn on where it was below the lower one."""
     return low_rad, high_rad + TWO_PI if high_rad < low_rad else high_rad

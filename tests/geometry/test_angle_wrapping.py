@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry.angles import longitude_difference_deg, sincosd
+from components.geometry.angles import longitude_difference_deg
 from components.geometry.wrapping import (
     TWO_PI,
     heading_from_deg,
@@ -75,35 +75,17 @@ def test_difference_of_huge_longitudes_is_exact():
         assert -180.0 <= got < 180.0
 
 
-@fast
-@given(st.floats(-1e9, 1e9) | st.sampled_from([90 - 1e-13, 180 + 3e-14, 270 + 6e-14, -90 + 2e-14]))
-def test_sine_and_cosine_of_degrees_keep_relative_accuracy(angle):
-    sine, cosine = sincosd(angle)
-    with mpmath.workdps(50):
-        exact = mpmath.radians(mpmath.mpf(angle))
-        rounding = mpmath.mpf("1e-38")  # of the 50 digits, for 1e9 degrees
-        assert abs(sine - mpmath.sin(exact)) <= 1e-15 * abs(mpmath.sin(exact)) + rounding
-        assert abs(cosine - mpmath.cos(exact)) <= 1e-15 * abs(mpmath.cos(exact)) + rounding
-
-
-def test_whole_quadrants_are_exact():
-    angles = np.arange(-8, 9) * 90.0
-    sine, cosine = sincosd(angles)
-    assert np.array_equal(sine, np.array([0, 1, 0, -1] * 4 + [0]))
-    assert np.array_equal(cosine, np.array([1, 0, -1, 0] * 4 + [1]))
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, [0.0, -np.inf], "north"])
 @pytest.mark.parametrize(
     ("function", "name"),
-    [(wrap_pi, "angle_rad"), (wrap_two_pi, "angle_rad"), (sincosd, "angle_deg")],
+    [(wrap_pi, "angle_rad"), (wrap_two_pi, "angle_rad")],
 )
 def test_angles_that_are_none_are_refused(function, name, bad):
     with pytest.raises(ValueError, match=f"^{name} is "):
         function(bad)
 
 
-@pytest.mark.parametrize("function", [wrap_pi, wrap_two_pi, sincosd])
+@pytest.mark.parametrize("function", [wrap_pi, wrap_two_pi])
 def test_bits_do_not_depend_on_shape(function):
     angles = np.random.default_rng(0).uniform(-1000, 1000, 3000)
     whole = np.asarray(function(angles))
