@@ -1,4 +1,4 @@
-"""What an aircraft is to a sensor, and which aircraft a run has."""
+"""Aircraft as sensors see them, and the aircraft of a run."""
 
 from typing import TYPE_CHECKING, Any
 

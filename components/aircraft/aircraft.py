@@ -1,4 +1,4 @@
-"""What an aircraft is to a sensor: radar cross-section, silhouette areas, contrast."""
+"""An aircraft as sensors see it: radar cross-section, silhouette areas, contrast."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What one call says of the planes: where they were detected, by which sensors, how surely."""
+"""The result of one call: where planes were detected, by which sensors, how surely."""
 
 import math
 from collections.abc import Iterator, Mapping

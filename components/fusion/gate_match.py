@@ -1,4 +1,4 @@
-"""Which detection of another sensor lies nearest within gates of time, angle and range."""
+"""The nearest detection of another sensor within gates of time, angle and range."""
 
 from typing import Any
 

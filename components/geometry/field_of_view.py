@@ -1,4 +1,4 @@
-"""Whether a direction lies in a sensor's field of view, and a range in its reach."""
+"""The field of view of a sensor: a test of directions, and its width."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What blocks tell each other: targets, detections, manoeuvres, reach."""
+"""Messages between blocks: targets, detections, manoeuvres, reach."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""What the sensors report, and what becomes of it: detections, fused lines of sight, tracks.
+"""Messages of and after the sensors: detections, fused lines of sight, tracks.
 
 All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
 is clockwise and elevation upward.

@@ -1,4 +1,4 @@
-"""Where the aircraft are: what flows from the traffic to the sensors.
+"""Messages from the traffic to the sensors: where the aircraft are.
 
 All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
 is clockwise and elevation upward.

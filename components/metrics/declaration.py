@@ -1,4 +1,4 @@
-"""When a target is declared: m detections in n scans (``declaration``)."""
+"""The time at which a target is declared: m detections in n scans (``declaration``)."""
 
 from collections.abc import Mapping
 from typing import Any, Self

@@ -1,4 +1,4 @@
-"""When and where a target was first seen, and how steadily (``first_detection``,
+"""Time and place of a target's first detection, and the share of looks (``first_detection``,
 ``detection_share``)."""
 
 from collections.abc import Mapping

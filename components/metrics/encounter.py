@@ -1,4 +1,4 @@
-"""What an encounter comes to, and how long before it a sensor knew (``closest_approach``,
+"""The outcome of an encounter, and the warning time before it (``closest_approach``,
 ``well_clear``).
 
 Loss of well clear is that of ASTM F3442 for small unmanned aircraft, 2000 ft horizontally and

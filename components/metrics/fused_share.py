@@ -1,4 +1,4 @@
-"""How often two sensors' detections are fused with each other (``fused_share``)."""
+"""The share of two sensors' detections that are fused with each other (``fused_share``)."""
 
 import itertools
 from collections.abc import Mapping

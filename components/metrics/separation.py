@@ -1,4 +1,4 @@
-"""How far apart the aircraft of an encounter truly are: slant, horizontal and vertical distance.
+"""True distances of the aircraft of an encounter: slant, horizontal and vertical.
 
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """

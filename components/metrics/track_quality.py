@@ -1,4 +1,4 @@
-"""How fresh, how steady and how right the fused picture is (``age_of_information``,
+"""Freshness, steadiness and errors of the fused picture (``age_of_information``,
 ``track_updates``, ``position_error``)."""
 
 from collections.abc import Mapping

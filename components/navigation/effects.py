@@ -1,4 +1,4 @@
-"""What the ownship's own navigation does to what its sensors report.
+"""The effect of the ownship's own navigation on what its sensors report.
 
 Sensors measure in body axes, and physics knows no navigation error: body angles, detections and
 whatever follows from them stay as they are. What an error touches is the conversion to the

@@ -1,4 +1,4 @@
-"""What EO and IR cameras have in common: pixels, signature, threshold (thesis §3.5.2)."""
+"""The base class of EO and IR cameras: pixels, signature, threshold (thesis §3.5.2)."""
 
 from collections.abc import Callable
 from dataclasses import replace

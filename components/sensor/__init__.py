@@ -1,4 +1,4 @@
-"""What all sensors share: clock, reach, mounting, grid, look and declaration."""
+"""The common parts of all sensors: clock, reach, mounting, grid, look and declaration."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""How blocks' ladders read a quantity: values per target-scan, over all targets of the run."""
+"""Quantities of blocks' ladders: values per target-scan, over all targets of the run."""
 
 from collections.abc import Callable
 from typing import Any

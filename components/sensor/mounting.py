@@ -1,4 +1,4 @@
-"""How a sensor sits on the ownship: its own axes, and how well they are known."""
+"""The mounting of a sensor on the ownship: its own axes, and how well they are known."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What every sensor has in common: a scan clock, a reach, a grid, and a look at the cells.
+"""The base class of sensors: a scan clock, a reach, a grid, and a look at the cells.
 
 A sensor subclass writes one pure function, `Sensor.look`, over *cells*: flat arrays with one
 element per (scan, target) that needs its physics. How many scans those come from is the

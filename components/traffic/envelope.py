@@ -1,4 +1,4 @@
-"""Where the traffic's lines of sight can lie over a run, proven from samples and largest speeds.
+"""Bounds of the traffic's lines of sight over a run, from samples and largest speeds.
 
 Nothing moves farther than its largest speed times half the spacing of the samples from where a
 sample saw it. What holds at the samples, widened by that, holds all the time.

@@ -1,4 +1,4 @@
-"""What every traffic source has in common: states at the instants that sensors ask for."""
+"""The base class of traffic sources: states at the instants that sensors ask for."""
 
 import math
 from collections.abc import Sequence

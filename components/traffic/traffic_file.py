@@ -1,4 +1,4 @@
-"""What a traffic file gives when it is read, and the one error it raises when it cannot be."""
+"""The content of a traffic file, and the one error it raises when it cannot be read."""
 
 from __future__ import annotations
 

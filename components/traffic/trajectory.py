@@ -1,4 +1,4 @@
-"""Where an aircraft is at any time, from samples of where it was."""
+"""The trajectory of an aircraft: its state at any time, from samples of where it was."""
 
 from __future__ import annotations
 

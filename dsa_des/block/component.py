@@ -1,4 +1,4 @@
-"""What a block is: declared ports, declared parameters, and what it does when it wakes.
+"""The base class of blocks: declared ports and parameters, and the work done at a wake.
 
 A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
 scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a

@@ -1,4 +1,4 @@
-"""What a scene file may hold beside its blocks' own parameters: keys, units, defaults, meaning."""
+"""The keys of a scene file beside its blocks' own parameters: units, defaults, meaning."""
 
 from collections.abc import Callable, Mapping
 from functools import partial

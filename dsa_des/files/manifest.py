@@ -1,4 +1,4 @@
-"""Which files of a folder are ours: only they may be replaced or deleted.
+"""The list of files in a folder that are ours: only they may be replaced or deleted.
 
 ``run.json`` lists every file that was written with it, each with a digest. Whatever is not in
 that list, or is no longer as it was written, belongs to the user.

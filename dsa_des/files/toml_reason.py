@@ -1,4 +1,4 @@
-"""What is wrong with a text that is no TOML, without repeating any of it."""
+"""The reason why a text is no TOML, without repeating any of it."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What a block, or a window that may be rewound, needs of the run it is part of."""
+"""The state of a run that a block needs, or a window that may be rewound."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol

@@ -1,4 +1,4 @@
-"""Which runs are tried again after the process that was at them died.
+"""Runs that are tried again after the process that was at them died.
 
 A chunk whose process dies is run once more; then it is cut in halves until the guilty run is
 alone. A single run is tried again when nothing else is under way, so that neither the memory of

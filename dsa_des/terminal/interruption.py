@@ -1,4 +1,4 @@
-"""What ctrl-C and SIGTERM do to a command: it clears up, says so in one line, and ends.
+"""Ctrl-C and SIGTERM in a command: it clears up, says so in one line, and ends.
 
 The exit code is 128 and the number of the signal, as a shell has it: 130 for ctrl-C, 143 for
 SIGTERM.

@@ -1,4 +1,4 @@
-"""Public functions and classes that no product code names: physics that the docs say is for users."""
+"""Public functions and classes that no product code names: the docs say they are for users."""
 
 import ast
 import re
@@ -25,9 +25,8 @@ def words(tree: ast.Module) -> Counter[str]:
             found[node.id] += 1
         elif isinstance(node, ast.Attribute):
             found[node.attr] += 1
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) not in left_out:
-                found.update(re.findall(r"\w+", node.value))
+        elif isinstance(node, ast.Constant) and id(node) not in left_out:
+            found.update(re.findall(r"\w+", str(node.value)))
     return found
 
 
