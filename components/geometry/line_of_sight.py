@@ -12,26 +12,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.arguments.checks import FloatArray
+from components.arguments.checks import FloatArray, positions, shaped
 from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.sensor_angles import MODELS as ATTITUDE_MODELS
 from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
 
-_ANGLES: dict[str, Callable[..., tuple[FloatArray, FloatArray, FloatArray]]] = {
-    "flat_earth": flat_earth.line_of_sight,
-    "local_radii": local_radii.line_of_sight,
-    "geodesic": geodesic.line_of_sight,
-    "ellipsoid": ellipsoid.line_of_sight,
-}
-# Those that find offsets first; the directions' angles in body axes then need no sines of angles.
+# Those that find offsets; the directions' angles in body axes then need no sines of angles.
 _OFFSETS: dict[str, Callable[..., tuple[FloatArray, FloatArray, FloatArray]]] = {
     "flat_earth": flat_earth.north_east_up,
     "local_radii": local_radii.north_east_up,
     "ellipsoid": ellipsoid.north_east_up,
 }
 
-EARTH_MODELS = tuple(_ANGLES)
+EARTH_MODELS = ("flat_earth", "local_radii", "geodesic", "ellipsoid")
 """Models of the Earth, crude to exact."""
 
 
@@ -79,8 +73,7 @@ class LineOfSight:
                 allowed = ", ".join(map(repr, models))
                 raise ValueError(f"{name} is {value!r}: it must be one of {allowed}")
         self.earth, self.attitude = earth, attitude
-        self._angles = _ANGLES[earth]
-        self._offsets = _OFFSETS.get(earth) if attitude == "exact" else None
+        self._offsets = _OFFSETS.get(earth)
 
     def in_ned(
         self,
@@ -107,7 +100,8 @@ class LineOfSight:
         ValueError
             As for `components.geometry.ellipsoid.line_of_sight`.
         """
-        return self._angles(own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m)
+        places = own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m
+        return self._in_ned(places, validate=True)
 
     def from_ownship(self, own: Any, other: Any) -> SeenFromOwnship:
         """Find where the ownship sees targets, in NED and in its body axes, without checks.
@@ -125,8 +119,8 @@ class LineOfSight:
         """
         places = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
         attitude = own.yaw_rad, own.pitch_rad, own.roll_rad
-        if self._offsets is None:
-            seen = self._angles(*places, validate=False)
+        if self._offsets is None or self.attitude != "exact":
+            seen = self._in_ned(places, validate=False)
             body = sensor_angles(*seen[:2], *attitude, model=self.attitude, validate=False)
             return SeenFromOwnship(*seen, *body)
         with np.errstate(under="ignore"):  # what is too small for a double is zero
@@ -134,3 +128,14 @@ class LineOfSight:
             return SeenFromOwnship(
                 *spherical_from_enu(*offsets), *sensor_angles_of_offsets(*offsets, *attitude)
             )
+
+    def _in_ned(
+        self, places: tuple[Any, ...], *, validate: bool
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        if self._offsets is None:
+            return geodesic.line_of_sight(*places, validate=validate)
+        arrays, shape = positions(*places, validate=validate)
+        with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
+            seen = spherical_from_enu(*self._offsets(*arrays))
+        azimuth, elevation, range_m = shaped(shape, *seen)
+        return azimuth, elevation, range_m
