@@ -130,7 +130,7 @@ class LineOfSight:
             )
 
     def _in_ned(
-        self, places: tuple[Any, ...], *, validate: bool
+        self, places: tuple[Any, Any, Any, Any, Any, Any], *, validate: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self._offsets is None:
             return geodesic.line_of_sight(*places, validate=validate)
