@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.display.styles import style_of
+from components.geometry.field_of_view import sector_width_rad
 from dsa_des.arrays.types import FloatArray
 
 
@@ -39,11 +40,10 @@ def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
     axes : BodyAxes
         How the sensor is mounted.
     """
-    low, high = reach.azimuth_rad
-    width = high - low if high >= low else high - low + 2 * math.pi
+    width = sector_width_rad(*reach.azimuth_rad)
     everywhere = width >= 2 * math.pi - 1e-9
     closed = math.isfinite(reach.range_max_m)
-    angle = low + np.linspace(0.0, min(width, 2 * math.pi), 181)
+    angle = reach.azimuth_rad[0] + np.linspace(0.0, min(width, 2 * math.pi), 181)
     if not closed:
         angle = angle[:0] if everywhere else angle[[0, -1]]
     radius_km = reach.range_max_m / 1000 if closed else 1.0

@@ -68,12 +68,12 @@ class Detected:
         rows: ThinnedStream,
     ) -> "Detected":
         number, (time_s, range_m) = rows.rows()
-        everyone = sorted({*sensors, *(name for name, _ in series)})
-        sensor = np.array([everyone.index(name) for name, _ in series], dtype=np.int64)[number]
+        all_sensors = sorted({*sensors, *(name for name, _ in series)})
+        sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
         target = np.array([target for _, target in series], dtype=np.int64)[number]
-        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(everyone)}
+        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(all_sensors)}
         return cls(
-            everyone,
+            all_sensors,
             {name: time_s[index] for name, index in chosen.items()},
             {name: range_m[index] for name, index in chosen.items()},
             {name: target[index] for name, index in chosen.items()},

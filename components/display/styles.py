@@ -1,4 +1,4 @@
-"""How each sensor is marked in every figure: colour, marker and size."""
+"""The marks of each sensor in every figure: colour, marker and size."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What fusion blocks have in common: who is ranked best, what is remembered, how rows are built."""
+"""The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What every column of a run folder's tables means, its unit and its frame.
+"""The meaning, unit and frame of every column of a run folder's tables.
 
 Beside the messages' ``recorded``, which has the types; a test sees that none is missing.
 """

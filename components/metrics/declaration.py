@@ -1,4 +1,4 @@
-"""When a target is declared: m detections in n scans (``declaration``)."""
+"""The time at which a target is declared: m detections in n scans (``declaration``)."""
 
 from collections.abc import Mapping
 from typing import Any, Self
@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.metrics.rows import (
-    SensorParameters,
+    SensorMetricParameters,
     TargetMetric,
     first_rows,
     is_named,
@@ -22,7 +22,7 @@ from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 ANY = "any"
 
 
-class DeclarationParameters(SensorParameters):
+class DeclarationParameters(SensorMetricParameters):
     """Parameters of declaration metrics."""
 
     m: int | None = Field(

@@ -1,4 +1,4 @@
-"""When and where a target was first seen, and how steadily (``first_detection``,
+"""Time and place of a target's first detection, and the share of looks (``first_detection``,
 ``detection_share``)."""
 
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import numpy as np
 
 from components.metrics.rows import (
     FUSED,
-    SensorParameters,
+    SensorMetricParameters,
     TargetMetric,
     first_rows,
     is_named,
@@ -27,7 +27,7 @@ _ROWS = ("block", "target", "time_s", "true_range_m")
 class FirstDetection(TargetMetric):
     """Time and true slant range of the first detection, per sensor and of the fusion."""
 
-    Parameters = SensorParameters
+    Parameters = SensorMetricParameters
     tables = {"detections": _ROWS}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
@@ -76,7 +76,7 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
 class DetectionShare(TargetMetric):
     """Share of the looks at targets inside a sensor's reach that detect."""
 
-    Parameters = SensorParameters
+    Parameters = SensorMetricParameters
     tables = {"detections": ("block", "target"), "scans": ("block", "evaluated")}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:

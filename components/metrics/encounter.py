@@ -1,4 +1,4 @@
-"""What an encounter comes to, and how long before it somebody knew (``closest_approach``,
+"""The outcome of an encounter, and the warning time before it (``closest_approach``,
 ``well_clear``).
 
 Loss of well clear is that of ASTM F3442 for small unmanned aircraft, 2000 ft horizontally and
@@ -13,7 +13,13 @@ from pydantic import Field
 
 from components.metrics.declaration import ANY, DeclarationParameters, declarations
 from components.metrics.rows import TargetMetric, sensors_of
-from components.metrics.separation import Flight, closest, first_inside, separations, traffic_block
+from components.metrics.separation import (
+    RelativeFlight,
+    closest,
+    first_inside,
+    separations,
+    traffic_block,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
@@ -41,7 +47,7 @@ class _Encounter(TargetMetric):
         self.sensors = sensors_of(scene, parameters.sensors)
 
     def of_flights(
-        self, group: Group, read: Callable[[list[Flight]], tuple[float, ...]], width: int
+        self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
     ) -> FloatArray:
         """Return what `read` makes of every replica's flights, shape (width, replicas).
 
@@ -124,7 +130,7 @@ class WellClear(_Encounter):
         return found
 
 
-def _closest(flights: list[Flight]) -> tuple[float, ...]:
+def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
     """Return smallest range (m) and its time (s)."""
     best = (float("inf"), float("nan"))
     for flight in flights:
@@ -132,7 +138,7 @@ def _closest(flights: list[Flight]) -> tuple[float, ...]:
     return best if np.isfinite(best[0]) else (float("nan"), float("nan"))
 
 
-def _losses(flights: list[Flight]) -> tuple[float, ...]:
+def _losses(flights: list[RelativeFlight]) -> tuple[float, ...]:
     """Return when well clear is first lost and when a collision first threatens, s."""
     if not flights:
         return float("nan"), float("nan")

@@ -1,4 +1,4 @@
-"""How far apart the aircraft of an encounter truly are: slant, horizontal and vertical distance.
+"""True distances of the aircraft of an encounter: slant, horizontal and vertical.
 
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
@@ -68,7 +68,7 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
-def separations(scene: Scene, step_s: float) -> "list[Flight]":
+def separations(scene: Scene, step_s: float) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -83,10 +83,10 @@ def separations(scene: Scene, step_s: float) -> "list[Flight]":
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
     count = regular_count(step_s, float(duration))
-    return [Flight(source, number, step_s, count) for number in range(len(source.targets))]
+    return [RelativeFlight(source, number, step_s, count) for number in range(len(source.targets))]
 
 
-class Flight:
+class RelativeFlight:
     """The distances of one target from the ownship, in pieces of time one after the other.
 
     Parameters
@@ -151,7 +151,7 @@ def _separation(source: Any, target: Any, time_s: FloatArray) -> Separation:
     )
 
 
-def closest(flight: Flight) -> tuple[float, float]:
+def closest(flight: RelativeFlight) -> tuple[float, float]:
     """Return the smallest range (m) and its time (s), the first of several."""
     best = (float("inf"), float("nan"))
     for piece in flight.pieces():
@@ -166,7 +166,7 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
 
     Parameters
     ----------
-    flight : Flight
+    flight : RelativeFlight
     *limits_m : (horizontal, vertical)
     """
     found = [float("nan")] * len(limits_m)

@@ -1,4 +1,4 @@
-"""What daylight does to a target's contrast: sun, sky and ground behind it."""
+"""The effect of daylight on a target's contrast: sun, sky and ground behind it."""
 
 import math
 from collections.abc import Callable

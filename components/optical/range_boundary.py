@@ -9,7 +9,7 @@ from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 
 
-class RangeBoundaryParameters(SensorParameters):
+class CameraBoundaryParameters(SensorParameters):
     """Parameters of a range boundary camera; the defaults are TECVOL's."""
 
     range_km: float = Field(
@@ -30,7 +30,7 @@ class OpticalRangeBoundary(Sensor):
     have whose target is just detected at the limit.
     """
 
-    Parameters = RangeBoundaryParameters
+    Parameters = CameraBoundaryParameters
     ladders = (VISIBLE,)
 
     def look(self, cells: Cells) -> Look:

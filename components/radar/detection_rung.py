@@ -1,4 +1,4 @@
-"""Whether a scene's accuracy needs the exact probability of detection or the table will do."""
+"""The choice between the exact probability of detection and its table, by accuracy."""
 
 from typing import Any
 

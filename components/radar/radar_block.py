@@ -1,4 +1,4 @@
-"""What every radar block has in common: it measures range, and effects act on its echoes."""
+"""The base class of radar blocks: it measures range, and effects act on its echoes."""
 
 from collections.abc import Callable
 from dataclasses import replace

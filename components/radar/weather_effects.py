@@ -1,4 +1,4 @@
-"""What the air takes from a radar's echo: gas, rain and fog, on the way there and back."""
+"""The loss of a radar's echo in the air: gas, rain and fog, on the way there and back."""
 
 import math
 from typing import Any

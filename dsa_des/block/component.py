@@ -1,4 +1,4 @@
-"""What a block is: declared ports, declared parameters, and what it does when it wakes.
+"""The base class of blocks: declared ports and parameters, and the work done at a wake.
 
 A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
 scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a
@@ -243,11 +243,11 @@ class Component:
         return cls.ladders
 
     def request(self, port: str) -> Any:
-        """Return what this block asks of whoever feeds `port`, or None."""
+        """Return what this block asks of the block that feeds `port`, or None."""
         return None
 
     def offer(self, port: str) -> Any:
-        """Return what this block says of the output `port` to whoever it feeds, or None."""
+        """Return what this block says of the output `port` to the blocks it feeds, or None."""
         return None
 
     def setup(self) -> None:

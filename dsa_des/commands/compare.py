@@ -20,6 +20,7 @@ from dsa_des.commands.study import (
     tell_crashed,
 )
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
 from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import load_scene
@@ -31,7 +32,6 @@ from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
 from dsa_des.studies.printing import short, times
 from dsa_des.studies.record import StudyRecord, results_of
-from dsa_des.studies.safe_files import write_whole
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
@@ -278,7 +278,7 @@ def _compare(
             x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
             drawn = io.BytesIO()
             draw_scatter(drawn, x, y, names, metric, "compared")
-            write_whole(path, drawn.getvalue())
+            write_file(path, drawn.getvalue())
             say(f"wrote {path}")
     except OSError as error:
         raise UsageError(f"--out {stem.parent}: cannot be written: {error.strerror}") from error

@@ -274,7 +274,7 @@ def _list_metrics() -> None:
     for name in registered(METRICS):
         try:
             cls = find_metric(name)
-        except ValueError as error:  # somebody's broken plug-in must not hide the others
+        except ValueError as error:  # a broken plug-in must not hide the others
             table.add_row(name, "", "", str(error))
             continue
         keys = ", ".join(row[0].strip() for row in parameter_rows(cls.Parameters))

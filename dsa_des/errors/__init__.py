@@ -1,4 +1,4 @@
-"""What can go wrong, and how it is said."""
+"""Errors, and how they are said."""
 
 from dsa_des.errors.problems import (
     MOST_PROBLEMS,

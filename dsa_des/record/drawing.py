@@ -82,7 +82,7 @@ def tight(figure: "Figure") -> None:
 
 
 def _make_plain(figure: "Figure") -> None:
-    """Cut and escape every text that was put into a figure, whoever put it there."""
+    """Cut and escape every text that was put into a figure, wherever it came from."""
     from matplotlib.text import Text
     from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 

@@ -41,7 +41,7 @@ class LockStep(Simulation):
         Every table it writes begins with the column ``replica``.
     report : callable, optional
         Called with a replica's number and what its blocks report (`Component.report`), for blocks
-        that are split; shared blocks report for nobody.
+        that are split; shared blocks report for none.
     window : int, optional
         Most scans in a look-ahead window, as for `Simulation`.
 
@@ -241,7 +241,7 @@ class LockStep(Simulation):
             raise _unwrapped(failure) from None
         for block in self.split.values():
             block.close(len(self._scenes))
-        # Nobody speaks for all replicas: a shared block has seen the rows of every one.
+        # No block speaks for all replicas: a shared block has seen the rows of every one.
         return replace(outcome, components={})
 
 

@@ -1,4 +1,4 @@
-"""Whether blocks come back when they are rewound: each window runs twice, and must be the same.
+"""A check that blocks can be rewound: each window runs twice and must be the same.
 
 `Component.rewindable` is a promise about all of a block's state. A generator of random numbers, a
 list within a list or a variable of its module that breaks it would show in nothing but results

@@ -1,4 +1,4 @@
-"""What a block, or a window that may be rewound, needs of the run it is part of."""
+"""The state of a run that a block needs, or a window that may be rewound."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -33,7 +33,7 @@ class RunState(Protocol):
     """The state of a run that all of its blocks share.
 
     ``window`` is the one that runs now, in ticks [start, end); ``trace`` and ``recorder`` are None
-    where nobody asks for them; ``span_ticks`` is 0 where no replicas share the run.
+    where they are not asked for; ``span_ticks`` is 0 where no replicas share the run.
     """
 
     env: simpy.Environment

@@ -1,6 +1,6 @@
 """Running one chunk of a study: from cells and replicas to the bytes of one Parquet file.
 
-It is a pure function of the study and the chunk; whoever runs it, where and when, the bytes are
+It is a pure function of the study and the chunk; whichever worker runs it, and when, the bytes are
 the same.
 """
 

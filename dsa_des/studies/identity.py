@@ -1,4 +1,4 @@
-"""What fixes every result of a study, as one digest, and the ``study.json`` that holds it."""
+"""The digest of all that fixes a study's results, and the ``study.json`` that holds it."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What a study leaves beside its parts: ``summary.parquet``, ``differences.parquet``, figures."""
+"""Results beside a study's parts: ``summary.parquet``, ``differences.parquet``, figures."""
 
 import hashlib
 import io

@@ -1,4 +1,4 @@
-"""What a study's folder says of itself: enough to read its tables, without the scene or any block.
+"""The record of a study in its folder: enough to read its tables without scene or blocks.
 
 It is written when the study is begun and checked when it is read, since a folder may come from a
 stranger. Nothing that it names is opened or imported.

@@ -145,7 +145,7 @@ def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Difference:
+class EstimatedDifference:
     """How two conditions differ on the same units.
 
     Parameters
@@ -173,7 +173,7 @@ class Difference:
 
 def difference(
     first: FloatArray, second: FloatArray, confidence: float, method: str = "t"
-) -> Difference:
+) -> EstimatedDifference:
     """Return second minus first on common units.
 
     Parameters
@@ -184,7 +184,7 @@ def difference(
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
     paired = mean(second[both] - first[both], confidence, method)
-    return Difference(
+    return EstimatedDifference(
         paired,
         _welch(first[both], second[both], confidence),
         int((here & ~there).sum()),

@@ -74,7 +74,7 @@ class Chunk:
         return sum(end - start for _, start, end in self.runs)
 
 
-class Cells(Sequence[tuple[int, ...]]):
+class StudyCells(Sequence[tuple[int, ...]]):
     """The cells of a study, each made when it is asked for; the last axis runs fastest.
 
     Parameters
@@ -166,9 +166,9 @@ class Study:
     tables: dict[str, Any]
 
     @property
-    def cells(self) -> Cells:
+    def cells(self) -> StudyCells:
         """Index of each axis's value, cell by cell; the last axis runs fastest."""
-        return Cells(len(axis.labels) for axis in self.axes)
+        return StudyCells(len(axis.labels) for axis in self.axes)
 
     @property
     def batch(self) -> int:

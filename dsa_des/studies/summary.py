@@ -13,7 +13,7 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.studies.chunk import CRASHED
 from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
-from dsa_des.studies.statistics import Difference, Estimate, difference, mean, share
+from dsa_des.studies.statistics import Estimate, EstimatedDifference, difference, mean, share
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -147,7 +147,7 @@ class Compared:
     value: Any
     baseline: Any
     result: Result
-    difference: Difference
+    difference: EstimatedDifference
 
 
 def compare_axis(

@@ -9,7 +9,7 @@ import pytest
 from accuracy_scenes import Listener, run, true_errors, write_scene
 from click.testing import CliRunner
 
-from components.line_of_sight.rung_planning import Rung
+from components.line_of_sight.rung_planning import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import MemorySink, Recorder
@@ -87,7 +87,7 @@ def test_detections_differ_by_no_more_than_allowed_over_200_scenes(tmp_path: Pat
         }
         exact, reference = run(write_scene(tmp_path, seed, "", {}))
         rough, listener = run(write_scene(tmp_path, seed, "", allowed))
-        assert exact.components["transform"].rung == Rung("ellipsoid", "exact")
+        assert exact.components["transform"].rung == PickedModels("ellipsoid", "exact")
         rung = rough.components["transform"].rung
         cheaper += rung.earth != "ellipsoid"
         truth, found = detections(reference), detections(listener)

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from components.evidence.benchmark.cases import Case, chosen
+from components.evidence.benchmark.cases import BenchmarkCase, chosen
 from components.evidence.benchmark.pairs import PAIRS, Pair
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file
@@ -66,7 +66,11 @@ _LEGEND = (
 
 
 def _measured_cases(
-    console: Any, cases: list[Case], quick: bool, repeats: int | None, before: dict[str, Any]
+    console: Any,
+    cases: list[BenchmarkCase],
+    quick: bool,
+    repeats: int | None,
+    before: dict[str, Any],
 ) -> list[dict[str, Any]]:
     rows = []
     for case in cases:
@@ -103,7 +107,7 @@ def _measured_pairs(
     return rows
 
 
-def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
+def _measured(case: BenchmarkCase, quick: bool, repeats: int) -> dict[str, Any]:
     """Measure times and memory in a fresh process."""
     options = [f"--repeats={repeats}", *(["--quick"] if quick else [])]
     return _fresh("measure", [case.name, *options])
@@ -155,7 +159,7 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
         raise UsageError(f"--compare {path}: not the rows of a benchmark ({error})") from error
 
 
-def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
+def _table(cases: list[BenchmarkCase], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0))

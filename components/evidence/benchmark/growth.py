@@ -1,4 +1,4 @@
-"""How cost grows: ``python -m components.evidence.benchmark.growth DIR`` measures it and draws it.
+"""The growth of cost: ``python -m components.evidence.benchmark.growth DIR`` draws it.
 
 One thing grows at a time: intruders, scan rate, simulated time, replicas. A point is the best of
 three runs in a fresh process; what is drawn is CPU time of the whole run with recording, per

@@ -17,7 +17,7 @@ from statistics import median
 from typing import Any
 
 from components.evidence.benchmark import yardstick
-from components.evidence.benchmark.cases import Case, chosen, replicas_of, scene_of
+from components.evidence.benchmark.cases import BenchmarkCase, chosen, replicas_of, scene_of
 from dsa_des.record.recording import MemorySink, Recorder, Sink
 from dsa_des.replicas.lockstep import LockStep
 from dsa_des.running.simulation import Simulation
@@ -43,7 +43,9 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def measured(case: Case, scene: Scene, scenes: list[Scene], repeats: int) -> dict[str, Any]:
+def measured(
+    case: BenchmarkCase, scene: Scene, scenes: list[Scene], repeats: int
+) -> dict[str, Any]:
     """Return medians over interleaved repetitions, and the peak memory of a first run.
 
     What a user waits for is building and running: targets that are never in reach are found when a
@@ -89,7 +91,7 @@ def pin() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def _replicas(case: Case, quick: bool) -> int:
+def _replicas(case: BenchmarkCase, quick: bool) -> int:
     return case.quick_replicas if quick else case.replicas
 
 
@@ -136,7 +138,7 @@ def _scans(simulation: Simulation) -> int:
     return sum(len(clock.between(s, s + length)[0]) for clock in clocks for s in starts)
 
 
-def _yardstick(case: Case, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:
+def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:
     """Prepare the yardstick; return what runs it and gives its seconds per target-scan."""
     step = max(1, len(scenes) // _SAMPLED_REPLICAS)
     prepared = [yardstick.prepare(_flown(one)) for one in (scenes[::step] or [scene])]

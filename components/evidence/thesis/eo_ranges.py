@@ -20,7 +20,7 @@ CLIMB_DEG = 1.4
 
 
 @dataclass(frozen=True)
-class Case:
+class EoCase:
     """One line of Table 4.4; the Boeing 787 stands for the Convair (errata 23)."""
 
     geometry: str
@@ -33,11 +33,11 @@ class Case:
 
 
 CASES = (
-    Case("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, "4.8", None),
-    Case("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG, "5.4", "9.5"),
-    Case("Level abeam", "King Air", "king_air", 90.0, 0.0, "6.7", "6.2"),
-    Case("Level head-on", "King Air", "king_air", 180.0, 0.0, "6.7", "3.3"),
-    Case("Level head-on", "Convair", "boeing_787", 180.0, 0.0, "7.7", "9.1"),
+    EoCase("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, "4.8", None),
+    EoCase("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG, "5.4", "9.5"),
+    EoCase("Level abeam", "King Air", "king_air", 90.0, 0.0, "6.7", "6.2"),
+    EoCase("Level head-on", "King Air", "king_air", 180.0, 0.0, "6.7", "3.3"),
+    EoCase("Level head-on", "Convair", "boeing_787", 180.0, 0.0, "7.7", "9.1"),
 )
 _CLIMBING = (
     "the exact projection shows the wings of an aircraft that climbs at us, where eq. 9-13 show "
@@ -118,7 +118,7 @@ def make() -> Made:
     return Made(rows, [Picture("table_4_4", caption, draw)], {"table_4_4": data})
 
 
-def range_km(case: Case, camera: Any, model: str, *, dynamic: float = 0.0) -> float:
+def range_km(case: EoCase, camera: Any, model: str, *, dynamic: float = 0.0) -> float:
     """Return the range at which a case's signature reaches the threshold, km."""
     areas = aircraft(case.file).eo.model_dump(exclude={"silhouette_table"})
     heading, climb = math.radians(case.heading_deg), math.radians(case.climb_deg)

@@ -1,4 +1,4 @@
-"""What the figures of this package share: panels, colours, a grid."""
+"""The common parts of the figures of this package: panels, colours, a grid."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -11,6 +11,7 @@ from components.evidence.thesis.plotting import BLUE, GREEN, ORANGE, legend_belo
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import Recording, flights_of, monte_carlo, scene
 from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry.wrapping import wrap_by_sines
 from dsa_des.arrays.types import FloatArray
 from dsa_des.running.simulation import Simulation
 
@@ -115,7 +116,7 @@ def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     turned = seen["ned_azimuth_rad"] - seen["true_azimuth_rad"]
     return Errors(
         range_km=seen["true_range_m"] / 1000.0,
-        azimuth_deg=np.degrees(np.arctan2(np.sin(turned), np.cos(turned))),
+        azimuth_deg=np.degrees(wrap_by_sines(turned)),
         elevation_deg=np.degrees(seen["ned_elevation_rad"] - seen["true_elevation_rad"]),
         east_m=_east_error_m(flights, seen),
     )
