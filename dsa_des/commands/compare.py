@@ -27,7 +27,7 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.identity import record_of
-from dsa_des.studies.metric import EVENT, METRICS, SHARE
+from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
 from dsa_des.studies.printing import short, times
 from dsa_des.studies.record import StudyRecord, results_of
@@ -269,8 +269,7 @@ def _compare(
                 np.array([first[k] for k in keys]),
                 np.array([second[k] for k in keys]),
             )[1:]
-            outcomes = kinds[metric] in (EVENT, SHARE)
-            d = difference(*pair, one.record.confidence, one.record.interval, outcomes=outcomes)
+            d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             table.add_row(
                 *map(short, at), metric, short(d.paired.value),
                 f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),

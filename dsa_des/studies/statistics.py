@@ -215,7 +215,7 @@ def difference(
     confidence: float,
     method: str = "t",
     *,
-    outcomes: bool = False,
+    kind: str = "number",
 ) -> Difference:
     """Return second minus first on common units.
 
@@ -223,17 +223,20 @@ def difference(
     ----------
     first, second : (units,)
         NaN where a unit has no value.
-    outcomes : bool
-        Whether values are shares or events, which lie between 0 and 1. Where each unit has won or
-        lost as a whole the paired interval is then that of Agresti and Min, "Simple improved
-        confidence intervals for comparing matched proportions", Statistics in Medicine 24 (2005):
-        it is no point where no unit differs.
+    confidence : float
+    method : {"t", "bootstrap"}
+    kind : {"number", "event", "share"}
+        Events, and shares of which each unit has all or nothing, are counted: their paired interval
+        is that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
+        proportions based on paired data", Journal of Educational and Behavioral Statistics 37
+        (2012). It is no point where no unit differs.
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
     changes = second[both] - first[both]
-    matched = outcomes and len(changes) > 1 and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
-    paired = _matched(changes, confidence) if matched else mean(changes, confidence, method)
+    whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
+    counted = len(changes) > 1 and (kind == "event" or whole)
+    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
     return Difference(
         paired,
         _welch(first[both], second[both], confidence),
@@ -242,18 +245,23 @@ def difference(
     )
 
 
-def _matched(changes: FloatArray, confidence: float) -> Estimate:
-    """Return the mean of changes that are -1, 0 or 1, its interval with half a unit more of each.
+def _counted(changes: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
 
-    (And one half more of those that stay at 0 and one of those that stay at 1.)
+    Units of several runs differ by parts of an event: there the two lie the smallest part that is
+    seen to either side of the mean.
     """
     count = len(changes)
-    more = count + 2.0
-    middle = math.fsum(changes) / more
-    spread = (math.fsum(changes**2) + 1.0) / more - middle**2
-    half = _z(confidence) * math.sqrt(spread / more)
+    value = math.fsum(changes) / count
+    sizes = np.abs(changes)
+    step = float(sizes[sizes > 1e-9].min(initial=1.0))
+    about = 0.0 if step == 1.0 else value
+    more = np.append(changes, [about - step, about + step])
+    middle = math.fsum(more) / len(more)
+    error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
+    half = t_quantile(count - 1, confidence) * error
     low, high = max(-1.0, middle - half), min(1.0, middle + half)
-    return Estimate(math.fsum(changes) / count, low, high, count, count < FEW)
+    return Estimate(value, low, high, count, count < FEW)
 
 
 def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:

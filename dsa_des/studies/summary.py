@@ -167,8 +167,7 @@ def compare_axis(
         for result in results:
             first, second = paired(rows, result.name, by_place[base], chosen)[1:]
             others = (*at[:place], *at[place + 1 :])
-            outcomes = result.kind in (EVENT, SHARE)
-            change = difference(first, second, confidence, method, outcomes=outcomes)
+            change = difference(first, second, confidence, method, kind=result.kind)
             found.append(Compared(others, at[place], baseline, result, change))
     return found
 
