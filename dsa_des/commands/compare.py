@@ -35,6 +35,7 @@ from dsa_des.studies.record import StudyRecord, results_of
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
+from dsa_des.studies.summary import paired_units
 from dsa_des.terminal.terminal import console, say
 
 _HOME = Path("studies")
@@ -245,8 +246,8 @@ def _compare(
     from rich.table import Table
     from rich.text import Text
 
-    known = {result.name for result in other.results}
-    metrics = [name for name in _shown(one, only) if name in known]
+    kinds = {result.name: result.kind for result in other.results}
+    metrics = [name for name in _shown(one, only) if name in kinds]
     table = Table(title=Text(f"{names[1]} less {names[0]}, pair by pair"), box=None, pad_edge=False,
                   title_justify="left")  # fmt: skip
     for heading in (*one.rows.axes, "result", "difference", "paired interval", "pairs",
@@ -261,8 +262,14 @@ def _compare(
         for metric in metrics:
             first, second = sides[0].values(metric), sides[1].values(metric)
             keys = [key for key in first if key in second]
-            pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
-            d = difference(*pair, one.record.confidence, one.record.interval)
+            names_of = [key[:-1] if one.rows.over else key for key in keys]
+            codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
+            pair = paired_units(
+                np.array([codes[name] for name in names_of], dtype=np.int64),
+                np.array([first[k] for k in keys]),
+                np.array([second[k] for k in keys]),
+            )[1:]
+            d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             table.add_row(
                 *map(short, at), metric, short(d.paired.value),
                 f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),

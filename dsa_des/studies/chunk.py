@@ -114,7 +114,7 @@ def joined(name: str, parts: Sequence[Done]) -> Done:
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
-    replicas = [study.replica(number) for number in numbers]
+    replicas = [study.replica(number, cell) for number in numbers]
     rows: dict[str, list[Any]] = {
         "cell": [cell] * len(numbers),
         "replica": list(numbers),
@@ -164,7 +164,7 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
     except (SceneError, ValueError) as error:
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
-    replicas = [study.replica(number) for number in numbers]
+    replicas = [study.replica(number, cell) for number in numbers]
     outcomes = _outcomes(scene, replicas, wanted_by(metrics))
     good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
     for k, outcome in enumerate(outcomes):

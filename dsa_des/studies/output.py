@@ -75,7 +75,7 @@ class Tables:
     def _expected(self, study: Study) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers at every place, averaged over draws and encounters."""
         sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
-        replicas = [study.replica(k) for k in range(min(study.replicas, _EXPECTED_OVER))]
+        many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
         for cell in range(len(study.cells)):
             labels = study.labels(cell)
             at = tuple(
@@ -86,8 +86,8 @@ class Tables:
             try:
                 scene = study.scene(cell)
                 metrics = [spec.build(scene) for spec in study.metrics]
-                for replica in replicas if study.draws else replicas[:1]:
-                    own = scene_of(scene, replica)
+                for number in range(many):
+                    own = scene_of(scene, study.replica(number, cell))
                     for metric in metrics:
                         for name, value in metric.expected(own).items():
                             sums.setdefault((name, at), []).append(value)
@@ -229,7 +229,7 @@ class Tables:
             return []
         if cell >= len(self.study.cells) or replica >= self.study.replicas:
             return []
-        scene = scene_of(self.study.scene(cell), self.study.replica(replica))
+        scene = scene_of(self.study.scene(cell), self.study.replica(replica, cell))
         target = self.folder.path / f"run-cell-{cell}-replica-{replica}"
         if target.is_symlink():
             raise UsageError(f"{target}: is a link; the figures of a run are in a folder")

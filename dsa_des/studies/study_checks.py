@@ -162,7 +162,9 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     if draw.kind == "choice":
         return list(draw.values)
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
-    drawn = [draw.value(study.seed, number, study.batch) for number in range(count)]
+    cells = range(len(study.cells) if study.over else 1)
+    seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
+    drawn = [draw.value(seed, number, study.batch) for seed in seeds for number in range(count)]
     return list(dict.fromkeys([min(drawn), max(drawn)]))
 
 

@@ -167,7 +167,7 @@ def compare_axis(
         for result in results:
             first, second = paired(rows, result.name, by_place[base], chosen)[1:]
             others = (*at[:place], *at[place + 1 :])
-            change = difference(first, second, confidence, method)
+            change = difference(first, second, confidence, method, kind=result.kind)
             found.append(Compared(others, at[place], baseline, result, change))
     return found
 
@@ -176,7 +176,39 @@ def paired(
     rows: Rows, name: str, first: IntArray, second: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the units that both sets of rows have, and the values of each in both."""
-    one, of_one = rows.by_unit(name, first)
-    two, of_two = rows.by_unit(name, second)
-    units, here, there = np.intersect1d(one, two, return_indices=True)
-    return units, of_one[here], of_two[there]
+    values, replica = rows.column(name), rows.column("replica")
+    runs = rows.units * (int(replica.max(initial=0)) + 1) + replica
+    _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
+    one, two = first[here], second[there]
+    return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
+
+
+def paired_units(
+    units: IntArray, first: FloatArray, second: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return units, and each one's mean value in two conditions, over runs that have both.
+
+    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
+    with a value on one side only would compare other draws.
+
+    Parameters
+    ----------
+    units : (runs,)
+    first, second : (runs,)
+        NaN where a run has no value.
+    """
+    found, place = np.unique(units, return_inverse=True)
+
+    def means(values: FloatArray, used: AnyArray) -> FloatArray:
+        many = np.bincount(place[used], minlength=len(found))
+        total = np.bincount(place[used], weights=values[used], minlength=len(found))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(many > 0, total / many, np.nan)
+
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = means(first, here & there), means(second, here & there)
+    without = np.isnan(one)
+    alone = np.where(without, means(first, here), np.nan)
+    one = np.where(without, alone, one)
+    two = np.where(without & np.isnan(alone), means(second, there), two)
+    return found, one, two
