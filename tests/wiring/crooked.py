@@ -23,7 +23,7 @@ ROLLING: dict[str, Any] = {
     "speed_mps": 60.0, "climb_mps": 7.0, "yaw_deg": 31.0, "pitch_deg": 11.0, "roll_deg": 38.0,
 }  # fmt: skip
 DIVING: dict[str, Any] = {
-    "name": "diving", "east_m": -640.0, "north_m": -1790.0, "up_m": -510.0, "heading_deg": 290.0,
+    "name": "diving", "east_m": -100.0, "north_m": -1900.0, "up_m": -510.0, "heading_deg": 290.0,
     "speed_mps": 85.0, "climb_mps": -9.0, "yaw_deg": 297.0, "pitch_deg": -14.0, "roll_deg": -52.0,
 }  # fmt: skip
 TARGETS = (ROLLING, DIVING)

@@ -74,3 +74,31 @@ def measured(scene: Mapping[str, Any], *metrics: Any) -> Row:
     """Return a study's results of one run of a scene, by name."""
     result = dsa_des.study(scene, metrics=list(metrics), replicas=1, workers=1)
     return {row["result"]: row["value"] for row in result.summary.to_pylist()}
+
+
+#: One of every sensor, which detects every target of the crooked flights at every scan.
+SENSORS: dict[str, dict[str, Any]] = {
+    "radar.threshold": HEARS_ALL,
+    "radar.swerling": {
+        **{key: value for key, value in HEARS_ALL.items() if key != "threshold_db"},
+        "type": "radar.swerling", "swerling": 0, "power_w": 1e9,
+    },
+    "radar.range_boundary": {"type": "radar.range_boundary", "scan_rate_hz": 1, "range_km": 20.0},
+    "optical.eo": SEES_ALL,
+    "optical.ir": {**SEES_ALL, "type": "optical.ir"},
+    "optical.projection": {**SEES_ALL, "type": "optical.projection"},
+    "optical.range_boundary": {
+        "type": "optical.range_boundary", "scan_rate_hz": 1, "range_km": 20.0,
+        "azimuth_resolution_deg": 0.0, "elevation_resolution_deg": 0.0,
+    },
+}  # fmt: skip
+
+
+def sensor(kind: str, **keys: Any) -> dict[str, Any]:
+    """Return a table of a sensor that detects everything, with some keys changed."""
+    return {**SENSORS[kind], **keys}
+
+
+def alone(kind: str, *, duration_s: float = 1, targets: Any = crooked.TARGETS, **keys: Any) -> Any:
+    """Run a scene with one such sensor, named ``sensor``."""
+    return run(chain({"sensor": sensor(kind, **keys)}, duration_s=duration_s, targets=targets))
