@@ -111,7 +111,7 @@ def test_silhouettes_of_one_attitude(kind, tmp_path):
     }
     for target in targets:
         name = target["name"]
-        nose, wing, floor = line_of_sight_in_target(target)
+        _, wing, floor = line_of_sight_in_target(target)
         exact = 4.0 + 20.0 * math.hypot(wing, floor) + 50.0 * abs(floor)
         assert areas["exact"][name] == pytest.approx(exact, rel=1e-6)
         assert areas["aspect_table"][name] == pytest.approx(123.0, rel=1e-6)

@@ -5,6 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
+from covering import covers
 from scipy.special import chndtr
 from wired import HEARS_ALL, chain, first_look
 
@@ -36,6 +37,7 @@ def clutter_to_signal(target: dict, height_m: float, gamma_db: float, rcs_m2: fl
     return 10.0 ** (gamma_db / 10.0) * sine * across * along * gain / rcs_m2
 
 
+@covers("height_m", "clutter_gamma_db", of=("[terrain]",))
 @pytest.mark.parametrize(
     ("ground_m", "gamma_db"), [(1300.0, -15.0), (1300.0, -5.0), (1150.0, -5.0)]
 )
@@ -55,6 +57,7 @@ def test_clutter_is_that_of_the_ground_below_the_line_of_sight(ground_m, gamma_d
         assert cnr == pytest.approx(expected, rel=1e-3)
 
 
+@covers("clutter_mean", of=("[terrain]",))
 @pytest.mark.parametrize("mean", ["constant", "fluctuating"])
 def test_the_probability_of_detection_follows_the_clutter_s_mean(mean):
     """Against a steady target: Marcum's Q, over the phase or with the clutter as noise."""

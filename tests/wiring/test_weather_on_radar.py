@@ -3,6 +3,7 @@
 import crooked
 import numpy as np
 import pytest
+from covering import covers
 from wired import HEARS_ALL, chain, first_look
 
 from components.atmosphere.gas import gas_specific_attenuation
@@ -40,6 +41,7 @@ def water_db_km(temperature_c: float) -> float:
     return 0.819 * f * abs(((eps - 1.0) / (eps + 2.0)).imag) / 3.0
 
 
+@covers("fog_water_g_m3", "fog_temperature_c", of=("[weather]",))
 @pytest.mark.parametrize("temperature_c", [-20.0, 10.0, 35.0])
 def test_fog_attenuates_by_its_water_and_temperature(temperature_c):
     found = loss_db(fog_water_g_m3=0.4, fog_temperature_c=temperature_c, fog_top_m=9000.0)
@@ -49,6 +51,7 @@ def test_fog_attenuates_by_its_water_and_temperature(temperature_c):
         assert found[name] == pytest.approx(expected, rel=1e-6)
 
 
+@covers("fog_base_m", "fog_top_m", of=("[weather]",))
 @pytest.mark.parametrize(
     ("base_m", "top_m"), [(-1000.0, 2600.0), (2500.0, 9000.0), (2100.0, 2200.0), (2410.0, 2790.0)]
 )
@@ -61,6 +64,7 @@ def test_fog_fills_the_altitudes_from_its_base_to_its_top(base_m, top_m):
         assert found[name] == pytest.approx(expected, rel=2e-3, abs=1e-9)
 
 
+@covers("gas", "vapour_density_g_m3", of=("[weather]",))
 @pytest.mark.parametrize("density", [2.0, 7.5, 25.0])
 def test_gas_attenuates_by_the_vapour_and_the_altitudes_of_both_ends(density):
     steep = {**crooked.ROLLING, "up_m": 6500.0}
@@ -78,6 +82,7 @@ def test_gas_attenuates_by_the_vapour_and_the_altitudes_of_both_ends(density):
     assert clear["snr_db"] - moist["rolling"]["snr_db"] == pytest.approx(expected, rel=1e-3)
 
 
+@covers("rain_rate_mm_h", "rain_top_m", of=("[weather]",))
 @pytest.mark.parametrize(
     ("polarisation", "balance"), [("horizontal", 1.0), ("vertical", -1.0), ("circular", 0.0)]
 )
