@@ -1,4 +1,4 @@
-"""Every key that a scene may hold, read from the models of the blocks and of the engine."""
+"""Every key of scenes and metrics, read from the models of the blocks and of the engine."""
 
 import typing
 from collections.abc import Iterator
@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.commands.scene_tables import scene_tables
+from dsa_des.studies.metric import METRICS, find_metric
 
 
 def keys_of(model: type[BaseModel], prefix: str) -> Iterator[str]:
@@ -32,12 +33,14 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def every_key() -> set[str]:
-    """Return ``TYPE.key`` of all block types, and ``[TABLE].key`` of all else in a scene."""
+    """Return ``TYPE.key`` of blocks, ``[TABLE].key`` of scenes, ``[metric NAME].key`` of metrics."""
     found: set[str] = set()
     for kind in registered():
         found |= set(keys_of(find(kind).Parameters, f"{kind}."))
     for table, (_, rows) in scene_tables().items():
         found |= {f"[{table}].{row[0]}" for row in rows()}
+    for name in registered(METRICS):
+        found |= set(keys_of(find_metric(name).Parameters, f"[metric {name}]."))
     return found
 
 
