@@ -33,7 +33,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def every_key() -> set[str]:
-    """Return ``TYPE.key`` of blocks, ``[TABLE].key`` of scenes, ``[metric NAME].key`` of metrics."""
+    """Return ``TYPE.key`` of blocks, ``[TABLE].key`` of all else, ``[metric NAME].key``."""
     found: set[str] = set()
     for kind in registered():
         found |= set(keys_of(find(kind).Parameters, f"{kind}."))

@@ -1,6 +1,7 @@
 """What studies measure, against sums by hand over the rows of the same run."""
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import crooked
@@ -138,7 +139,7 @@ def test_ages_of_what_the_fusion_holds(recorded, target):
     found = measured(scene(), {"metric": "age_of_information", "target": target})
     fused = rows(recorded, "fused", target=target)
     origin, area, ages = -math.inf, 0.0, []
-    for row, after in zip(fused, fused[1:], strict=False):
+    for row, after in pairwise(fused):
         late = min(DELAY_S[name] for name in row["sensors"].split("+"))
         origin = max(origin, row["time_s"] - late)
         times = np.linspace(row["time_s"], after["time_s"], 20001)
@@ -147,9 +148,11 @@ def test_ages_of_what_the_fusion_holds(recorded, target):
     span = fused[-1]["time_s"] - fused[0]["time_s"]
     assert found["age_of_information_mean_s"] == pytest.approx(area / span, rel=1e-5)
     weights = np.concatenate(
-        [np.full(len(part), (b["time_s"] - a["time_s"]) / len(part))
-         for part, a, b in zip(ages, fused, fused[1:], strict=False)]
-    )  # fmt: skip
+        [
+            np.full(len(part), (after["time_s"] - row["time_s"]) / len(part))
+            for part, (row, after) in zip(ages, pairwise(fused), strict=True)
+        ]
+    )
     everything = np.concatenate(ages)
     order = np.argsort(everything)
     share = np.cumsum(weights[order]) / span
