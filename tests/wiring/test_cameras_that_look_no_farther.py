@@ -18,8 +18,14 @@ BODIES = {
 
 
 @pytest.mark.parametrize("bodies", list(BODIES))
-@pytest.mark.parametrize(("kind", "key"), [("optical.eo", "contrast"), ("optical.ir", "contrast_ir"),
-                                           ("optical.projection", "contrast")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [
+        ("optical.eo", "contrast"),
+        ("optical.ir", "contrast_ir"),
+        ("optical.projection", "contrast"),
+    ],
+)
 def test_what_is_just_detected_is_not_left_out(bodies, kind, key):
     """At a threshold just below its signature a target is seen, with what is culled or without."""
     eo, ir = BODIES[bodies]

@@ -55,6 +55,50 @@ def test_together_they_put_the_target_where_it_is(fusion):
         assert off_m < (0.05 if row["updated_by"] == "radar+eye" else 400.0)
 
 
+@pytest.mark.parametrize("fusion", ["fusion.pick_best", "fusion.gated"])
+def test_angles_are_of_the_sensor_whose_coarser_step_is_the_finest(fusion):
+    """One camera is fine in azimuth only, one in neither; of the radars the finer gives ranges."""
+    sensors = {
+        "a": {**SEES_ALL, "azimuth_resolution_deg": 0.1, "elevation_resolution_deg": 3.0},
+        "b": {**SEES_ALL, "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 2.0},
+        "c": sensor("radar.range_boundary", azimuth_resolution_deg=1.0, range_resolution_m=50.0),
+        "d": sensor("radar.range_boundary", azimuth_resolution_deg=0.5, range_resolution_m=70.0),
+    }
+    table = {"type": fusion}
+    if fusion == "fusion.gated":
+        table["angle_gate_deg"] = 9.0
+    scene = chain(sensors, fusion=table)
+    found = run(scene)
+    fused = rows(found, "fused")
+    assert len(fused) == 2
+    for row in fused:
+        assert (row["angle_source"], row["range_source"]) == ("b", "d")
+        (of_b,) = rows(found, block="b", target=row["target"])
+        (of_d,) = rows(found, block="d", target=row["target"])
+        for column in ("azimuth_rad", "elevation_rad", "true_azimuth_rad", "true_range_m"):
+            assert row[column] == of_b[column]
+        assert row["range_m"] == of_d["range_m"]
+        assert set(row["sensors"].split("+")) == set(sensors)
+    # Without cameras the finer radar gives all.
+    only = chain({name: sensors[name] for name in "cd"}, fusion=table)
+    for row in rows(run(only), "fused"):
+        assert (row["angle_source"], row["range_source"]) == ("d", "d")
+
+
+def test_a_beam_s_instants_are_passed_on_as_they_are():
+    """Two sensors saw the target at other instants: the true range is that of the angles' sensor."""
+    radar = sensor("radar.range_boundary", beam_sweep=True, azimuth_deg=[-90, 70])
+    found = run(chain({"radar": radar, "eye": SEES_ALL}, fusion={"type": "fusion.pick_best"}))
+    for row in rows(found, "fused"):
+        ranges = {
+            name: rows(found, block=name, target=row["target"])[0]["true_range_m"]
+            for name in ("radar", "eye")
+        }
+        assert abs(ranges["radar"] - ranges["eye"]) > 1.0
+        assert row["true_range_m"] == ranges["eye"]
+        assert row["range_m"] == pytest.approx(ranges["radar"])
+
+
 @covers("coincidence_s", of=("fusion.pick_best",))
 @pytest.mark.parametrize(("coincidence_s", "together"), [(0.1, True), (0.09, False), (0, False)])
 def test_looks_coincide_within_their_time(coincidence_s, together):

@@ -123,3 +123,25 @@ def test_the_zero_of_a_probabilistic_radar_s_confidence_is_that_of_the_model():
     snr_db = look(BASE)["radar"] - 250.0 + 70.0
     assert zero[1] == pytest.approx(snr_db - needed_db, abs=1e-5)
     assert zero[0] > zero[3] + 2.0 > zero[1] + 4.0
+
+
+def test_a_host_is_told_where_the_planes_are_in_its_own_body_axes():
+    """Range of the radar, angles of the cameras, by the states that the host gave."""
+    fine = {"azimuth_resolution_deg": 1e-7, "elevation_resolution_deg": 1e-7}
+    sensors = {"radar": CLOCKED["radar"], "eye": {**CLOCKED["eye"], **fine}}
+    scene = chain(sensors, fusion={"type": "fusion.pick_best"})
+    scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [BASE, {**BASE, "name": "b"}]}
+    simulator = Simulator(dsa_des.load_scene(scene))
+    states = []
+    for flight in (OWN, *crooked.TARGETS):
+        lat, lon, alt = crooked.geodetic(crooked.position(flight))
+        turned = [math.radians(flight[f"{key}_deg"]) for key in ("yaw", "pitch", "roll")]
+        states.append(((math.radians(lat), math.radians(lon), alt), turned))
+    (own, turned), *others = states
+    places, attitudes = zip(*others, strict=True)
+    result = simulator.simulate(own, turned, places, attitudes, 0.0)
+    for name, target in zip(("one", "b"), crooked.TARGETS, strict=True):
+        vector = crooked.body(target)
+        azimuth, elevation = crooked.angles(vector)
+        polar = azimuth, elevation, math.sqrt(float(vector @ vector))
+        assert result[name].polar == pytest.approx(polar, abs=1e-6)

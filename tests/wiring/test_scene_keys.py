@@ -50,3 +50,29 @@ def test_files_come_first_and_what_is_removed_is_gone(tmp_path):
     with pytest.raises(dsa_des.SceneError, match="range_km"):
         scene["blocks"]["radar"]["remove"] = ["range_km"]
         dsa_des.load_scene(scene)
+
+
+def test_the_summary_tells_bandwidths_and_closest_approaches():
+    """Of the calibrated radar its bandwidth, by the radar equation; of each target its nearest."""
+    import math
+
+    import crooked
+    import numpy as np
+
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.5, "swerling": 1}
+    table = sensor("radar.threshold", calibrate=calibrate, noise_figure_db=3.0)
+    del table["bandwidth_hz"], table["threshold_db"]
+    scene = chain({"one": table, "two": sensor("radar.threshold", bandwidth_hz=12345.0)})
+    told = run({**scene, "duration_s": 2}).info["summary"]
+    needed = math.log(1e-6) / math.log(0.5) - 1.0
+    wavelength = 299_792_458.0 / 35e9
+    top = 100.0 * 10 ** (6.0 + 0.5) * wavelength**2
+    noise = 1.380649e-23 * 290.0 * 10**0.3
+    bandwidth = top / ((4 * math.pi) ** 3 * noise * 4200.0**4 * needed)
+    assert told["link_budgets"]["one"]["bandwidth_hz"] == pytest.approx(bandwidth, rel=1e-6)
+    assert told["link_budgets"]["two"]["bandwidth_hz"] == 12345.0
+    for target in crooked.TARGETS:
+        ranges = [float(np.linalg.norm(crooked.ned(target, 0.1 * k))) for k in range(21)]
+        nearest = told["targets"][target["name"]]["closest_approach"]
+        assert nearest["range_m"] == pytest.approx(min(ranges), abs=0.02)
+        assert nearest["time_s"] == pytest.approx(0.1 * ranges.index(min(ranges)))
