@@ -161,7 +161,7 @@ class _Reader:
         return {}
 
     def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
-        return self._table(tables, path, (), (path,))
+        return self.inheritance.finished(self._table(tables, path, (), (path,)), ())
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values
