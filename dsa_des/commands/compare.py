@@ -29,12 +29,13 @@ from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import short, times
+from dsa_des.studies.printing import interval_text, short, times
 from dsa_des.studies.record import StudyRecord, results_of
 from dsa_des.studies.safe_files import write_whole
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
+from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
 _HOME = Path("studies")
@@ -242,16 +243,11 @@ def _compare(
             f"{names[0]} has the seed {one.record.seed} and {names[1]} {other.record.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    from rich.table import Table
-    from rich.text import Text
-
     known = {result.name for result in other.results}
     metrics = [name for name in _shown(one, only) if name in known]
-    table = Table(title=Text(f"{names[1]} less {names[0]}, pair by pair"), box=None, pad_edge=False,
-                  title_justify="left")  # fmt: skip
-    for heading in (*one.rows.axes, "result", "difference", "paired interval", "pairs",
-                    "unpaired interval", "narrower"):  # fmt: skip
-        table.add_column(heading)
+    heads = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
+             "unpaired interval", "narrower"]  # fmt: skip
+    lines: list[list[str]] = []
     theirs = dict(other.rows.each_place())
     together: dict[str, list[tuple[Any, Any]]] = {}
     for at, rows in one.rows.each_place():
@@ -263,14 +259,15 @@ def _compare(
             keys = [key for key in first if key in second]
             pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
             d = difference(*pair, one.record.confidence, one.record.interval)
-            table.add_row(
-                *map(short, at), metric, short(d.paired.value),
-                f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),
-                f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", times(d.narrower),
+            lines.append(
+                [*map(short, at), metric, short(d.paired.value), interval_text(d.paired),
+                 str(d.paired.count), interval_text(d.unpaired).rstrip(" *"),
+                 times(d.narrower)]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
             _farthest_apart(metric, sides, names)
-    console(160).print(table)
+    title = f"{names[1]} less {names[0]}, pair by pair"
+    print_table(console(160), title, heads, lines, group=len(one.rows.axes))
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():
