@@ -16,6 +16,7 @@ from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
+from dsa_des.text.safe_text import shortened
 
 #: Replicas whose random draws an analytic answer is averaged over.
 _EXPECTED_OVER = 64
@@ -122,6 +123,8 @@ class Tables:
             "count": [line.estimate.count for line in self.lines],
             "missing": [line.missing for line in self.lines],
             "few": [line.estimate.few for line in self.lines],
+            "cut_off": [sum(many for _, many in line.cut_off) for line in self.lines],
+            "cut_off_where": [cut_off_text(line) for line in self.lines],
             "expected": [line.expected for line in self.lines],
         }
         return columns
@@ -235,6 +238,13 @@ class Tables:
             raise UsageError(f"{target}: is a link; the figures of a run are in a folder")
         record_run(scene, target)
         return sorted(target.glob("*.png"))
+
+
+def cut_off_text(line: Line) -> str:
+    """Return ``12 of 200 at the start, 3 never``; nothing where the run cut nothing off."""
+    texts = [f"{many:,} {shortened(where)}" for where, many in line.cut_off]
+    texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
+    return ", ".join(texts)
 
 
 def _shortened(title: str) -> str:

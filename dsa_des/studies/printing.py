@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dsa_des.studies.output import Tables
+from dsa_des.studies.output import Tables, cut_off_text
 from dsa_des.studies.statistics import Estimate
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
@@ -27,12 +27,15 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     level = f"{100 * study.confidence:g} %"
     unit = "encounters" if study.over else "replicas"
     expected = any(line.expected is not None for line in lines)
-    heads = [*tables.rows.axes, "result", "mean or share", f"{level} interval", unit, "without"]
+    heads = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
+    heads += ["without"]
     rows = []
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
+        cut_off = cut_off_text(line)
         row = [*map(short, line.at), line.result.name, short(e.value)]
-        row += [interval_text(e), str(e.count), str(line.missing or "")]
+        row += [f"({cut_off})" if cut_off else "", interval_text(e), str(e.count)]
+        row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
         if expected:
             row.append("" if line.expected is None else short(line.expected))
         rows.append(row)
@@ -51,6 +54,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         console.print(
             f"* warning: too few values to rely on the interval in {len(few)} of {len(lines)} "
             f"lines; give more {unit}"
+        )
+    if any(line.cut_off for line in lines):
+        console.print(
+            "(N of RUNS at the start): so many values are only where the run began or ended; "
+            "without that they would lie beyond it"
         )
     _note_unreached(console, tables)
     if len(lines) < len(tables.lines):

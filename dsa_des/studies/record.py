@@ -51,6 +51,7 @@ class ResultRecord(_Strict):
     name: str
     kind: Literal["number", "event", "share"]
     meaning: str
+    cut_off: str | None = None
 
 
 class StopRecord(_Strict):
@@ -135,7 +136,7 @@ class StudyRecord(StudyHead):
         return columns_of(
             [(axis.column, axis.numeric) for axis in self.axes],
             [(draw.column, draw.numeric) for draw in self.draws],
-            [(result.name, result.kind) for result in self.results],
+            self.results_list(),
         )
 
     @property
@@ -146,7 +147,7 @@ class StudyRecord(StudyHead):
     def results_list(self) -> list[Result]:
         """Return what the metrics gave."""
         kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
-        return [Result(r.name, kinds[r.kind], r.meaning) for r in self.results]
+        return [Result(r.name, kinds[r.kind], r.meaning, r.cut_off) for r in self.results]
 
     def command(self, row: Mapping[str, Any]) -> str:
         """Return the command that repeats a run.

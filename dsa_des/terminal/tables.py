@@ -66,33 +66,30 @@ def print_table(
             names = [*names[:at], *names[at + 1 :]]
             cells = [[*row[:at], *row[at + 1 :]] for row in cells]
             right = [k - (k > at) for k in right if k != at]
-        _print_rows(console, names, cells, None, right, notes_below)
+        _print_rows(console, names, cells, right, notes_below)
         return
     kept = [k for k in range(len(names)) if k != group]
     together: dict[str, list[list[str]]] = {}
     for row in cells:
         together.setdefault(row[group], []).append([row[k] for k in kept])
     short = [names[k] for k in kept]
-    layout = _layout(short, [row for some in together.values() for row in some], console.width)
     for name, some in together.items():
         note = (notes or {}).get(name, "")
         _put(console)
         _put_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
         used = [k for k in range(len(short)) if any(row[k] for row in some)]
         shown = [[row[k] for k in used] for row in some]
-        widths = [layout.widths[k] for k in used if layout.widths]
-        _print_rows(console, [short[k] for k in used], shown, _Layout(widths, layout.gap))
+        _print_rows(console, [short[k] for k in used], shown)
 
 
 def _print_rows(
     console: Any,
     names: list[str],
     cells: list[list[str]],
-    layout: "_Layout | None" = None,
     right: Collection[int] = (),
     below: Sequence[str] = (),
 ) -> None:
-    layout = _layout(names, cells, console.width) if layout is None else layout
+    layout = _layout(names, cells, console.width)
     if not layout.widths:
         _print_lists(console, names, cells)
         return
