@@ -19,7 +19,7 @@ from components.metrics.rows import (
 from components.metrics.run_ends import SCANS, at_start, start_or_never
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, Told
 
 ANY = "any"
 
@@ -67,14 +67,21 @@ class Declaration(TargetMetric):
         found = []
         for name in self.names:
             cut = f"declaration_cut_off.{name}"
+            who = "any of the sensors" if name == ANY else name
             found += [
-                Result(f"declared.{name}", EVENT, "whether the target is declared"),
-                Result(f"declaration_time_s.{name}", NUMBER, "first declaration, s", cut),
+                Result(
+                    f"declared.{name}", EVENT, "whether the target is declared",
+                    told=Told(who, "no longer declares any target", "now declares a target"),
+                ),
+                Result(
+                    f"declaration_time_s.{name}", NUMBER, "first declaration, s", cut,
+                    Told(who, "declares a target earlier", "declares a target later"),
+                ),
                 Result(f"declaration_range_m.{name}", NUMBER, "true slant range then, m", cut),
                 Result(
                     f"declaration_delay_s.{name}", NUMBER, "from first detection to declaration, s"
                 ),
-            ]
+            ]  # fmt: skip
         return found
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:

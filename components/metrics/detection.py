@@ -20,7 +20,7 @@ from components.metrics.rows import (
 from components.metrics.run_ends import SCANS, at_start, scan_time_s, start_or_never
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Result, recorded_by
+from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Result, Told, recorded_by
 
 _ROWS = ("block", "target", "time_s", "true_range_m")
 
@@ -49,10 +49,19 @@ class FirstDetection(TargetMetric):
             who = "the fusion" if name == FUSED else name
             time, cut = f"first report by {who}, s", f"first_detection_cut_off.{name}"
             found += [
-                Result(f"detected.{name}", EVENT, f"whether {who} reports the target at all"),
-                Result(f"first_detection_time_s.{name}", NUMBER, time, cut),
-                Result(f"first_detection_range_m.{name}", NUMBER, "true slant range then, m", cut),
-            ]
+                Result(
+                    f"detected.{name}", EVENT, f"whether {who} reports the target at all",
+                    told=Told(who, "no longer sees any target", "now sees a target"),
+                ),
+                Result(
+                    f"first_detection_time_s.{name}", NUMBER, time, cut,
+                    Told(who, "sees a target earlier", "sees a target later"),
+                ),
+                Result(
+                    f"first_detection_range_m.{name}", NUMBER, "true slant range then, m", cut,
+                    Told(who, "first sees it nearer", "first sees it farther away"),
+                ),
+            ]  # fmt: skip
         return found
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:

@@ -34,6 +34,23 @@ TRIALS = ".trials"
 
 
 @dataclass(frozen=True)
+class Told:
+    """How a change of a result is told: ``radar``, ``sees a target earlier``, ``... later``.
+
+    Parameters
+    ----------
+    who : str
+    less, more : str
+        What it does where the result is smaller, or larger; of an event, where it no longer
+        happens, or now does.
+    """
+
+    who: str
+    less: str
+    more: str
+
+
+@dataclass(frozen=True)
 class Result:
     """One column of a study's results.
 
@@ -48,12 +65,15 @@ class Result:
     cut_off : str, optional
         Name of a further column, a text: where the run's start or end cut this value off (``at the
         start``, ``never``), nothing where it did not. Results may share one.
+    told : Told, optional
+        How comparisons tell a change of it.
     """
 
     name: str
     kind: str
     meaning: str
     cut_off: str | None = None
+    told: Told | None = None
 
 
 class Group:

@@ -6,12 +6,13 @@ stranger. Nothing that it names is opened or imported.
 
 import json
 from collections.abc import Mapping
+from dataclasses import astuple
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dsa_des.record.version import __version__
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result
+from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result, Told
 from dsa_des.studies.study import Study, run_command, set_text
 from dsa_des.studies.study_tables import json_safe
 
@@ -52,6 +53,7 @@ class ResultRecord(_Strict):
     kind: Literal["number", "event", "share"]
     meaning: str
     cut_off: str | None = None
+    told: tuple[str, str, str] | None = None
 
 
 class StopRecord(_Strict):
@@ -147,7 +149,16 @@ class StudyRecord(StudyHead):
     def results_list(self) -> list[Result]:
         """Return what the metrics gave."""
         kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
-        return [Result(r.name, kinds[r.kind], r.meaning, r.cut_off) for r in self.results]
+        return [
+            Result(
+                r.name,
+                kinds[r.kind],
+                r.meaning,
+                r.cut_off,
+                None if r.told is None else Told(*r.told),
+            )
+            for r in self.results
+        ]
 
     def command(self, row: Mapping[str, Any]) -> str:
         """Return the command that repeats a run.
@@ -210,7 +221,10 @@ def record_text(study: Study, digest: str) -> str:
             {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.numeric}
             for draw in study.draws
         ],
-        "results": [vars(result) for result in results_of(study)],
+        "results": [
+            vars(result) | {"told": None if result.told is None else astuple(result.told)}
+            for result in results_of(study)
+        ],
         "sets": [(key, set_text(value)) for key, value in study.sets],
         "swaps": study.swaps,
         "compare": study.baseline,
