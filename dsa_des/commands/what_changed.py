@@ -161,7 +161,7 @@ def _change(result: Result, pair: Pair) -> _Change:
     fell, rose = before[known] > after[known], before[known] < after[known]
     gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
     counts = [int(which.sum()) for which in (fell, rose, gone, come)]
-    return _Change(result, len(keys), *counts, mean)
+    return _Change(result, len(keys), counts[0], counts[1], counts[2], counts[3], mean)
 
 
 def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
