@@ -35,6 +35,7 @@ class FirstDetection(TargetMetric):
         super().__init__(parameters, scene)
         fusions = recorded_by(scene, FUSED)
         self.names = sensors_of(scene, parameters.sensors, [FUSED] if fusions else [])
+        self.fusion = fusions[0] if fusions else None
         #: Delay (s) from each block to the fusion.
         self.delay_s: dict[str, float] = {}
         if FUSED in self.names:
@@ -47,19 +48,20 @@ class FirstDetection(TargetMetric):
         found = []
         for name in self.names:
             who = "the fusion" if name == FUSED else name
+            block = self.fusion if name == FUSED else name
             time, cut = f"first report by {who}, s", f"first_detection_cut_off.{name}"
             found += [
                 Result(
                     f"detected.{name}", EVENT, f"whether {who} reports the target at all",
-                    told=Told(who, "no longer sees any target", "now sees a target"),
+                    told=Told(who, "no longer sees any target", "now sees a target"), block=block,
                 ),
                 Result(
                     f"first_detection_time_s.{name}", NUMBER, time, cut,
-                    Told(who, "sees a target earlier", "sees a target later"),
+                    Told(who, "sees a target earlier", "sees a target later"), block,
                 ),
                 Result(
                     f"first_detection_range_m.{name}", NUMBER, "true slant range then, m", cut,
-                    Told(who, "first sees it nearer", "first sees it farther away"),
+                    Told(who, "first sees it nearer", "first sees it farther away"), block,
                 ),
             ]  # fmt: skip
         return found

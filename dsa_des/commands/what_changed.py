@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.studies.figures import unit_of
+from dsa_des.studies.labels import unit_of
 from dsa_des.studies.metric import EVENT, Result
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import short

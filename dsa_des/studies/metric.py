@@ -67,6 +67,10 @@ class Result:
         start``, ``never``), nothing where it did not. Results may share one.
     told : Told, optional
         How comparisons tell a change of it.
+    block : str, optional
+        The block it is of, if that is not what stands behind the dot of its name.
+    mark : (colour, marker), optional
+        How figures mark that block; a study fills it in.
     """
 
     name: str
@@ -74,6 +78,8 @@ class Result:
     meaning: str
     cut_off: str | None = None
     told: Told | None = None
+    block: str | None = None
+    mark: tuple[str, str] | None = None
 
 
 class Group:

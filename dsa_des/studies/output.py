@@ -175,7 +175,8 @@ class Tables:
         return self.folder.path / name
 
     def _draw_one(self, target: BinaryIO, figure: FigureRecord) -> bool:
-        places = Places(self.rows.axes, self.lines)
+        categories = {axis.column for axis in self.record.axes if axis.category}
+        places = Places(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
         if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False
