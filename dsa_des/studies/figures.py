@@ -96,7 +96,8 @@ def draw_axis(
             expected = [line.expected for line in lines]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
-                note = f"analytic{', ' + who if who else ''}"
+                # One entry for all: each is dotted in the colour of its series.
+                note = "analytic" if number == 0 else None
                 top.plot(
                     x,
                     y,
@@ -210,9 +211,9 @@ def _differences(
                 text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
     unit = unit_of(shown[0].result.name)
-    axes.set_ylabel(f"difference from that at {text}{f', {unit}' if unit else ''}")
+    axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
     axes.set_title(
-        f"paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
+        f"Paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
     )
     axes.margins(x=0.12, y=0.2)
 
@@ -287,7 +288,7 @@ def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str)
             axes.plot(angle[ring], value[ring], color=colour, marker=marker, ms=4, label=who)
             axes.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         axes.set_ylim(bottom=0.0)
-        over = f"{readable(metric)} over {axis_label(axis)}"
+        over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
         axes.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
             axes.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))

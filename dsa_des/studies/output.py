@@ -6,11 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
+from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
+from dsa_des.studies.labels import value_label
 from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.seal import parquet
@@ -175,6 +180,8 @@ class Tables:
         return self.folder.path / name
 
     def _draw_one(self, target: BinaryIO, figure: FigureRecord) -> bool:
+        if figure.kind in ("histogram", "cdf"):
+            return self._draw_spread(target, figure)
         categories = {axis.column for axis in self.record.axes if axis.category}
         places = Places(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
@@ -196,6 +203,26 @@ class Tables:
             compared = self.compared if own else []
             by = figure.lines
             draw_axis(target, places, metric, axis, by, compared, title, self.record.confidence)
+        return True
+
+    def _draw_spread(self, target: BinaryIO, figure: FigureRecord) -> bool:
+        """Draw how a result is spread over the runs, one series per value of an axis."""
+        metric = str(figure.metric)
+        if figure.axis is not None and figure.axis not in self.rows.axes:
+            return False
+        axis = figure.axis or next(iter(self.rows.axes), None)
+        found: dict[Any, list[FloatArray]] = {}
+        for at, rows in self.rows.each_place():
+            value = None if axis is None else at[self.rows.axes.index(axis)]
+            found.setdefault(value, []).append(self.rows.column(metric)[rows].astype(float))
+        series = [
+            ("" if axis is None else value_label(axis, value), np.concatenate(values))
+            for value, values in found.items()
+        ]
+        (mark,) = (result.mark for result in self.results if result.name == metric)
+        draw = draw_histogram if figure.kind == "histogram" else draw_cdf
+        title = _shortened(self.record.title if figure.title is None else figure.title)
+        draw(target, series, metric, title, mark)
         return True
 
     def telling(self, only: Sequence[str] = ()) -> list[str]:

@@ -74,7 +74,7 @@ class StopRecord(_Strict):
 class FigureRecord(_Strict):
     """A figure; see `read_figures`."""
 
-    kind: Literal["axis", "heat", "polar", "run"]
+    kind: Literal["axis", "heat", "polar", "histogram", "cdf", "run"]
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
