@@ -1,7 +1,7 @@
 """Reading a run's detections for drawing: only what a figure needs, thinned where it is much."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from components.display.row_groups import each_row_group
 from components.display.thinned_stream import ThinnedStream
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.mark import Mark
 
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
@@ -37,6 +38,8 @@ class Detected:
     range_m: dict[str, FloatArray]
     target: dict[str, IntArray]
     names: list[str]
+    #: How each sensor is marked.
+    styles: dict[str, Mark] = field(default_factory=dict)
 
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":

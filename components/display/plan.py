@@ -1,5 +1,6 @@
 """``plan.png``: the run from above, and where each sensor detected what."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,13 @@ from components.display.labels import Labels
 from components.display.map_view import MAP_WIDTH_IN, MapView
 from components.display.marks import Detected
 from components.display.positions import positions
-from components.display.styles import mark_of, style_of
+from components.display.styles import mark_of
 from components.display.terminal import distance_text
 from components.display.thinning import evenly, staggered
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import drawing, figure_text
 
 if TYPE_CHECKING:
@@ -77,10 +79,10 @@ def draw_plan(
         axes.set_axisbelow(True)
         axes.ticklabel_format(useOffset=False, style="plain")
         for name, outline in outlines.items():
-            draw_outline(axes, outline, detected.sensors, name, view.farthest_km)
+            draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
         drawn = {
-            name: _draw_marks(axes, view, marks[name], detected.sensors, name)
+            name: _draw_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
         }
         named = _draw_closest(axes, view, flights)
@@ -148,12 +150,13 @@ def _draw_marks(
     axes: Any,
     view: MapView,
     paths: list[tuple[Track, FloatArray, FloatArray, FloatArray]],
-    sensors: list[str],
+    styles: Mapping[str, Mark],
     name: str,
 ) -> int:
     """Mark a sensor's detections, as far as they can be told apart, and return how many."""
     if not paths:
         return 0
+    sensors = list(styles)
     kept_east, kept_north = [], []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
@@ -162,9 +165,9 @@ def _draw_marks(
         kept_north.append(north[keep])
     east, north = np.concatenate(kept_east), np.concatenate(kept_north)
     few = evenly(len(east), 5000)
-    style = style_of(sensors, name)
+    style = styles[name]
     axes.plot(
-        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style[2],
+        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
         scalex=False, scaley=False,
     )  # fmt: skip
     return len(few)
@@ -241,5 +244,5 @@ def _legend(
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
             text += f"\n{reaches[name]}"
-        handles.append(Line2D([], [], **mark_of(style_of(detected.sensors, name)), label=text))
+        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=text))
     return handles

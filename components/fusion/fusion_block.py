@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.messages.detections import Detections, FusedDetections, SensorOffer, mask_type
+from components.sensor.marks import FUSION
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import offsets_of
@@ -26,6 +27,7 @@ class Fusion(Component):
     missing is taken from what there is.
     """
 
+    mark = FUSION
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     windowed = True

@@ -5,6 +5,7 @@ from pydantic import Field
 
 from components.optical.ladder import VISIBLE
 from components.sensor.look import Cells, Look
+from components.sensor.marks import EO
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 
@@ -30,6 +31,7 @@ class OpticalRangeBoundary(Sensor):
     have whose target is just detected at the limit.
     """
 
+    mark = EO
     Parameters = CameraBoundaryParameters
     ladders = (VISIBLE,)
 

@@ -24,6 +24,7 @@ from pydantic import (
 from dsa_des.block.effect import Effect
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.limits import refuse_extremes
+from dsa_des.block.mark import Mark
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.errors import did_you_mean
@@ -216,6 +217,8 @@ class Component:
     ladders: ClassVar[tuple[Ladder, ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
+    #: How figures mark it; a neutral one by default.
+    mark: ClassVar[Mark | None] = None
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name

@@ -180,11 +180,12 @@ def run_into(
 
 def finish(
     study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
-    only: Sequence[str] = (),
+    only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
 ) -> Tables:  # fmt: skip
     """Write the tables of a finished study, draw its figures and print them.
 
-    `only` names the results to print; by default those that the study draws.
+    `only` names the results to print; by default those that the study draws. `first` prints what
+    stands before the tables.
     """
     tables = Tables(study, folder)
     try:
@@ -193,6 +194,7 @@ def finish(
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
     if not quiet:
+        first(tables)
         show(terminal.console(160), tables, only)
         for path in figures:
             say(f"wrote {path}")
@@ -207,14 +209,16 @@ def _count(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
-def show_study(path: Path, only: Sequence[str] = ()) -> None:
+def show_study(
+    path: Path, only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None
+) -> None:
     """Print all tables of a study's folder, or those of some results; draw its figures again.
 
     The folder's tables are read and nothing else: no scene, and no code that it names.
     """
     folder = StudyFolder(path)
     every = known_results(folder.record.results_list(), only)
-    finish(folder.record, folder, only=only or every)
+    finish(folder.record, folder, only=only or every, first=first)
 
 
 def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:

@@ -12,7 +12,8 @@ from dsa_des.costs.study import RungCost
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.terminal import terminal
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.terminal.tables import print_table
+from dsa_des.text.safe_text import shortened
 
 _NO_ERROR = "-"
 
@@ -47,25 +48,18 @@ def print_costs(
     comparison: Comparison,
 ) -> None:
     """Print one table per ladder."""
-    from rich.table import Table
-    from rich.text import Text
-
     console = terminal.console(150)
+    effects = [change.heading for change in comparison.changes]
+    headings = ["rung", "us/target-scan", "mean", "p95", "max", *effects, "remark"]
     for (block, ladder_name), group in groupby(costs, key=lambda c: (c.block, c.ladder.name)):
         rungs = list(group)
         unit = rungs[0].ladder.quantities[0]
         what = f"{ladder_name}: errors in {unit.name}, {unit.unit}, against {rungs[0].reference}"
         console.print()
-        console.print(Text.assemble((shortened(block), "bold"), f", {printable(what)}"))
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-        table.add_column("rung", no_wrap=True)
-        for heading in ("us/target-scan", "mean", "p95", "max",
-                        *(change.heading for change in comparison.changes)):  # fmt: skip
-            table.add_column(heading, justify="right", no_wrap=True)
-        table.add_column("")
-        for cost in rungs:
-            table.add_row(*_cells(cost, comparison))
-        console.print(table, highlight=False)
+        rows = [_cells(cost, comparison) for cost in rungs]
+        last = len(headings) - 1
+        title = f"{shortened(block)}, {what}"
+        print_table(console, title, headings, rows, below=last, right=range(1, last))
     if chain:
         _print_chain(console, chain, comparison)
     for note in notes:
@@ -100,25 +94,22 @@ def _remarks(cost: RungCost) -> list[str]:
 
 
 def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: Comparison) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
     console.print()
-    console.print(Text.assemble(("whole chain", "bold"), ", the front"))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     telling = comparison.changes[:1]
-    headings = [change.heading for change in telling]
-    for heading in ("us/target-scan", comparison.difference.name, *headings, "rungs"):
-        table.add_column(heading, justify="left" if heading == "rungs" else "right")
-    for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"])):
-        if row["pareto"]:
-            table.add_row(
-                f"{row['cpu_us_per_target_scan']:.3g}",
-                f"{row['error_p95']:.2%}",
-                *(shown(change, row["effect"], _NO_ERROR) for change in telling),
-                row["rung"],
-            )
-    console.print(table, highlight=False)
+    headings = ["us/target-scan", comparison.difference.name, *(c.heading for c in telling)]
+    rows = [
+        [
+            f"{row['cpu_us_per_target_scan']:.3g}",
+            f"{row['error_p95']:.2%}",
+            *(shown(change, row["effect"], _NO_ERROR) for change in telling),
+            row["rung"],
+        ]
+        for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"]))
+        if row["pareto"]
+    ]
+    last = len(headings)
+    title = "whole chain, the front"
+    print_table(console, title, [*headings, "rungs"], rows, below=last, right=range(last))
 
 
 def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:

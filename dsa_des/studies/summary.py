@@ -4,6 +4,7 @@ Where a study runs over a sample of encounters (`over`), the encounters are the 
 and a cell of the summary joins all of them; otherwise the replicas are.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,9 @@ class Line:
     estimate: Estimate
     missing: int
     expected: float | None
+    #: Runs of this place, and (where, how many) of those whose value the run cut off.
+    runs: int = 0
+    cut_off: tuple[tuple[str, int], ...] = ()
 
 
 class Rows:
@@ -112,6 +116,13 @@ class Rows:
         tried = np.bincount(place, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
+    def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
+        """Return where the run cut a result off in some rows, and in how many, sorted."""
+        if result.cut_off is None:
+            return ()
+        said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]
+        return tuple(sorted(Counter(said).items()))
+
 
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
@@ -135,7 +146,9 @@ def summarise(
     for at, chosen in rows.each_place():
         for result in results:
             estimate, missing = rows.estimate(result, chosen, confidence, method)
-            lines.append(Line(at, result, estimate, missing, expected.get((result.name, at))))
+            known = expected.get((result.name, at))
+            cut_off = rows.cut_off(result, chosen)
+            lines.append(Line(at, result, estimate, missing, known, len(chosen), cut_off))
     return lines
 
 

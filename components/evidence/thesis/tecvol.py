@@ -7,7 +7,7 @@ import numpy as np
 
 from components.display.flights import Flights
 from components.evidence.thesis.made import Columns, Picture
-from components.evidence.thesis.plotting import BLUE, GREEN, ORANGE, legend_below, panels
+from components.evidence.thesis.plotting import EO, RADAR, legend_below, panels
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import Recording, flights_of, monte_carlo, scene
 from components.geometry.ellipsoid import line_of_sight_ned
@@ -69,7 +69,7 @@ def make() -> tuple[list[Row], Picture, Columns]:
     def draw(path: Path) -> None:
         with panels(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, places):
             for (name, colour), label in zip(
-                (("radar", BLUE), ("eo", ORANGE)), ("radar", "EO"), strict=True
+                (("radar", RADAR), ("eo", EO)), ("radar", "EO"), strict=True
             ):
                 for quantity, style in (("azimuth", "o-"), ("elevation", "s--")):
                     values = getattr(errors[name], f"{quantity}_deg")
@@ -77,7 +77,7 @@ def make() -> tuple[list[Row], Picture, Columns]:
                     angles.plot(middle, np.hypot(mean, spread), style, color=colour, markersize=4,
                                 label=f"{label}, {quantity}")  # fmt: skip
             middle, mean, spread = radar.by_range(radar.east_m)
-            places.errorbar(middle, mean, spread, fmt="o-", color=GREEN, markersize=4,
+            places.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
             angles.set_ylabel("root mean square angle error [deg]")
             places.set_ylabel("east error of the intruder's position [m]")
