@@ -18,12 +18,14 @@ from dsa_des.block.component import Component
 from dsa_des.block.message import Message, by_output
 from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.errors import RunRefused
 from dsa_des.running.block_environment import BlockEnvironment
 from dsa_des.running.channel import Channel
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.run_state import RunState
-from dsa_des.time.clock import MAX_TICK, ScanClock
+from dsa_des.running.windows import Window
+from dsa_des.time.clock import ScanClock
 from dsa_des.time.timeline import ReplicaTime
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
@@ -45,19 +47,18 @@ class Demand:
 
     block: str
     clock: ScanClock
-    lead_ticks: int = 0
-    replicas: ReplicaTime | None = None
-    end_tick: int = MAX_TICK
+    lead_ticks: int
+    time: ReplicaTime
 
     def between(self, start: int, end: int) -> IntArray:
         """Return the ticks in [start, end) at which this block needs a row."""
         if not self.lead_ticks:
             return self.clock.between(start, end)[1]
         # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.end_tick)
+        last = min(end + self.lead_ticks, self.time.end_tick)
         _, ticks = self.clock.between(start + self.lead_ticks, last)
-        if self.replicas is not None:  # rows from before a replica's start do not exist
-            ticks = ticks[ticks % self.replicas.span_ticks >= self.lead_ticks]
+        if self.time.span_ticks:  # rows from before a replica's start do not exist
+            ticks = ticks[ticks % self.time.span_ticks >= self.lead_ticks]
         return ticks - self.lead_ticks
 
 
@@ -110,7 +111,7 @@ class Node:
             yield self._bell
             self._bell = Bell(self.simulation.env)
             if self.windowed:
-                self._run_window(*self.simulation.window)
+                self._run_window(self.simulation.window.start, self.simulation.window.end)
             else:
                 self._run_at(int(self.simulation.env.now))
 
@@ -157,8 +158,9 @@ class Node:
 
     # -- when ----------------------------------------------------------------------------------
 
-    def open_window(self, start: int, end: int) -> None:
-        """Schedule everything this block's clock asks for in [start, end)."""
+    def open_window(self, window: Window) -> None:
+        """Schedule everything this block's clock asks for in a window."""
+        start, end = window.start, window.end
         if self.windowed:
             self.wake_at(start)
             return
@@ -244,7 +246,7 @@ class Node:
             self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
             self.send(self.runner.run(wake), ticks)
-        except Abort:
+        except (Abort, RunRefused):
             raise
         except BaseException as error:
             if is_ours_to_obey(error):
@@ -314,7 +316,7 @@ class Node:
         for channel, node, target_port in self.subscribers.get(port, []):
             arrivals = channel.push(message, sent)
             if node.component.inputs[target_port].mode == "sampled":
-                channel.forget(self.simulation.window[0])
+                channel.forget(self.simulation.window.start)
             if not node.windowed and target_port in node._trigger_ports:
                 for arrival in arrivals.tolist():
                     node.wake_at(arrival)

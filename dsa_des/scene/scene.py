@@ -97,6 +97,10 @@ class Scene(Changeable):
         """Class of each block."""
         return {name: block.cls for name, block in self.blocks.items()}
 
+    def problem(self, key: str, message: str) -> Problem:
+        """Return what is wrong with a dotted key of this scene."""
+        return Problem(str(self.path), key, message)
+
     def look_ahead_blocks(self) -> set[str]:
         """Return the blocks that may run in look-ahead windows."""
         queued = [name for name, block in self.blocks.items() if block.options.processor]
