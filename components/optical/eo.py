@@ -47,6 +47,7 @@ class ElectroOptical(Camera):
     """An electro-optical camera that sees a target's silhouette against its background."""
 
     Parameters = ElectroOpticalParameters
+    lockstep = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), *Camera.effects)
     ladders = (VISIBLE,)

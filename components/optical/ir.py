@@ -24,6 +24,7 @@ class Infrared(Camera):
     """An infrared camera that sees a target's warm areas, its front and back unequal."""
 
     Parameters = InfraredParameters
+    lockstep = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), *Camera.effects)
     ladders = (INFRARED,)

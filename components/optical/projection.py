@@ -30,6 +30,7 @@ class Projection(Camera):
     """
 
     Parameters = ProjectionParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     @classmethod

@@ -31,6 +31,7 @@ class OpticalRangeBoundary(Sensor):
     """
 
     Parameters = RangeBoundaryParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     def look(self, cells: Cells) -> Look:

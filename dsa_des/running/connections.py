@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 from dsa_des.errors import SceneError
 from dsa_des.running.channel import Channel
-from dsa_des.running.node import Demand, Node
+from dsa_des.running.demand import Demand
+from dsa_des.running.node import Node
 from dsa_des.running.wire_faults import WireFaults
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
