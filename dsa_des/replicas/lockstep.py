@@ -51,7 +51,7 @@ def lock_step(
         Every table it writes begins with the column ``replica``.
     report : callable, optional
         Called with a replica's number and what its blocks report, for blocks that are split;
-        shared blocks report for nobody.
+        shared blocks report for none.
     window : int, optional
         Most scans in a look-ahead window, as for `Simulation`.
 

@@ -29,7 +29,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node], time: ReplicaTime) -> None:
     ------
     SceneError
         If a wire's delay or initial message makes no sense, or a block that runs on demand has
-        nobody to demand anything.
+        no block to demand anything.
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)

@@ -47,7 +47,7 @@ class Node:
     """The runtime of one block.
 
     Invariants: `run_at` is called with increasing ticks; at each of them every undelayed sender
-    has run; a channel's rows are collected by nobody else.
+    has run; only here are a channel's rows collected.
     """
 
     simulation: RunState

@@ -76,7 +76,7 @@ class Pacer:
         due = self._started + time_s / self.factor
         while (ahead_s := due - self.now()) > 0.0:
             self.sleep(min(ahead_s, LONGEST_SLEEP_S))
-        # Waking up late counts as well: whoever waits for the results waits for that too.
+        # Waking up late counts as well: the user waits for that too.
         lag_s = max(0.0, self.now() - due)
         self.windows += 1
         self.max_lag_s = max(self.max_lag_s, lag_s)

@@ -33,8 +33,8 @@ class RunningBlock(Protocol):
 class RunState(Protocol):
     """The state of a run that all of its blocks share.
 
-    ``window`` is the one that runs now; ``trace`` and ``recorder`` are None where nobody asks for
-    them.
+    ``window`` is the one that runs now; ``trace`` and ``recorder`` are None where
+    they are not asked for.
     """
 
     env: simpy.Environment
