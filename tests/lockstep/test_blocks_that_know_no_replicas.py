@@ -106,7 +106,7 @@ def test_state_of_an_ordinary_block_stays_with_its_replica(
         blocks.{block}.type = "{__name__}:{kind.__name__}"
         """
     )
-    scene = load_scene(path, sets=[*SOUTH, *sets], duration_s="31")
+    scene = load_scene(path, sets=[*SOUTH, *sets], duration_s="12")
     scenes = [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
     simulation = lock.same_as_alone(scenes, window=window)
     assert list(simulation.timeline.split) == [block]
