@@ -94,7 +94,7 @@ class Echo(Component):
         ("echo", Echo, []),
     ],
 )
-@pytest.mark.parametrize("window", [None, 40])
+@pytest.mark.parametrize("window", [None, 90])
 def test_state_of_an_ordinary_block_stays_with_its_replica(
     lock, tmp_path, block, kind, sets, window
 ):
