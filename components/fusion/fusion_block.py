@@ -31,7 +31,6 @@ class Fusion(Component):
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     windowed = True
-    lockstep = True
     rewindable = True
 
     def setup(self) -> None:

@@ -185,21 +185,25 @@ class FlatEarth(Transform):
     """Line of sight over a flat Earth with 111,195 m per degree (thesis eq. 1-5, corrected)."""
 
     earth = "flat_earth"
+    lockstep = True
 
 
 class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
     earth = "local_radii"
+    lockstep = True
 
 
 class Geodesic(Transform):
     """Bearing and distance along the geodesic (GeographicLib), elevation from the heights."""
 
     earth = "geodesic"
+    lockstep = True
 
 
 class Ellipsoid(Transform):
     """Exact line of sight on the WGS-84 ellipsoid."""
 
     earth = "ellipsoid"
+    lockstep = True

@@ -49,6 +49,7 @@ class ElectroOptical(Camera):
 
     mark = EO
     Parameters = ElectroOpticalParameters
+    lockstep = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), *Camera.effects)
     ladders = (VISIBLE,)

@@ -26,6 +26,7 @@ class Infrared(Camera):
 
     mark = IR
     Parameters = InfraredParameters
+    lockstep = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), *Camera.effects)
     ladders = (INFRARED,)

@@ -32,6 +32,7 @@ class Projection(Camera):
 
     mark = EO
     Parameters = ProjectionParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     @classmethod

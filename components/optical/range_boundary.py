@@ -33,6 +33,7 @@ class OpticalRangeBoundary(Sensor):
 
     mark = EO
     Parameters = CameraBoundaryParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     def look(self, cells: Cells) -> Look:

@@ -58,7 +58,6 @@ class Sensor(Component):
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
-    lockstep = True
     rewindable = True
     #: Whether detections carry a range.
     measures_range = False

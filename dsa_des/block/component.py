@@ -202,7 +202,8 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
+    #: draws by scan number only, or keeps replicas apart by `Wake.replica`. A class says so of its
+    #: own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -219,6 +220,10 @@ class Component:
     needs_host: ClassVar[str] = ""
     #: How figures mark it; a neutral one by default.
     mark: ClassVar[Mark | None] = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.lockstep = vars(cls).get("lockstep", False)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name

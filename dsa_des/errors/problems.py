@@ -178,5 +178,9 @@ class SetupFailure(BlockFailure):
     exit_code = 2
 
 
+class RunRefused(Exception):
+    """The engine itself cannot go on with a run as it was put together; no block has failed."""
+
+
 class OutputError(Exception):
     """Results could not be written: the disk is full, their folder is gone (exit code 1)."""

@@ -18,7 +18,7 @@ from dsa_des.record.recording import ObserverSink, Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.version import __version__
 from dsa_des.running.long_run import say_if_long
-from dsa_des.running.pacing import Pacer
+from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.reports import draw_all, load_reports
 from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.running.warnings import say_warnings, warnings_of
@@ -84,7 +84,7 @@ def record_run(
     if warn:
         say_warnings(warnings, "note")
     if pacer is not None:
-        simulation.limit_windows(pacer.longest_window_s)
+        simulation.windows = PacedWindows(simulation.windows, pacer, simulation.ticks_per_s)
     reports = load_reports()
     notes: list[str] = []
     observers = ObserverSink(
@@ -99,7 +99,7 @@ def record_run(
         started = time.perf_counter()
         try:
             with _progress(simulation, silent=silent) as bar:
-                outcome = simulation.run(_paced(progress or bar, pacer))
+                outcome = simulation.run(progress or bar)
         finally:
             tables.release()
         summary = summary_of(observers, outcome, target.path, notes)
@@ -170,22 +170,6 @@ def info_of(
         "summary": sections,
         "timings": timings,
     }
-
-
-def _paced(
-    progress: Callable[[float], None] | None, pacer: Pacer | None
-) -> Callable[[float], None] | None:
-    """Return what is called after each window: the pacer first, then the progress bar."""
-    if pacer is None:
-        return progress
-
-    def after_window(time_s: float) -> None:
-        pacer(time_s)
-        if progress is not None:
-            progress(time_s)
-
-    pacer.start()
-    return after_window
 
 
 @contextmanager

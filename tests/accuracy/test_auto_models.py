@@ -13,7 +13,7 @@ from components.line_of_sight.rung_planning import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.replicas.lockstep import LockStep
+from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -220,7 +220,7 @@ def test_replicas_in_lock_step_pick_the_same_models_as_separate_runs(tmp_path: P
         for seed in (1, 2)
     ]
     together = MemorySink()
-    simulation = LockStep(scenes, recorder=Recorder([together]))
+    simulation = lock_step(scenes, recorder=Recorder([together]))
     simulation.run()
     assert simulation.components["transform"].rung.earth == "flat_earth"
     rows = together.tables()["detections"].to_pylist()

@@ -19,7 +19,7 @@ from typing import Any
 from components.evidence.benchmark import yardstick
 from components.evidence.benchmark.cases import BenchmarkCase, chosen, replicas_of, scene_of
 from dsa_des.record.recording import MemorySink, Recorder, Sink
-from dsa_des.replicas.lockstep import LockStep
+from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say_json
@@ -120,7 +120,7 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
     recorder = Recorder([sink])
     started = time.process_time()
     simulation = (
-        LockStep(scenes, recorder=recorder) if scenes else Simulation(scene, recorder=recorder)
+        lock_step(scenes, recorder=recorder) if scenes else Simulation(scene, recorder=recorder)
     )
     build_s = time.process_time() - started
     cpu_s = _timed(simulation.run)
@@ -131,11 +131,10 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
 
 def _scans(simulation: Simulation) -> int:
     """Count the scans of all sensors, one replica at a time so that it takes no memory."""
-    time_of = simulation.replicas
-    starts = [0] if time_of is None else [r * time_of.span_ticks for r in range(time_of.replicas)]
-    length = simulation.end_tick if time_of is None else time_of.end_tick
+    time_of = simulation.time
+    starts = [r * time_of.span_ticks for r in range(time_of.replicas)]
     clocks = [node.clock for node in simulation.nodes.values() if node.clock is not None]
-    return sum(len(clock.between(s, s + length)[0]) for clock in clocks for s in starts)
+    return sum(len(clock.between(s, s + time_of.run_ticks)[0]) for clock in clocks for s in starts)
 
 
 def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:
