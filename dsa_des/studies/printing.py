@@ -40,6 +40,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
             row.append("" if line.expected is None else short(line.expected))
         table.add_row(*row)
     console.print(table)
+    if study.over:
+        console.print(
+            "intervals are over encounters like these, of which each counts once, whatever its "
+            "replicas"
+        )
     if tables.compared:
         console.print()
         console.print(_difference_table(tables, {line.result.name for line in lines}))
