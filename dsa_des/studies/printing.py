@@ -43,6 +43,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     notes = {result.name: result.meaning for result in tables.results}
     group = len(tables.rows.axes)
     print_table(console, shortened(study.title), heads, rows, group=group, notes=notes)
+    if study.over:
+        console.print(
+            "intervals are over encounters like these, of which each counts once, whatever its "
+            "replicas"
+        )
     if tables.compared:
         console.print()
         _show_differences(console, tables, {line.result.name for line in lines})

@@ -115,7 +115,7 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
 def _rests_on_few(successes: FloatArray, trials: FloatArray) -> bool:
     """Return whether few units say how trials hang together: few in all, or few unlike the rest."""
     unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
-    return len(trials) < FEW or bool(unlike < FEW_UNLIKE)
+    return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
 
 def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:

@@ -143,6 +143,19 @@ def test_latin_hypercubes_are_never_too_narrow() -> None:
     assert held / (ROUNDS // 4) >= 0.93
 
 
+@pytest.mark.parametrize(("half_width", "event"), [(0.25, False), (0.4, False), (0.1, True)])
+def test_cells_that_stop_when_their_interval_is_narrow(half_width: float, event: bool) -> None:
+    def stopped(random: Random) -> Estimate:
+        values = (random.random(200) < 0.1) * 1.0 if event else random.normal(0.1, 1.0, 200)
+        for end in range(10, 201, 10):
+            e = share(values[:end], np.ones(end), LEVEL) if event else mean(values[:end], LEVEL)
+            if e.half_width <= half_width:
+                return e
+        return e
+
+    assert 0.93 <= coverage(stopped, 0.1) <= 0.975
+
+
 RESULTS = [Result("time_s", NUMBER, ""), Result("seen", EVENT, ""), Result("looks", SHARE, "")]
 #: Means of the population from which `folder_study` draws encounters.
 TRUTHS = {"time_s": 7.0, "seen": 0.6, "looks": 0.6}

@@ -22,7 +22,7 @@ _PAGE = """# What accuracy costs
 
 For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their time; cruder ones save fractions of a microsecond, dearer ones bring nothing:
 1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad in the flown encounter.
-2. **Radar**: take the exact Pd: for one pulse the table costs the same and Gram-Charlier {gram_times} times as much. A threshold or a range boundary saves up to {boundary_saves} µs and moves first detection by {threshold_km} to {boundary_km} km.
+2. **Radar**: take the exact Pd: for one pulse the table costs the same and Gram-Charlier {gram_times} times as much. A threshold or a range boundary saves up to {boundary_saves} µs and sees first at least {threshold_km} to {boundary_km} km nearer; how much more is not measured, as the exact radar sees the intruder from where the scene begins.
 3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) is nearly as good in level flight ({exact_gained} detections too many) but sees {flown_km} km too early in the flown encounter; boundary and line are {eo_boundary_km} and {eo_line_km} km off. A mesh costs {mesh_times} times the union and is no better.
 4. **Fusion**: a window of 0.1 s is worth its {window_extra} µs: it raises the fused share from {share} to {window_share} and adds {window_range} m to the range error (95th percentile).
 
@@ -34,7 +34,9 @@ every rung in turn, everything else fixed, on common random numbers. Made by
 ## How to read the tables
 
 *First seen*: of all pairs of sensor and target, the largest change in the range of the first
-detection, and the change of its time. *Gained, lost*: detections (sensor, target, instant) that only
+detection, and the change of its time. The radar's reference sees from the first scan on, in the
+thesis's scene (12 km) and in the flown encounter: what its rungs lose there is a lower bound.
+*Gained, lost*: detections (sensor, target, instant) that only
 the rung, only the reference has. *Fused*: share of fused rows with two sensors or more. **Bold**
 rungs are on the front: none is both cheaper and nearer to the reference. Costs that differ by less
 than 10 % come in another order in another run and are given one value.
