@@ -86,7 +86,7 @@ def test_angles_are_of_the_sensor_whose_coarser_step_is_the_finest(fusion):
 
 
 def test_a_beam_s_instants_are_passed_on_as_they_are():
-    """Two sensors saw the target at other instants: the true range is that of the angles' sensor."""
+    """Two sensors saw it at other instants: the true range is that of the angles' sensor."""
     radar = sensor("radar.range_boundary", beam_sweep=True, azimuth_deg=[-90, 70])
     found = run(chain({"radar": radar, "eye": SEES_ALL}, fusion={"type": "fusion.pick_best"}))
     for row in rows(found, "fused"):
