@@ -204,3 +204,32 @@ def test_the_ownship_turns_for_what_is_near_and_not_all_the_time():
     paused, _ = turned(20.0, turn_deg=5.0, pause_s=2.5)
     assert [row["time_s"] for row in paused] == [0.0, 2.5, 5.0, 7.5]
     assert len(turned(20.0, turn_deg=5.0, pause_s=30)[0]) == 1
+
+
+@pytest.mark.parametrize("nearer", ["left", "right"])
+def test_it_is_the_nearest_track_that_is_turned_away_from(nearer):
+    """Two hovering targets on both sides, and names that sort the other way round."""
+    targets = []
+    for name, azimuth_deg in (("left", -20.0), ("right", 20.0)):
+        bearing = math.radians(217.0 + azimuth_deg)
+        range_m = 1500.0 if name == nearer else 2500.0
+        targets.append(
+            {
+                "name": name,
+                "east_m": range_m * math.sin(bearing),
+                "north_m": range_m * math.cos(bearing),
+                "up_m": 900.0 if name == nearer else -40.0,
+            }
+        )
+    own = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400, "heading_deg": 217}
+    scene = chain(
+        {"radar": sensor("radar.range_boundary")}, ownship={**own, "speed_mps": 40.0},
+        targets=targets, fusion={"type": "fusion.pick_best"}, tracker=TRACKER,
+    )  # fmt: skip
+    scene["blocks"]["avoidance"] = {"type": "avoidance.turn_away"}
+    scene["wires"] += [
+        "tracker -> avoidance",
+        {"from": "avoidance", "to": "traffic", "delay_s": 0.1, "holds": "nothing"},
+    ]
+    (told,) = rows(run(scene), "manoeuvres")
+    assert (told["turn_rad"] > 0) is (nearer == "left")
