@@ -80,6 +80,21 @@ def test_a_range_is_the_farthest_looked_at(kind):
     assert look(kind, range_km=near_km - 0.001)[0] == set()
 
 
+@pytest.mark.parametrize("range_km", [3.0, 11.0])
+@pytest.mark.parametrize(
+    ("kind", "margin"),
+    [
+        ("radar.range_boundary", lambda ratio: 40.0 * math.log10(ratio)),
+        ("optical.range_boundary", lambda ratio: ratio**2 - 1.0),
+    ],
+)
+def test_the_confidence_inside_a_boundary_is_the_margin_to_it(kind, margin, range_km):
+    """In dB of an echo that goes with the fourth power, or in pixels that go with the square."""
+    found = rows(alone(kind, range_km=range_km), block="sensor")
+    for row, here_km in zip(found, RANGES_KM, strict=True):
+        assert row["confidence"] == pytest.approx(margin(range_km / here_km), rel=1e-9)
+
+
 SKEW = (-35.0, 21.0, -75.0)
 
 
