@@ -129,3 +129,20 @@ def test_noise_that_crosses_the_threshold_is_as_strong_as_that_takes(kind, pulse
     expected = [row["snr_db"] - row["confidence"] for row in true]
     assert max(zero) - min(zero) < 1e-9
     assert max(zero) == pytest.approx(expected[0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("allowed", "range_km", "left_out"),
+    [(None, 3.0, False), (0.05, 3.0, True), (1e-6, 3.0, False), (0.05, 300.0, False)],
+)
+def test_an_allowed_error_of_pd_leaves_drizzle_out_where_it_is_small(allowed, range_km, left_out):
+    """0.02 mm/h cost 0.06 dB to 3 km and back, a hundred times that to 300 km."""
+    radar = sensor("radar.swerling", range_km=range_km)
+    accuracy = {} if allowed is None else {"accuracy": {"detection_probability": allowed}}
+    drizzle = {"rain_rate_mm_h": 0.02, "rain_top_m": 9000.0}
+    dry = first_look(chain({"radar": radar}), "radar")
+    wet = first_look(chain({"radar": radar}, weather=drizzle, **accuracy), "radar")
+    for name, row in dry.items():
+        lost_db = row["snr_db"] - wet[name]["snr_db"]
+        assert 0.0 <= lost_db < 0.06
+        assert (lost_db == 0.0) is left_out
