@@ -199,15 +199,16 @@ def test_areas_of_the_bodies(carrier, band, tmp_path):
     blocks = ("eye", "lit") if band == "eo" else ("warm", "hot")
     shown = {}
     none = dict.fromkeys(WARM if band == "ir" else AREAS, 0.0)
+    before = look(carrier, tmp_path, BASE)
     for key in none:
-        before, after = changed(carrier, tmp_path, {band: {**none, key: 40.0}})
+        after = look(carrier, tmp_path, {**BASE, band: {**none, key: 40.0}})
         shown[key] = area_m2(after[blocks[0]]) / 40.0
         assert 0.0 <= shown[key] <= 1.0 + 1e-9
         only(before, after, *blocks)
     around = shown["front_m2"] + shown.get("back_m2", 0.0)
     assert around == pytest.approx(1.0, rel=1e-9)
     # A level plate and a level cylinder: sine of the elevation, and off the long axis.
-    seen = look(carrier, tmp_path, BASE)["eye"]
+    seen = before["eye"]
     if carrier == "traffic.scripted.intruders":
         up = abs(math.sin(seen["true_elevation_rad"]))
         assert shown["horizontal_m2"] == pytest.approx(up, rel=1e-6)

@@ -49,6 +49,20 @@ def test_a_beam_goes_on_from_the_instant_of_a_late_picture(delayed):
         assert into_s == pytest.approx(lit_s(row, -60, 160, picture_s), abs=1e-5)
 
 
+def test_a_beam_meets_what_was_published_last():
+    """Positions every 0.1 s, and a sweep of half a second."""
+    radar = sensor("radar.range_boundary", **KEYS, **VIEW, beam_sweep=True)
+    scene = chain({"radar": radar})
+    scene["blocks"]["traffic"]["update_rate_hz"] = 10
+    found = rows(run(scene))
+    assert len(found) == 4
+    for row in found:
+        published_s = math.floor(10.0 * row["illuminated_s"]) / 10.0
+        assert published_s < row["illuminated_s"] - 1e-3
+        into_s = row["illuminated_s"] - row["scan"] / 2
+        assert into_s == pytest.approx(lit_s(row, -60, 160, published_s), abs=1e-5)
+
+
 @pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling", "optical.eo", "optical.ir"])
 def test_false_alarms_lie_in_the_field_of_view_of_the_mounted_sensor(kind):
     """Turned into the sensor's axes, and on its grid there."""

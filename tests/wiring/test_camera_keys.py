@@ -258,6 +258,26 @@ def test_contrast_falls_with_range_by_the_visibility(kind, weather, per_m):
         assert left == pytest.approx(math.exp(-per_m * row["true_range_m"]), rel=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["optical.eo", "optical.ir"])
+def test_a_target_covers_no_more_pixels_than_there_are(kind):
+    """Of 7 by 5 pixels over 2 by 1 deg: a picture of 70 by 35 m at 2 km."""
+    azimuth, elevation = np.degrees(crooked.angles(crooked.body(crooked.DIVING)))
+    view = {
+        "azimuth_deg": [azimuth - 1.0, azimuth + 1.0],
+        "elevation_deg": [elevation - 0.5, elevation + 0.5],
+        "azimuth_pixels": 7,
+        "elevation_pixels": 5,
+    }
+    large = {"front_m2": 1e4, "side_m2": 0.0, "horizontal_m2": 0.0}
+    small = {"front_m2": 500.0, "side_m2": 0.0, "horizontal_m2": 0.0}
+    range_m = float(np.linalg.norm(crooked.ned(crooked.DIVING)))
+    picture_m2 = math.radians(2.0) * math.radians(1.0) * range_m**2
+    for bodies, pixels in ((large, 35.0), (small, 35.0 * 500.0 / picture_m2)):
+        back = {**bodies, "back_m2": bodies["front_m2"]}
+        found = seen(kind, [{**crooked.DIVING, "eo": bodies, "ir": back}], **view)
+        assert found["diving"]["pixels"] == pytest.approx(pixels, rel=1e-9)
+
+
 def test_a_camera_that_sees_all_is_what_these_tests_start_from():
     assert SEES_ALL["azimuth_pixels"] * math.degrees(PIXEL_RAD) == pytest.approx(360.0)
     assert SEES_ALL["elevation_pixels"] * math.degrees(PIXEL_RAD) == pytest.approx(180.0)

@@ -75,3 +75,69 @@ def test_a_detection_of_another_sensor_may_be_as_old_as_the_time_gate(gate_s, to
     scene = chain(sensors, targets=[crooked.ROLLING], fusion=fusion)
     found = {row["time_s"]: row["sensors"] for row in rows(run(scene), "fused")}
     assert found == {0.0: "radar", 0.25: "radar+eye" if together else "eye"}
+
+
+def test_the_nearest_in_the_gate_belongs_together():
+    """Two targets 3 deg apart in a gate of 9 deg, and a radar that is off by 1 deg."""
+    bearing = {"near": 217.0, "far": 220.0}
+    targets = [
+        {
+            "name": name,
+            "east_m": range_m * math.sin(math.radians(bearing[name])),
+            "north_m": range_m * math.cos(math.radians(bearing[name])),
+            "up_m": 200.0,
+        }
+        for name, range_m in (("near", 1500.0), ("far", 1700.0))
+    ]
+    radar = {**HEARS_ALL, "misalignment_deg": [1.0, 0, 0]}
+    fusion = {"type": "fusion.gated", "angle_gate_deg": 9.0}
+    scene = chain({"radar": radar, "eye": SEES_ALL}, ownship=LEVEL, targets=targets, fusion=fusion)
+    found = rows(run(scene), "fused")
+    assert {row["sensors"] for row in found} == {"radar+eye"}
+    for row in found:
+        assert row["range_m"] == pytest.approx(row["true_range_m"], abs=1e-6)
+
+
+def test_the_latest_in_the_gate_belongs_together():
+    """A radar at 8 Hz and a camera at 0.6 s: of the looks in the gate that at 0.5 s counts."""
+    eye = {**SEES_ALL, "offset_s": 0.6}
+    radar = {**HEARS_ALL, "scan_rate_hz": 8}
+    fusion = {"type": "fusion.gated", "angle_gate_deg": 9.0, "time_gate_s": 0.4}
+    scene = chain({"radar": radar, "eye": eye}, targets=[crooked.ROLLING], fusion=fusion)
+    found = run(scene)
+    (seen,) = (row for row in rows(found, block="radar") if row["time_s"] == 0.5)
+    (row,) = (row for row in rows(found, "fused") if row["time_s"] == 0.6)
+    assert row["sensors"] == "radar+eye"
+    assert row["range_m"] == seen["range_m"]
+
+
+@pytest.mark.parametrize("kind", ["fusion.gated", "fusion.pick_best"])
+def test_false_alarms_pass_through_as_they_were_reported(kind):
+    """Each with its own sensor's name, a range from the radar only; no track is made of them."""
+    radar = {
+        **HEARS_ALL, "false_alarms": True, "cell_false_alarm_probability": 3e-4, "range_km": 3.0,
+        "azimuth_resolution_deg": 9.0, "elevation_resolution_deg": 9.0,
+        "range_resolution_m": 300.0, "scan_rate_hz": 10,
+    }  # fmt: skip
+    eye = {**SEES_ALL, "false_alarms_per_frame": 0.5, "scan_rate_hz": 15}
+    scene = chain(
+        {"radar": radar, "eye": eye}, targets=[crooked.ROLLING],
+        fusion={"type": kind} | ({"angle_gate_deg": 1e-3} if kind == "fusion.gated" else {}),
+        tracker={"type": "tracking.stub"},
+    )  # fmt: skip
+    found = run(scene)
+    columns = ("azimuth_rad", "elevation_rad", "range_m")
+    alone = {"radar": [], "eye": []}
+    for row in rows(found, "fused", target=None):
+        alone[row["sensors"]].append((row["time_s"], *(row[column] for column in columns)))
+        assert row["angle_source"] == row["sensors"]
+        assert row["range_source"] == ("radar" if row["sensors"] == "radar" else None)
+        assert row["true_range_m"] is None
+    for name, reported in alone.items():
+        expected = [
+            (row["time_s"], *(row[column] for column in columns))
+            for row in rows(found, block=name, target=None)
+        ]
+        assert len(expected) > 3
+        assert sorted(reported, key=str) == sorted(expected, key=str)
+    assert {row["target"] for row in rows(found, "tracks")} == {"rolling"}

@@ -113,6 +113,31 @@ def test_a_rule_of_m_in_n_needs_them_close_together():
     assert found["declared.radar"] == 0
 
 
+@pytest.mark.parametrize(("m", "n"), [(3, 4), (3, 5), (2, 2), (4, 5), (5, 8), (5, 9)])
+def test_scans_that_miss_count_among_the_n(tmp_path, m, n):
+    """A target that turns once a second shows a large side to two of four scans."""
+    nodes = [(az, el) for az in range(0, 360, 10) for el in (-90, 90)]
+    lines = [f"{az},{el},{30 if 5 < az < 175 else -60}" for az, el in nodes]
+    path = tmp_path / "rcs.csv"
+    path.write_text("\n".join(["az_deg,el_deg,dbsm", *lines]) + "\n", encoding="utf-8")
+    turning = {
+        "name": "turning", "east_m": -1500.0, "north_m": -1500.0, "up_m": 100.0,
+        "heading_deg": 10.0, "speed_mps": 5.0, "pitch_deg": 0.0, "roll_deg": 0.0,
+        "rcs_table": str(path), "legs": [{"kind": "turn", "rate_deg_s": 360}],
+    }  # fmt: skip
+    radar = {**HEARS_ALL, "scan_rate_hz": 4, "threshold_db": 20.0}
+    looked = chain({"radar": radar}, targets=[turning], duration_s=4)
+    hits = [row["scan"] for row in rows(run(looked))]
+    assert {b - a for a, b in pairwise(hits)} == {1, 3}
+    expected = next(
+        (scan for scan in hits if sum(scan - n < other <= scan for other in hits) >= m), None
+    )
+    found = measured(looked, {"metric": "declaration", "m": m, "n": n})
+    assert found["declared.radar"] == (expected is not None)
+    if expected is not None:
+        assert found["declaration_time_s.radar"] == pytest.approx(expected / 4)
+
+
 @covers("target", "sensors", of=("[metric fused_share]",))
 @pytest.mark.parametrize("target", [None, "diving"])
 def test_shares_of_fused_detections(recorded, target):
@@ -161,19 +186,21 @@ def test_ages_of_what_the_fusion_holds(recorded, target):
 
 
 @covers("target", "break_after_s", of=("[metric track_updates]",))
+@pytest.mark.parametrize("target", ["rolling", "diving"])
 @pytest.mark.parametrize("break_after_s", [0.22, 1.0])
-def test_updates_and_breaks_of_tracks(recorded, break_after_s):
-    keys = {"target": "diving", "break_after_s": break_after_s}
+def test_updates_and_breaks_of_tracks(recorded, target, break_after_s):
+    """The one that leaves early is held on, and no longer updated."""
+    keys = {"target": target, "break_after_s": break_after_s}
     found = measured(scene(), {"metric": "track_updates", **keys})
-    times = [row["time_s"] for row in rows(recorded, "tracks", target="diving", age_s=0.0)]
+    held = rows(recorded, "tracks", target=target)
+    times = [row["time_s"] for row in held if row["age_s"] == 0.0]
+    assert (len(held) > len(times) + 3) is (target == "rolling")
     gaps = np.diff(times)
     assert found["track_update_interval_s"] == pytest.approx(np.mean(gaps))
     broken = np.maximum(gaps - break_after_s, 0.0)
     assert found["track_continuity"] == pytest.approx(1.0 - broken.sum() / gaps.sum())
     assert found["track_breaks"] == np.count_nonzero(broken > 0.0)
     assert bool(broken.any()) is (break_after_s < 1)
-    other = measured(scene(), {"metric": "track_updates", "target": "rolling"})
-    assert other["track_update_interval_s"] != found["track_update_interval_s"]
 
 
 @covers("target", of=("[metric position_error]",))

@@ -62,6 +62,18 @@ def test_the_noise_of_a_position_is_of_its_own_axis(axis):
     assert abs(np.mean(off, axis=0)[axis]) < 2.0
 
 
+def attitude_of(pair: list) -> tuple[float, float, float]:
+    """Return the believed yaw, pitch and roll that two lines of sight in both frames tell."""
+    body = [crooked.direction(r["azimuth_rad"], r["elevation_rad"]) for r in pair]
+    level = [crooked.direction(r["ned_azimuth_rad"], r["ned_elevation_rad"]) for r in pair]
+    frames = [np.column_stack([a, b, np.cross(a, b)]) for a, b in (body, level)]
+    matrix = frames[0] @ np.linalg.inv(frames[1])  # NED to body
+    yaw = math.atan2(matrix[0, 1], matrix[0, 0])
+    pitch = -math.asin(matrix[0, 2])
+    roll = math.atan2(matrix[1, 2], matrix[2, 2])
+    return yaw, pitch, roll
+
+
 @covers("attitude_noise_deg", of=("[navigation]",))
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_the_noise_of_an_attitude_is_of_its_own_angle(axis):
@@ -73,13 +85,7 @@ def test_the_noise_of_an_attitude_is_of_its_own_angle(axis):
         by_scan.setdefault(row["scan"], []).append(row)
     off = []
     for pair in by_scan.values():
-        body = [crooked.direction(r["azimuth_rad"], r["elevation_rad"]) for r in pair]
-        level = [crooked.direction(r["ned_azimuth_rad"], r["ned_elevation_rad"]) for r in pair]
-        frames = [np.column_stack([a, b, np.cross(a, b)]) for a, b in (body, level)]
-        matrix = frames[0] @ np.linalg.inv(frames[1])  # NED to body
-        yaw = math.atan2(matrix[0, 1], matrix[0, 0])
-        pitch = -math.asin(matrix[0, 2])
-        roll = math.atan2(matrix[1, 2], matrix[2, 2])
+        yaw, pitch, roll = attitude_of(pair)
         wrong = np.degrees([yaw, pitch, roll]) - ATTITUDE
         off.append((wrong + 180.0) % 360.0 - 180.0)
     spread = np.std(off, axis=0)
@@ -93,3 +99,20 @@ def test_what_is_measured_does_not_depend_on_what_is_believed():
     plain = [[row[c] for c in columns] for row in believed(rate=10)]
     biased = believed(rate=10, position_bias_m=[500, 500, 500], attitude_bias_deg=[9, 9, 9])
     assert [[row[c] for c in columns] for row in biased] == plain
+
+
+def test_the_noises_of_position_and_attitude_have_nothing_to_do_with_each_other():
+    """Six series of 150 draws: any two correlate by less than a third."""
+    by_scan: dict[int, list] = {}
+    noise = {"position_noise_m": [8, 8, 8], "attitude_noise_deg": [2, 2, 2]}
+    for row in believed(rate=150, **noise):
+        by_scan.setdefault(row["scan"], []).append(row)
+    errors = []
+    for pair in by_scan.values():
+        own = crooked.geodetic(crooked.position(crooked.OWNSHIP, pair[0]["time_s"]))
+        place = pair[0]["own_lat_deg"], pair[0]["own_lon_deg"], pair[0]["own_alt_m"]
+        yaw, pitch, roll = attitude_of(pair)
+        wrong = (np.degrees([yaw, pitch, roll]) - ATTITUDE + 180.0) % 360.0 - 180.0
+        errors.append([*pymap3d.geodetic2ned(*place, *own), *wrong])
+    correlation = np.corrcoef(np.array(errors).T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.33

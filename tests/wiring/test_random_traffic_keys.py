@@ -59,6 +59,20 @@ def test_speeds_lie_between_the_slowest_and_the_fastest(slow, fast):
     assert np.mean(moved) == pytest.approx(0.5 * (slow + fast), abs=2 * margin)
 
 
+def test_they_fly_in_all_directions():
+    """Of 300 headings each quarter of the compass has about 75, wherever they start."""
+    found = looked()
+    moved = np.array([found[0.5][name] - found[0.0][name] for name in found[0.0]])
+    heading = np.degrees(np.arctan2(moved[:, 1], moved[:, 0])) % 360.0
+    share, _ = np.histogram(heading, bins=[0, 90, 180, 270, 360])
+    assert share.min() > 45
+    start = np.array(list(found[0.0].values()))
+    bearing = np.degrees(np.arctan2(start[:, 1], start[:, 0])) % 360.0
+    assert np.histogram(bearing, bins=[0, 90, 180, 270, 360])[0].min() > 45
+    for one, other in ((heading, bearing), (heading, -start[:, 2]), (bearing, -start[:, 2])):
+        assert abs(np.corrcoef(one, other)[0, 1]) < 0.2
+
+
 @covers("update_rate_hz", of=("traffic.random",))
 def test_positions_are_held_between_updates():
     still = looked(update_rate_hz=1)

@@ -80,10 +80,32 @@ def test_a_range_is_the_farthest_looked_at(kind):
     assert look(kind, range_km=near_km - 0.001)[0] == set()
 
 
+@pytest.mark.parametrize("range_km", [3.0, 11.0])
+@pytest.mark.parametrize(
+    ("kind", "margin"),
+    [
+        ("radar.range_boundary", lambda ratio: 40.0 * math.log10(ratio)),
+        ("optical.range_boundary", lambda ratio: ratio**2 - 1.0),
+    ],
+)
+def test_the_confidence_inside_a_boundary_is_the_margin_to_it(kind, margin, range_km):
+    """In dB of an echo that goes with the fourth power, or in pixels that go with the square."""
+    found = rows(alone(kind, range_km=range_km), block="sensor")
+    for row, here_km in zip(found, RANGES_KM, strict=True):
+        assert row["confidence"] == pytest.approx(margin(range_km / here_km), rel=1e-9)
+
+
+SKEW = (-35.0, 21.0, -75.0)
+
+
 @covers("mount_azimuth_deg", "mount_elevation_deg", "mount_roll_deg", of=SENSORS)
-@pytest.mark.parametrize("kind", SENSORS)
-@pytest.mark.parametrize("mount", [(25.0, 0.0, 0.0), (0.0, -14.0, 0.0), (0.0, 0.0, 40.0),
-                                   (-35.0, 21.0, -75.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "mount"),
+    [
+        *((kind, SKEW) for kind in SENSORS),
+        *(("optical.ir", mount) for mount in ((25.0, 0, 0), (0, -14.0, 0), (0, 0, 40.0))),
+    ],
+)
 def test_fields_of_view_turn_with_the_mounting(kind, mount):
     """Narrow windows round a target's direction in the sensor's axes, and beside it."""
     keys = dict(

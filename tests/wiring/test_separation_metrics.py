@@ -95,3 +95,18 @@ def test_the_closest_approach_is_a_slant_range():
     slant = [float(np.linalg.norm(crooked.ned(passing, t))) for t in times]
     assert found["closest_approach_m"] == pytest.approx(min(slant), abs=0.05)
     assert found["closest_approach_time_s"] == pytest.approx(times[int(np.argmin(slant))], abs=0.11)
+
+
+def test_the_closest_approach_is_not_where_the_level_distance_is_smallest():
+    """A target that comes nearer on the level while it climbs away."""
+    leaving = {
+        "name": "leaving", "east_m": -300.0, "north_m": -200.0, "up_m": 30.0,
+        "heading_deg": 100.0, "speed_mps": 30.0, "climb_mps": 90.0,
+    }  # fmt: skip
+    found = measured(encounter(leaving, duration_s=4), "closest_approach")
+    times = np.arange(0.0, 4.05, 0.1)
+    lines = np.array([crooked.ned(leaving, t) for t in times])
+    slant, level = np.linalg.norm(lines, axis=1), np.hypot(lines[:, 0], lines[:, 1])
+    assert abs(int(np.argmin(slant)) - int(np.argmin(level))) > 5
+    assert found["closest_approach_m"] == pytest.approx(slant.min(), abs=0.05)
+    assert found["closest_approach_time_s"] == pytest.approx(times[int(np.argmin(slant))])

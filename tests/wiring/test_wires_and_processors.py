@@ -56,6 +56,24 @@ def test_a_delay_in_scans_is_of_the_receiver_s_clock(delay, scans):
         assert seen[time] == pytest.approx(plain[time - 0.25 * scans])
 
 
+def test_two_receivers_of_a_wire_each_count_their_own_scans():
+    sensors = {
+        "slow": sensor("radar.range_boundary", scan_rate_hz=4),
+        "fast": sensor("radar.range_boundary", scan_rate_hz=10, offset_s=0.05),
+    }
+    plain = chain(sensors, targets=ONE, duration_s=2)
+    late = chain(sensors, targets=ONE, duration_s=2)
+    late["wires"] = ["traffic -> transform -> gate"]
+    late["wires"] += [{"from": "gate", "to": name, "delay": "2 scans"} for name in sensors]
+    truth = {row["time_s"]: row["true_range_m"] for row in rows(run(plain))}
+    for name, before_s in (("slow", 0.5), ("fast", 0.2)):
+        seen = rows(run(late), block=name)
+        assert len(seen) > 5
+        for row in seen:
+            then = min(truth, key=lambda t: abs(t - (row["time_s"] - before_s)))
+            assert row["true_range_m"] == pytest.approx(truth[then], abs=1e-6)
+
+
 @covers("jitter_s", of=("[wires]",))
 @pytest.mark.parametrize("jitter_s", [0.01, 0.2])
 def test_jitter_is_the_largest_extra_delay(jitter_s):
