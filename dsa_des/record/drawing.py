@@ -88,7 +88,7 @@ def plain_log_ticks(axis: Any) -> None:
 
     low, high = axis.get_view_interval()
     decades = math.log10(high / low)
-    steps = (1.0, 2.0, 5.0) if decades < 2.5 else (1.0,)
+    steps: tuple[float, ...] = (1.0, 2.0, 5.0) if decades < 2.5 else (1.0,)
     if decades < 0.7:
         steps = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
     axis.set_major_locator(LogLocator(subs=steps, numticks=9))
