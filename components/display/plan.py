@@ -1,4 +1,4 @@
-"""``plan.png``: the run from above, and where each sensor detected what."""
+"""``plan.png``: the run from above, altitudes below it, and where each sensor detected what."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from components.display.altitudes import draw_altitudes
 from components.display.fields_of_view import draw_outline, outline_of, reach_text
 from components.display.flights import Flights, Track
 from components.display.labels import Labels
@@ -19,7 +20,7 @@ from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
-from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 MOST_NAMED = 8
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
+# The panel of altitudes below it, and what is between the two.
+_ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
 _OWN = "#000000"
 _TARGET = "#777777"
 
@@ -67,9 +70,10 @@ def draw_plan(
     }
     view = MapView(flights, marks, list(outlines.values()))
     width_in = _LEFT_IN + MAP_WIDTH_IN + _LEGEND_IN
-    height_in = _BOTTOM_IN + view.height_in + _TOP_IN
+    below_in = _BOTTOM_IN + _ALTITUDES_IN + _BETWEEN_IN
+    height_in = below_in + view.height_in + _TOP_IN
     left, right = _LEFT_IN / width_in, (_LEFT_IN + MAP_WIDTH_IN) / width_in
-    bottom, high = _BOTTOM_IN / height_in, view.height_in / height_in
+    bottom, high = below_in / height_in, view.height_in / height_in
     with drawing(width_in, height_in, path) as figure:
         axes = figure.add_axes((left, bottom, right - left, high))
         axes.set(xlim=view.x, ylim=view.y)
@@ -94,6 +98,12 @@ def draw_plan(
         if view.cropped:
             title += "; flights go on outside"
         axes.set_title(title, loc="left")
+        heights = figure.add_axes(
+            (left, _BOTTOM_IN / height_in, right - left, _ALTITUDES_IN / height_in)
+        )
+        px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
+        colours = (_OWN, _TARGET)
+        draw_altitudes(heights, flights, marks, detected.styles, px_per_s, colours)
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         handles = _legend(texts, detected, drawn, summary)
         figure.legend(

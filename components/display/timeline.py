@@ -77,7 +77,7 @@ def draw_timeline(
     with drawing(*_SIZE_IN, path) as figure:
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
         _draw_scans(above, scans, shown, detected.styles, close_up)
-        title = figure_text(simulation.scene.title, 60)
+        title = figure_text(simulation.scene.title, 28)  # the legend is beside it
         above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)

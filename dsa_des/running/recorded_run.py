@@ -41,6 +41,7 @@ def record_run(
     pacer: Pacer | None = None,
     told: bool = True,
     progress: Callable[[float], None] | None = None,
+    draw: bool = True,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
@@ -60,6 +61,8 @@ def record_run(
         Whether notes are written to standard error.
     progress : callable, optional
         Called with the simulated time in s after each window, instead of a bar.
+    draw : bool
+        Whether reports draw their figures.
 
     Raises
     ------
@@ -117,7 +120,8 @@ def record_run(
     summary["out"] = str(target.path)
     # The run has its name: whatever happens while figures are drawn, it is not lost.
     try:
-        notes += draw_all(reports, simulation, target.path, summary)
+        if draw:
+            notes += draw_all(reports, simulation, target.path, summary)
         write_run_json(target.path, info)  # with the figures among its files
     except OSError as error:
         what = f"figures cannot be written: {error.strerror or error}"

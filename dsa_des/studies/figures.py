@@ -1,6 +1,7 @@
 """Figures of a study: a result against an axis with intervals, heat maps, polar plots."""
 
 import math
+import textwrap
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -257,7 +258,7 @@ def draw_heat(path: Target, places: Places, metric: str, x: str, y: str, title: 
                     axes.text(c, r, _digits(value), ha="center", va="center", color=ink, size=8)
         axes.set_xlabel(axis_label(x))
         axes.set_ylabel(axis_label(y))
-        axes.set_title(figure_text(title, _TITLE), loc="left")
+        axes.set_title(textwrap.fill(figure_text(title, _TITLE), 44), loc="left")
         figure.colorbar(image, label=readable(metric))
         tight(figure)
 

@@ -1,5 +1,7 @@
 """Histograms and cumulative shares in studies: drawn alike each time, refused with reasons."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -62,3 +64,26 @@ def test_bins_cover_every_value() -> None:
     assert np.histogram(np.full(3, 7.0), _edges(np.full(3, 7.0), 3))[0].sum() == 3
     assert len(_edges(np.empty(0), 0)) == 2
     assert len(_edges(np.linspace(0, 1, 10**6), 10**6)) == 41
+
+
+def test_without_figures_nothing_of_matplotlib_is_imported(small: Path) -> None:
+    """A run and a study say so; both leave the same tables."""
+    Path("study.toml").write_text(STUDY + '[[figures]]\nmetric = "detected.ir"\n')
+    code = """
+import sys
+from dsa_des.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert end.code in (0, None), end.code
+sys.exit(any(name.partition(".")[0] == "matplotlib" for name in sys.modules))
+"""
+    for words in (("run", "small.toml", "--out", "r"),
+                  ("study", "study.toml", "--workers", "1", "--out", "s"),
+                  ("study", "show", "s")):  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words, "--no-figures"], capture_output=True, text=True
+        )
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+    assert not [*Path("r").glob("*.png"), *Path("s").glob("*.png")]
+    assert Path("r/detections.parquet").exists() and Path("s/summary.parquet").exists()
