@@ -15,7 +15,7 @@ from dsa_des.block.ports import Input
 from dsa_des.block.wake import Arrivals, Wake
 
 
-class Wire(Protocol):
+class WireEnd(Protocol):
     """The receiving end of a wire, as `dsa_des.running.channel.Channel` has it."""
 
     source: str
@@ -44,7 +44,7 @@ class Inputs:
     def __init__(
         self,
         declared: Mapping[str, Input],
-        wires: Mapping[str, Sequence[Wire]],
+        wires: Mapping[str, Sequence[WireEnd]],
         ticks_per_s: int,
         span_ticks: int = 0,
     ) -> None:
