@@ -21,6 +21,7 @@ from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.error_model import attitude_with_error, position_with_error
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.clock import nanosecond_of
 
 Belief = dict[str, FloatArray]
 Three = tuple[float, float, float]
@@ -64,8 +65,9 @@ class NavigationErrors(_Navigation):
 
         def believed(states: TrafficStates) -> Belief:
             # An instant may take more bits than a scan number has: the rest goes to the target.
-            high = (states.tick >> _SCAN_BITS).astype(np.uint64)
-            low = states.tick & ((1 << _SCAN_BITS) - 1)
+            instant = nanosecond_of(states.tick, block.context.ticks_per_s)
+            high = (instant >> _SCAN_BITS).astype(np.uint64)
+            low = instant & ((1 << _SCAN_BITS) - 1)
             draws = [stream.normal(high, low, draw) for draw in range(6)]
             lat, lon, alt = position_with_error(
                 states.own_lat_deg,

@@ -104,6 +104,7 @@ def _faults(scene: Scene, wire: Wire, everything: bool) -> WireFaults | None:
         wire.drop_probability,
         streams.stream(str(wire), "wire jitter"),
         streams.stream(str(wire), "wire loss"),
+        scene.ticks_per_s,
     )
 
 

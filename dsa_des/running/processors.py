@@ -18,6 +18,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Columns, Message, Text, static
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.scene.processor import ProcessorParameters
+from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream, key_of
 
 # Messages are finished before, and taken in after, every block of an instant.
@@ -121,6 +122,7 @@ class Service:
         self._least = round(parameters.service_s * ticks_per_s)
         self._spread = float(parameters.service_spread_s * ticks_per_s)
         self._stream = stream
+        self._ticks_per_s = ticks_per_s
         if self._least < 1:
             raise ValueError(f"processors.{name}: service_s is shorter than one tick")
 
@@ -128,7 +130,7 @@ class Service:
         """Return the time for each message, by its block and the tick at which it entered."""
         if not self._spread:
             return np.full(len(entered), self._least, dtype=np.int64)
-        pairs = zip(blocks, entered.tolist(), strict=True)
+        pairs = zip(blocks, nanosecond_of(entered, self._ticks_per_s).tolist(), strict=True)
         keys = np.array([key_of("job", block, tick) for block, tick in pairs], dtype=np.uint64)
         extra = np.rint(self._stream.uniform(keys, 0) * self._spread)
         return self._least + extra.astype(np.int64)

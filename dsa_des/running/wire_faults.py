@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
 
 
@@ -19,18 +20,23 @@ class WireFaults:
     drop_probability : float
     jitter, drops : Stream
         Draws named after the wire.
+    ticks_per_s : int
     """
 
     jitter_ticks: float
     drop_probability: float
     jitter: Stream
     drops: Stream
+    ticks_per_s: int
 
     def kept(self, ticks: IntArray) -> BoolArray:
         """Return which rows sent at `ticks` are not lost."""
-        return self.drops.uniform(ticks.astype(np.uint64), 0) >= self.drop_probability
+        return self.drops.uniform(self._keys(ticks), 0) >= self.drop_probability
 
     def lateness(self, ticks: IntArray) -> IntArray:
         """Return the extra delay of the rows sent at `ticks`, in ticks."""
-        draws = self.jitter.uniform(ticks.astype(np.uint64), 0)
+        draws = self.jitter.uniform(self._keys(ticks), 0)
         return np.rint(draws * self.jitter_ticks).astype(np.int64)
+
+    def _keys(self, ticks: IntArray) -> IntArray:
+        return nanosecond_of(ticks, self.ticks_per_s).astype(np.uint64)

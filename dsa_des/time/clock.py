@@ -75,6 +75,14 @@ def resolution(times_s: Iterable[Fraction]) -> int:
     return math.lcm(NANOSECONDS, *(time.denominator for time in times_s))
 
 
+def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
+    """Return the whole nanoseconds at ticks of any `resolution`, as keys of draws.
+
+    A block more or less in a scene may change the resolution; what an instant draws must not.
+    """
+    return ticks // max(1, ticks_per_s // NANOSECONDS)
+
+
 @dataclass(frozen=True)
 class ClockSpec:
     """What a scene says of a clock: rate in Hz, offset in s, rate error in ppm, jitter in s.
