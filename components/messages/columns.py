@@ -80,7 +80,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "processor": ("", "", "shared processor"),
         "entered_s": ("s", "", "when the message came to the processor"),
         "started_s": ("s", "", "when work on it began; null if never"),
-        "age_s": ("s", "", "from the instant it is about to its delivery"),
+        "age_s": ("s", "", "from when it was handed in to its delivery"),
         "queue_length": ("messages", "", "messages that waited behind it at its outcome"),
         "outcome": ("", "", "whether it was done, dropped or skipped"),
     },

@@ -11,7 +11,8 @@ import io
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from importlib.metadata import EntryPoint
+from functools import lru_cache
+from importlib.metadata import Distribution, EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -192,7 +193,13 @@ def installed(point: EntryPoint) -> Any:
 
 def is_ours(point: EntryPoint) -> bool:
     """Return whether this package itself registered an entry point."""
-    return point.dist is None or point.dist.name.lower().replace("_", "-") == _OURS
+    return point.dist is None or _name_of(point.dist) == _OURS
+
+
+@lru_cache(maxsize=64)
+def _name_of(distribution: Distribution) -> str:
+    """Return a package's name; studies ask for every block of every replica, and this parses."""
+    return distribution.name.lower().replace("_", "-")
 
 
 def _imported(module_name: str, beside: Sequence[Path]) -> Any:
