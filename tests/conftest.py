@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,8 @@ from hypothesis import HealthCheck, settings
 # A machine that is busy with something else is no defect of what is tested.
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy")
+# What runs tests in parallel sets the width of its own terminal, which our tables would obey.
+os.environ.pop("COLUMNS", None)
 
 ROOT = Path(__file__).parent.parent
 

@@ -61,7 +61,7 @@ def _describe_table(
     console.print(Text.assemble((name, "bold"), f"  {what}"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  name", "type", "unit", "default", "meaning"):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=heading.startswith("  "))
     for first, *rest in rows():
         table.add_row(Text(f"  {first}"), *map(Text, rest))
     console.print(table, highlight=False)
@@ -99,7 +99,7 @@ def _describe(console: Any, name: str, cls: type[Component]) -> None:
     console.print("parameters", style="bold")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  name", "type", "unit", "default", "meaning"):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=heading.startswith("  "))
     for row in parameter_rows(cls.Parameters):
         table.add_row(*row)
     console.print(table, highlight=False)
@@ -117,7 +117,7 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
     console.print("hooks, what effects may act on", style="bold")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  hook", "what it calls", "effects"):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=heading.startswith("  "))
     for hook, how in sorted(hooks.items()):
         names = ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
         table.add_row(f"  {hook}", how, names or "-")
@@ -131,7 +131,7 @@ def _describe_ladder(console: Any, ladder: Ladder) -> None:
                   highlight=False)  # fmt: skip
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("  rung", "type", "what it is"):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=heading.startswith("  "))
     for rung in ladder.rungs:
         reference = " (reference)" if rung.name == ladder.reference else ""
         table.add_row(f"  {rung.name}{reference}", rung.type_name or "as it is", rung.what)
