@@ -56,7 +56,8 @@ def test_wavelength_of_35_ghz():
 
 def test_too_close_is_no_echo_and_finite():
     nearest = OASYS.nearest_m
-    assert nearest == pytest.approx(1.55, abs=0.01)
+    # Far field 2D²/λ of an antenna whose gain is 4π(πD²/4)/λ²: 2 G λ/π².
+    assert nearest == pytest.approx(2 * 10**2.95 * 8.57e-3 / math.pi**2, rel=1e-9)
     echo = OASYS.snr([0.0, 5e-324, nearest * (1 - 1e-12), nearest, 1e300], 1.0)
     np.testing.assert_array_equal(echo[:3], 0.0)
     assert echo[3] > 1e10

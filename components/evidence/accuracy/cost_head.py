@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.types import AnyArray
 from dsa_des.record.recording import ColumnSink, Recorder
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -84,9 +85,9 @@ def radar_sees_from(scene: Scene) -> str:
     simulation.run()
     tables = sink.tables()
 
-    def ours(table: str, column: str) -> np.ndarray[Any, Any]:
-        block = tables[table]["block"]
-        here = np.array([*block.names, None], dtype=object)[block.codes] == "radar"  # type: ignore[union-attr]
+    def ours(table: str, column: str) -> AnyArray:
+        block: Any = tables[table]["block"]
+        here = np.array([*block.names, None])[block.codes] == "radar"
         return np.asarray(tables[table][column])[here]
 
     times_s, ranges_m = ours("detections", "time_s"), ours("detections", "true_range_m")
