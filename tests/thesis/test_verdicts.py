@@ -85,7 +85,8 @@ def test_only_a_prediction_counts_and_only_once() -> None:
     ]
     assert tally(rows) == (
         "6 rows: 2 predicted, 1 calibrated, 1 configured, 1 differs because, 1 no value printed. "
-        "Only a prediction counts as agreement: of 2 printed numbers that are predicted, 1 agree."
+        "Only a prediction counts as agreement: of 2 printed numbers that are predicted, "
+        "1 agree: a."
     )
 
 

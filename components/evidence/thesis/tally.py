@@ -6,7 +6,7 @@ from components.evidence.thesis.row import VERDICTS, Row
 
 
 def tally(rows: Sequence[Row], mark: str = "") -> str:
-    """Return one line: how many rows there are by verdict, and how many are agreement.
+    """Return one line: how many rows there are by verdict, and which are agreement.
 
     Parameters
     ----------
@@ -16,9 +16,10 @@ def tally(rows: Sequence[Row], mark: str = "") -> str:
     """
     verdicts = [row.verdict for row in rows]
     counts = ", ".join(f"{verdicts.count(name)} {mark}{name}{mark}" for name in VERDICTS)
-    agree = sum(row.counts for row in rows)
+    agree = [row.quantity for row in rows if row.counts]
+    which = f": {'; '.join(agree)}" if agree else ""
     tried = sum(row.predicts for row in rows)
     return (
         f"{len(rows)} rows: {counts}. Only a prediction counts as agreement: of {tried} printed "
-        f"numbers that are predicted, {agree} agree."
+        f"numbers that are predicted, {len(agree)} agree{which}."
     )
