@@ -1,4 +1,4 @@
-"""Where the shipped scenes and studies lie."""
+"""The folder of the shipped scenes and studies."""
 
 from pathlib import Path
 

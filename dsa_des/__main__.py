@@ -26,7 +26,7 @@ def start() -> None:
 def _without_working_directory() -> None:
     """Take the working directory off the module path, where ``python -m`` puts it first.
 
-    A folder ``components`` there is somebody else's. The folder that we were imported from stays.
+    A folder ``components`` there is not ours. The folder that we were imported from stays.
     """
     home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     if not sys.flags.safe_path and sys.path[:1] == [os.getcwd()] != [home]:

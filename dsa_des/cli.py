@@ -45,6 +45,9 @@ def _optional_scene_options(command: Callable[..., None]) -> Callable[..., None]
     return _scene_options(command, scene_required=False)
 
 
+_figures_option = click.option(
+    "--no-figures", is_flag=True, help="Draw nothing; results are the same."
+)
 _everything_option = click.option(
     "--simulate-everything",
     is_flag=True,
@@ -66,6 +69,7 @@ def main() -> None:
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-NNN].")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON only.")
+@_figures_option
 @_everything_option
 @click.option(
     "--realtime",
@@ -201,6 +205,7 @@ _workers_option = click.option(
 @click.option("--scheduler", metavar="ADDR", help="Dask scheduler, e.g. tcp://localhost:8786.")
 @click.option("--out", metavar="DIR", help="Folder for the results [default: studies/STUDY-NNN].")
 @click.option("--metrics", is_flag=True, help="List what studies can measure.")
+@_figures_option
 @click.option("--quiet", is_flag=True, help="Print no tables.")
 @plain_errors
 def study(**options: Any) -> None:

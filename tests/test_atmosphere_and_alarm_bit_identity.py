@@ -21,11 +21,9 @@ from components.radar.beam_sweep import illumination_offset_s
 from components.radar.clutter import clutter_detection_probability
 from components.radar.false_alarms import (
     false_alarm_count,
-    false_alarm_positions,
     false_alarm_snr,
 )
 from components.radar.ground_clutter import ground_clutter_rcs_m2
-from components.radar.resolution_cells import ResolutionCells
 
 COUNT = 10_000
 WEATHER = attenuation_table(
@@ -35,7 +33,6 @@ WEATHER = attenuation_table(
     fog_liquid_water_g_m3=0.1,
     fog_top_m=900.0,
 )
-CELLS = ResolutionCells(220, 40, 86, (-1.9, 3.8), (-0.3, 0.6), (0.0, 6500.0))
 
 
 def in_clutter(model, kind):
@@ -82,7 +79,6 @@ CASES = {
         range_resolution_m=76.2,
     ),
     "count": lambda a, b, c: false_alarm_count(a, cells=10_000, false_alarm_probability=0.01),
-    "where": lambda a, b, c: false_alarm_positions(a, b, c, CELLS)[1],
     "alarm_snr": lambda a, b, c: false_alarm_snr(a, false_alarm_probability=0.01, pulses=3),
     "alarm_snr_1": lambda a, b, c: false_alarm_snr(a, false_alarm_probability=0.01),
     "sweep": lambda a, b, c: illumination_offset_s(

@@ -11,7 +11,7 @@ from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import KnownTraffic
 from components.geometry import ellipsoid
 from components.geometry.enu import enu_to_geodetic
-from components.line_of_sight.transform import LINES_OF_SIGHT
+from components.geometry.line_of_sight import LineOfSight
 from components.line_of_sight.true_reach import true_reach_m
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import MemorySink, Recorder
@@ -86,7 +86,7 @@ def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
                 level * np.sin(bearing), level * np.cos(bearing), up,
                 reference_lat_deg=own[0], reference_lon_deg=own[1], reference_alt_m=own[2],
             )  # fmt: skip
-            seems = LINES_OF_SIGHT[model](*own, *target)[2] <= reach_m
+            seems = LineOfSight(model).in_ned(*own, *target)[2] <= reach_m
             truly = ellipsoid.line_of_sight(*own, *target)[2]
             assert seems.sum() > pairs / 10
             assert (truly[seems] <= true_m).all()

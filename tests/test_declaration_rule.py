@@ -1,14 +1,11 @@
 """The m-of-n rule against counting by hand, in any division into windows."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.sensor.declaration import (
-    declaration_probability,
     declare,
     declare_looks,
     no_looks_yet,
@@ -63,13 +60,6 @@ def test_one_of_one_is_the_detection_itself():
     assert declare(np.empty((2, 0)), 2, 3, no_looks_yet(3, 0))[0].shape == (2, 0)
 
 
-def test_declaration_probability_is_the_binomial_tail():
-    for m, n in ((1, 1), (2, 3), (3, 5), (5, 5)):
-        for p in (0.0, 1e-9, 0.045, 0.9, 1.0):
-            tail = sum(math.comb(n, k) * p**k * (1 - p) ** (n - k) for k in range(m, n + 1))
-            assert declaration_probability(p, m, n) == pytest.approx(tail, rel=1e-12, abs=1e-300)
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -80,7 +70,6 @@ def test_declaration_probability_is_the_binomial_tail():
         (lambda: declare([[True]], 1, 2, no_looks_yet(3, 1)), "memory has the shape"),
         (lambda: declare_looks([1], [True], 1, 2, no_looks_yet(2, 1)), "target is 1"),
         (lambda: declare_looks([0], [True, False], 1, 2, no_looks_yet(2, 1)), "must be"),
-        (lambda: declaration_probability(1.2, 1, 2), "detection_probability is 1.2"),
     ],
 )
 def test_bad_input_is_named(call, words):

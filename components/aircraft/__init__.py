@@ -1,4 +1,4 @@
-"""What an aircraft is to a sensor, and which aircraft a run has."""
+"""Aircraft as sensors see them, and the aircraft of a run."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Aircraft", "Roster"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Aircraft": "components.aircraft.aircraft",
     "Roster": "components.aircraft.aircraft",

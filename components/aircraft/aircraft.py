@@ -1,4 +1,4 @@
-"""What an aircraft is to a sensor: radar cross-section, silhouette areas, contrast."""
+"""An aircraft as sensors see it: radar cross-section, silhouette areas, contrast."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -107,7 +107,7 @@ class Roster:
         return target_keys(self.names)
 
     def keys_of(self, targets: IntArray) -> AnyArray:
-        """Return the keys of some targets (n,); those that nobody asks for are never made."""
+        """Return the keys of some targets (n,); those not asked for are never made."""
         if "keys" in self.__dict__:
             return self.keys[targets]
         keys, known = self._keys_so_far

@@ -10,7 +10,7 @@ from dsa_des.block.component import Context
 class KnownTraffic:
     """What a traffic block offers: what its targets are, and where they can be.
 
-    Two offers are equal when their targets are and nobody has asked where these can be.
+    Two offers are equal when their targets are and it was not asked where these can be.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def known_targets(context: Context) -> tuple[Roster, ...]:
     Returns
     -------
     tuple of Roster
-        Empty where nobody says what the targets are: they may then be anything.
+        Empty where it is not said what the targets are: they may then be anything.
     """
     offers = (
         offer.roster if isinstance(offer, KnownTraffic) else offer

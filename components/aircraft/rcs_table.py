@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.geometry.wrapping import past
 
 # Beyond this the pole was meant and pi/2 was rounded.
 _POLE_DEG = 90.0 + 1e-9
@@ -30,7 +31,7 @@ def dbsm_to_m2(rcs_dbsm: ArrayLike) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class AspectTable:
+class RcsTable:
     """Hold an RCS over the direction of the radar in the target's body axes.
 
     Azimuth 0 and elevation 0 is nose-on; azimuth grows towards the right wing (90: seen from the
@@ -97,8 +98,7 @@ class AspectTable:
         beyond = np.abs(degrees) > _POLE_DEG
         refuse("elevation_rad", elevation, beyond, "lie in [-pi/2, pi/2]")
         first = self.azimuth_deg[0]
-        turned = np.mod(azimuth * (180.0 / np.pi) - first, 360.0)
-        turned = np.where(turned >= 360.0, 0.0, turned)  # -1e-20 mod 360 rounds to 360
+        turned = past(azimuth * (180.0 / np.pi) - first, 360.0)
         nodes = np.append(self.azimuth_deg - first, 360.0)
         left = np.searchsorted(nodes, turned, side="right") - 1
         right = np.where(left + 2 == nodes.size, 0, left + 1)
@@ -123,7 +123,7 @@ class AspectTable:
     @staticmethod
     def from_rows(
         az_deg: ArrayLike, el_deg: ArrayLike, dbsm: ArrayLike, *, symmetric: bool = False
-    ) -> AspectTable:
+    ) -> RcsTable:
         """Build a table from one row per node, in any order.
 
         Parameters
@@ -135,7 +135,7 @@ class AspectTable:
 
         Returns
         -------
-        AspectTable
+        RcsTable
 
         Raises
         ------
@@ -171,10 +171,10 @@ class AspectTable:
                     "it must have every azimuth at every elevation"
                 )
         grid = [[values[az, el] for az in azimuths] for el in elevations]
-        return AspectTable(np.array(azimuths), np.array(elevations), np.array(grid))
+        return RcsTable(np.array(azimuths), np.array(elevations), np.array(grid))
 
     @staticmethod
-    def from_csv(path: str | PathLike[str], *, symmetric: bool = False) -> AspectTable:
+    def from_csv(path: str | PathLike[str], *, symmetric: bool = False) -> RcsTable:
         """Read a table from CSV with the columns az_deg, el_deg and dbsm.
 
         Column names may be written in capitals, in any order, among others; rows may be in any
@@ -188,7 +188,7 @@ class AspectTable:
 
         Returns
         -------
-        AspectTable
+        RcsTable
 
         Raises
         ------
@@ -215,6 +215,6 @@ class AspectTable:
             raise ValueError(f"{path} is empty: it must have a header and one row per direction")
         nodes = np.array(rows)
         try:
-            return AspectTable.from_rows(*nodes.T, symmetric=symmetric)
+            return RcsTable.from_rows(*nodes.T, symmetric=symmetric)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from components.aircraft.table_rows import row_values, table_rows
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.geometry.wrapping import past
 
 _SQUARE_FOOT_M2 = 0.3048**2
 
@@ -29,7 +30,7 @@ _WIDEST_STEP_TO_NEIGHBOUR = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class AspectTable:
+class SilhouetteTable:
     """Hold a projected area over the direction of the observer in the target's body axes.
 
     Azimuth 0 and elevation 0 is nose-on; azimuth grows towards the right wing (90 = from the
@@ -117,10 +118,7 @@ class AspectTable:
             azimuth_rad=finite("azimuth_rad", azimuth_rad), elevation_rad=elevation
         )
         first = self.azimuth_deg[0]
-        # Turn into [first node, first node + 360); rounding may land on the far end, which is the
-        # first node again.
-        turned = np.mod(np.degrees(azimuth) - first, 360.0)
-        turned = np.where(turned >= 360.0, 0.0, turned)
+        turned = past(np.degrees(azimuth) - first, 360.0)
         offsets = self.azimuth_deg - first
         left = np.searchsorted(offsets, turned, side="right") - 1
         right = np.where(left + 1 == offsets.size, 0, left + 1)
@@ -150,7 +148,7 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
 
     Returns
     -------
-    AspectTable
+    SilhouetteTable
 
     Raises
     ------
@@ -161,8 +159,7 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
     elevation = finite("elevation_deg", elevation_deg).ravel()
     area = finite("area_m2", area_m2).ravel()
     refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
-    turned = np.mod(azimuth, 360.0)
-    turned = np.where(turned >= 360.0, 0.0, turned)
+    turned = past(azimuth, 360.0)
     nodes: dict[tuple[float, float], float] = {}
     for az, el, value in zip(turned.tolist(), elevation.tolist(), area.tolist(), strict=True):
         if nodes.setdefault((az, el), value) != value:
@@ -179,19 +176,19 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
                     f"the table has a hole: no area for the node az_deg {az:g}, el_deg {el:g}; "
                     "every azimuth needs every elevation"
                 )
-    return AspectTable(
+    return SilhouetteTable(
         np.array(azimuths),
         np.array(elevations),
         np.array([[nodes[az, el] for az in azimuths] for el in elevations]),
     )
 
 
-def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
+def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
     """Read a table from CSV with the columns az_deg, el_deg and an area.
 
     The area column carries its unit in its name: `area_m2`, `a_m2` or plain `area` are square
     metres, `area_ft2`, `a_ft2` and `a_ft` square feet. Other columns, blank lines and lines that
-    start with # are ignored. See `AspectTable` for the axes.
+    start with # are ignored. See `SilhouetteTable` for the axes.
 
     Parameters
     ----------
@@ -199,7 +196,7 @@ def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
 
     Returns
     -------
-    AspectTable
+    SilhouetteTable
 
     Raises
     ------
@@ -223,7 +220,7 @@ def read_aspect_table(path: str | PathLike[str]) -> AspectTable:
         raise ValueError(f"{path} is empty: it must hold a header and one row per direction")
     nodes = np.array(rows)
     try:
-        table: AspectTable = table_from_nodes(nodes[:, 0], nodes[:, 1], nodes[:, 2])
+        table: SilhouetteTable = table_from_nodes(nodes[:, 0], nodes[:, 1], nodes[:, 2])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     return table

@@ -26,7 +26,7 @@ class TableFile:
     ----------
     path : Path
     table : object
-        `components.aircraft.rcs_table.AspectTable`, or that of `silhouette_table`.
+        `components.aircraft.rcs_table.RcsTable`, or that of `silhouette_table`.
     """
 
     path: Path
@@ -34,9 +34,9 @@ class TableFile:
 
 
 def _rcs(path: Path) -> Any:
-    from components.aircraft.rcs_table import AspectTable
+    from components.aircraft.rcs_table import RcsTable
 
-    return AspectTable.from_csv(path)
+    return RcsTable.from_csv(path)
 
 
 def _silhouette(path: Path) -> Any:

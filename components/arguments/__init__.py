@@ -1,1 +1,1 @@
-"""Which arguments physics functions accept, and how they become arrays."""
+"""Checks of the arguments of physics functions, and their way into arrays."""

@@ -1,1 +1,1 @@
-"""What the air does to radio waves and light on their way to the sensor."""
+"""The effect of the air on radio waves and light on their way to the sensor."""

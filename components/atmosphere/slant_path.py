@@ -46,7 +46,9 @@ def one_way_attenuation_db(
     loses no digits.
 
     The curvature of the Earth is ignored: on a sphere the middle of the path lies up to
-    R²/(8·6371 km) lower than here, R²/(12·6371 km) on average (see `curvature_error_bound`).
+    R²/(8·6371 km) lower than here, R²/(12·6371 km) on average. With the scale height of
+    water vapour, 2 km, that is 0.1 % of the attenuation over 10 km, 0.4 % over 20 km and 10 % over
+    100 km.
     """
     shape, (distance, own, target) = broadcast_flat(
         range_m=not_negative("range_m", range_m),
@@ -80,23 +82,6 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
     gone = attenuation > 1600.0
     factor = np.power(10.0, -0.2 * np.where(gone, 0.0, attenuation))
     return unflatten(np.where(gone, 0.0, factor), shape)
-
-
-def curvature_error_bound(range_m: ArrayLike, scale_height_m: float = 2000.0) -> Any:
-    """Return the largest relative error of the attenuation from ignoring the Earth's curvature.
-
-    expm1 of the path's greatest dip R²/(8·6371 km) over the attenuation's scale height (2 km for
-    water vapour, the fastest falling part of clear air): 0.1 % at 10 km, 0.4 % at 20 km, 10 % at
-    100 km. A layer's top (rain, fog) counts as displaced by the dip.
-
-    Raises
-    ------
-    ValueError
-        If a range is negative or not finite.
-    """
-    shape, (distance,) = broadcast_flat(range_m=not_negative("range_m", range_m))
-    dip_m = distance * (distance / (8.0 * EARTH_RADIUS_M))
-    return unflatten(np.expm1(np.minimum(dip_m / scale_height_m, 700.0)), shape)
 
 
 def _mean_gas(low: FloatArray, high: FloatArray, table: AttenuationTable) -> FloatArray:

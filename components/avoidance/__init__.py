@@ -1,1 +1,1 @@
-"""What the ownship does about what it sees."""
+"""The ownship's reaction to what it sees."""

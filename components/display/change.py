@@ -1,4 +1,4 @@
-"""What changed in what a run found: first detections, detections gained and lost, fused share."""
+"""The change in what a run found: first detections, detections gained and lost, fused share."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,13 +1,15 @@
 """The sensors' fields of view on the plan."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from components.display.styles import style_of
+from components.geometry.field_of_view import sector_width_rad
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.mark import Mark
 
 
 @dataclass
@@ -39,11 +41,10 @@ def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
     axes : BodyAxes
         How the sensor is mounted.
     """
-    low, high = reach.azimuth_rad
-    width = high - low if high >= low else high - low + 2 * math.pi
+    width = sector_width_rad(*reach.azimuth_rad)
     everywhere = width >= 2 * math.pi - 1e-9
     closed = math.isfinite(reach.range_max_m)
-    angle = low + np.linspace(0.0, min(width, 2 * math.pi), 181)
+    angle = reach.azimuth_rad[0] + np.linspace(0.0, min(width, 2 * math.pi), 181)
     if not closed:
         angle = angle[:0] if everywhere else angle[[0, -1]]
     radius_km = reach.range_max_m / 1000 if closed else 1.0
@@ -56,15 +57,17 @@ def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
     return Outline(corners, radius_km, closed)
 
 
-def draw_outline(axes: Any, outline: Outline, sensors: list[str], name: str, far_km: float) -> None:
+def draw_outline(
+    axes: Any, outline: Outline, styles: Mapping[str, Mark], name: str, far_km: float
+) -> None:
     """Draw a field of view: filled up to a range limit, or dashed edges without end.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
     outline : Outline
-    sensors : list of str
-        All sensors, for the colours.
+    styles : mapping of str to Mark
+        Of all sensors.
     name : str
         Whose field of view this is.
     far_km : float
@@ -72,17 +75,18 @@ def draw_outline(axes: Any, outline: Outline, sensors: list[str], name: str, far
     """
     from matplotlib.patches import Polygon
 
-    colour = style_of(sensors, name)[0]
+    colour = styles[name].colour
     corners = outline.corners_km
     if outline.closed:
         axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.06, zorder=0.5))
         axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.0, zorder=0.6))
         return
+    shift = 4 * list(styles).index(name)
     for edge in corners * far_km:
         # Shifted dashes keep two fields of view with the same edges apart.
         axes.plot(
             [0.0, edge[0]], [0.0, edge[1]], color=colour, linewidth=1.2,
-            linestyle=(4 * sensors.index(name), (6, 5)), zorder=0.7, scalex=False, scaley=False,
+            linestyle=(shift, (6, 5)), zorder=0.7, scalex=False, scaley=False,
         )  # fmt: skip
 
 

@@ -25,10 +25,12 @@ def draw(
     from components.display.flights import Flights
     from components.display.marks import Detected
     from components.display.plan import draw_plan
+    from components.display.styles import styles_of
     from components.display.timeline import draw_timeline
 
     flights = Flights.of(simulation, summary)
     detected = Detected.read(folder, sensors)
+    detected.styles = styles_of(detected.sensors, simulation.components)
     paths = []
     if flights is not None:
         paths.append(draw_plan(folder / "plan.png", simulation, flights, detected, summary))

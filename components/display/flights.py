@@ -32,6 +32,8 @@ class Track:
         NaN where the aircraft is not there.
     range_m : (points,)
         True slant range from the ownship; NaN where one of the two is not there.
+    alt_m : (points,)
+        Above the ellipsoid; NaN where the aircraft is not there.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Track:
     east_km: FloatArray
     north_km: FloatArray
     range_m: FloatArray
+    alt_m: FloatArray
 
     @property
     def along_km(self) -> FloatArray:
@@ -85,7 +88,7 @@ class Flights:
         #: Where the ownship's nose points at its start, clockwise from north.
         self.start_yaw_rad = float(own.yaw_rad[start])
         east, north = self._map(own)
-        self.own = Track("ownship", times, east, north, np.zeros(len(times)))
+        self.own = Track("ownship", times, east, north, np.zeros(len(times)), _altitude(own))
         self.targets = [self._track(target, count) for target in chosen]
 
     @property
@@ -134,7 +137,7 @@ class Flights:
             validate=False,
         )  # fmt: skip
         range_m = np.where(own.present & state.present, range_m, np.nan)
-        return Track(target.name, times, *self._map(state), range_m)
+        return Track(target.name, times, *self._map(state), range_m, _altitude(state))
 
     def _map(self, state: Any) -> tuple[FloatArray, FloatArray]:
         north, east, _ = line_of_sight_ned(
@@ -148,6 +151,10 @@ class Flights:
         )
         there = state.present
         return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)
+
+
+def _altitude(state: Any) -> FloatArray:
+    return np.where(state.present, state.alt_m, np.nan)
 
 
 def _nearest(targets: Sequence[Any], nearest_m: dict[str, float]) -> list[Any]:

@@ -1,4 +1,4 @@
-"""Which part of the map the plan shows, and how large."""
+"""The part of the map that the plan shows, and its scale."""
 
 import math
 

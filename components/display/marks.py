@@ -1,7 +1,7 @@
 """Reading a run's detections for drawing: only what a figure needs, thinned where it is much."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from components.display.row_groups import each_row_group
 from components.display.thinned_stream import ThinnedStream
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.mark import Mark
 
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
@@ -37,6 +38,8 @@ class Detected:
     range_m: dict[str, FloatArray]
     target: dict[str, IntArray]
     names: list[str]
+    #: How each sensor is marked.
+    styles: dict[str, Mark] = field(default_factory=dict)
 
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
@@ -68,12 +71,12 @@ class Detected:
         rows: ThinnedStream,
     ) -> "Detected":
         number, (time_s, range_m) = rows.rows()
-        everyone = sorted({*sensors, *(name for name, _ in series)})
-        sensor = np.array([everyone.index(name) for name, _ in series], dtype=np.int64)[number]
+        all_sensors = sorted({*sensors, *(name for name, _ in series)})
+        sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
         target = np.array([target for _, target in series], dtype=np.int64)[number]
-        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(everyone)}
+        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(all_sensors)}
         return cls(
-            everyone,
+            all_sensors,
             {name: time_s[index] for name, index in chosen.items()},
             {name: range_m[index] for name, index in chosen.items()},
             {name: target[index] for name, index in chosen.items()},

@@ -1,23 +1,26 @@
-"""``plan.png``: the run from above, and where each sensor detected what."""
+"""``plan.png``: the run from above, altitudes below it, and where each sensor detected what."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from components.display.altitudes import draw_altitudes
 from components.display.fields_of_view import draw_outline, outline_of, reach_text
 from components.display.flights import Flights, Track
 from components.display.labels import Labels
 from components.display.map_view import MAP_WIDTH_IN, MapView
 from components.display.marks import Detected
 from components.display.positions import positions
-from components.display.styles import mark_of, style_of
+from components.display.styles import mark_of
 from components.display.terminal import distance_text
 from components.display.thinning import evenly, staggered
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.block.mark import Mark
+from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 MOST_NAMED = 8
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
+# The panel of altitudes below it, and what is between the two.
+_ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
 _OWN = "#000000"
 _TARGET = "#777777"
 
@@ -65,9 +70,10 @@ def draw_plan(
     }
     view = MapView(flights, marks, list(outlines.values()))
     width_in = _LEFT_IN + MAP_WIDTH_IN + _LEGEND_IN
-    height_in = _BOTTOM_IN + view.height_in + _TOP_IN
+    below_in = _BOTTOM_IN + _ALTITUDES_IN + _BETWEEN_IN
+    height_in = below_in + view.height_in + _TOP_IN
     left, right = _LEFT_IN / width_in, (_LEFT_IN + MAP_WIDTH_IN) / width_in
-    bottom, high = _BOTTOM_IN / height_in, view.height_in / height_in
+    bottom, high = below_in / height_in, view.height_in / height_in
     with drawing(width_in, height_in, path) as figure:
         axes = figure.add_axes((left, bottom, right - left, high))
         axes.set(xlim=view.x, ylim=view.y)
@@ -77,10 +83,10 @@ def draw_plan(
         axes.set_axisbelow(True)
         axes.ticklabel_format(useOffset=False, style="plain")
         for name, outline in outlines.items():
-            draw_outline(axes, outline, detected.sensors, name, view.farthest_km)
+            draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
         drawn = {
-            name: _draw_marks(axes, view, marks[name], detected.sensors, name)
+            name: _draw_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
         }
         named = _draw_closest(axes, view, flights)
@@ -92,6 +98,12 @@ def draw_plan(
         if view.cropped:
             title += "; flights go on outside"
         axes.set_title(title, loc="left")
+        heights = figure.add_axes(
+            (left, _BOTTOM_IN / height_in, right - left, _ALTITUDES_IN / height_in)
+        )
+        px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
+        colours = (_OWN, _TARGET)
+        draw_altitudes(heights, flights, marks, detected.styles, px_per_s, colours)
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         handles = _legend(texts, detected, drawn, summary)
         figure.legend(
@@ -148,12 +160,13 @@ def _draw_marks(
     axes: Any,
     view: MapView,
     paths: list[tuple[Track, FloatArray, FloatArray, FloatArray]],
-    sensors: list[str],
+    styles: Mapping[str, Mark],
     name: str,
 ) -> int:
     """Mark a sensor's detections, as far as they can be told apart, and return how many."""
     if not paths:
         return 0
+    sensors = list(styles)
     kept_east, kept_north = [], []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
@@ -162,9 +175,9 @@ def _draw_marks(
         kept_north.append(north[keep])
     east, north = np.concatenate(kept_east), np.concatenate(kept_north)
     few = evenly(len(east), 5000)
-    style = style_of(sensors, name)
+    style = styles[name]
     axes.plot(
-        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style[2],
+        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
         scalex=False, scaley=False,
     )  # fmt: skip
     return len(few)
@@ -241,5 +254,5 @@ def _legend(
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
             text += f"\n{reaches[name]}"
-        handles.append(Line2D([], [], **mark_of(style_of(detected.sensors, name)), label=text))
+        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=text))
     return handles

@@ -1,4 +1,4 @@
-"""Where the targets were when they were detected."""
+"""The positions of the targets when they were detected."""
 
 import numpy as np
 

@@ -31,7 +31,7 @@ class DetectAndSenseReport:
     def observers(self, simulation: "Simulation") -> list[Observer]:
         """Return running summaries with the sections ``sensors`` and ``fused``.
 
-        Every block that sends `Detections` is a sensor, whoever wrote it.
+        Every block that sends `Detections` is a sensor, ours or not.
         """
         return [SensorSummary(sensor_names(simulation)), FusedSummary()]
 

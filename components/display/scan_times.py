@@ -1,4 +1,4 @@
-"""When each sensor scanned, and in which scans it detected something, read off a run's table."""
+"""The scans of each sensor, and those in which it detected something, from a run's table."""
 
 from bisect import bisect_left
 from collections.abc import Mapping

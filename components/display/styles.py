@@ -1,34 +1,31 @@
-"""How each sensor is marked in every figure: colour, marker and size."""
+"""How each sensor is marked in a run's figures: by its kind, alike in every figure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-#: Okabe and Ito's colours, told apart with any kind of colour vision, each with its marker and
-#: its size in points. Sensors see the same target in the same place: big open marks first and
-#: small ones on top keep all of them visible.
-STYLES = (
-    ("#0072B2", "o", 7.5),
-    ("#E69F00", "^", 6.0),
-    ("#D55E00", "s", 4.0),
-    ("#009E73", "D", 5.0),
-    ("#CC79A7", "v", 5.5),
-    ("#56B4E9", "P", 5.0),
-)
+from dsa_des.block.mark import Mark, marks_of
 
 
-def style_of(sensors: Sequence[str], name: str) -> tuple[str, str, float]:
-    """Return a sensor's colour, marker and marker size in points."""
-    return STYLES[sensors.index(name) % len(STYLES)]
+def styles_of(names: Iterable[str], blocks: Mapping[str, Any]) -> dict[str, Mark]:
+    """Return name → mark of sensors.
+
+    Parameters
+    ----------
+    names : iterable of str
+    blocks : mapping
+        The run's blocks by name.
+    """
+    return marks_of({name: type(blocks[name]) if name in blocks else None for name in names})
 
 
-def mark_of(style: tuple[str, str, float]) -> dict[str, Any]:
+def mark_of(style: Mark) -> dict[str, Any]:
     """Return how a sensor's detections are marked: big ones open, small ones filled."""
-    colour, marker, size = style
+    big = style.size_pt > 7
     return {
         "linestyle": "none",
-        "marker": marker,
-        "markersize": size,
-        "markeredgecolor": colour,
-        "markerfacecolor": "none" if size > 7 else colour,
-        "markeredgewidth": 1.2 if size > 7 else 0.4,
+        "marker": style.marker,
+        "markersize": style.size_pt,
+        "markeredgecolor": style.colour,
+        "markerfacecolor": "none" if big else style.colour,
+        "markeredgewidth": 1.2 if big else 0.4,
     }

@@ -11,13 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.messages.detections import Detections
+from components.sensor.cut_off import END, START, in_scan
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Text
 from dsa_des.record.recording import Columns
 
 _SKIPPED = "skipped_"
-#: The first scan and the last: what was seen there may have been in sight before, or still be.
-_ENDS = ("the start", "the end of the run")
 SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.startswith(_SKIPPED))
 
 
@@ -140,8 +139,8 @@ class _Sensor:
         if seen is None:
             return None
         found = seen.result()
-        if self.span is not None and seen.tick == self.span[end]:
-            found["at"] = _ENDS[end]
+        if self.span is not None and in_scan(seen.tick, self.span[end]):
+            found["at"] = (START, END)[end]
         return found
 
 

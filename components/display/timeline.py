@@ -1,5 +1,6 @@
 """``timeline.png``: the sensors' scans on their own clocks, and what was detected when."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -10,8 +11,9 @@ import numpy as np
 from components.display.flights import Flights
 from components.display.marks import Detected, read_fused
 from components.display.scan_times import ScansShown, SensorScans, read_scans, scans_between
-from components.display.styles import mark_of, style_of
+from components.display.styles import mark_of
 from components.display.thinning import by_target, evenly, staggered
+from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
 if TYPE_CHECKING:
@@ -74,8 +76,8 @@ def draw_timeline(
     share = min(0.42, 0.14 + 0.07 * rows)
     with drawing(*_SIZE_IN, path) as figure:
         above = figure.add_axes((_LEFT, 0.94 - share, _WIDTH, share))
-        _draw_scans(above, scans, shown, detected.sensors, close_up)
-        title = figure_text(simulation.scene.title, 60)
+        _draw_scans(above, scans, shown, detected.styles, close_up)
+        title = figure_text(simulation.scene.title, 28)  # the legend is beside it
         above.set_title(f"{title}: {close_up.what}", loc="left")
         below = figure.add_axes((_LEFT, 0.08, _WIDTH, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s)
@@ -140,29 +142,30 @@ def _draw_scans(
     axes: Any,
     scans: Scans,
     shown: dict[str, ScansShown],
-    sensors: list[str],
+    styles: Mapping[str, Mark],
     close_up: CloseUp,
 ) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
+    sensors = list(styles)
     # The first sensor on top, as in the legend of the plan.
     height = {name: len(sensors) - 1 - i for i, name in enumerate(sensors)}
     names = []
     nothing = ScansShown(np.empty(0), np.empty(0))
     for name in sensors:
         here = shown.get(name, nothing)
-        style = style_of(sensors, name)
+        style = styles[name]
         rate_hz = scans[name].rate_hz if name in scans else None
         who = figure_text(name, 16)
         names.append(f"{who}\n{rate_hz:.4g} Hz" if rate_hz else who)
         size = min(7.0, _mark_size(len(here.time_s)))
         axes.plot(
             here.time_s, np.full(len(here.time_s), height[name]), linestyle="none", marker="|",
-            markersize=20, markeredgewidth=1.0, color=style[0], clip_on=False,
+            markersize=20, markeredgewidth=1.0, color=style.colour, clip_on=False,
         )  # fmt: skip
         hit_s = here.hit_s[here.hit_s >= close_up.start_s]
-        mark = mark_of(style) | {"markersize": size, "markerfacecolor": style[0]}
+        mark = mark_of(style) | {"markersize": size, "markerfacecolor": style.colour}
         axes.plot(hit_s, np.full(len(hit_s), height[name]), **mark, zorder=3.0, clip_on=False)
     segments: list[Any] = []
     dots: list[tuple[float, float]] = []
@@ -230,7 +233,7 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     top_km = max(1.05 * top_km, 0.1)
     width_px = _SIZE_IN[0] * _WIDTH * DPI
     for name in detected.sensors:
-        style = style_of(detected.sensors, name)
+        style = detected.styles[name]
         _draw_detections(axes, style, detected, name, width_px / duration_s)
         handles.append(Line2D([], [], **mark_of(style), label=figure_text(name, 16)))
     axes.set_ylim(0.0, top_km)
@@ -246,7 +249,7 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
 
 def _draw_detections(
     axes: Any,
-    style: tuple[str, str, float],
+    style: Mark,
     detected: Detected,
     name: str,
     px_per_s: float,
@@ -262,7 +265,7 @@ def _draw_detections(
         rows = np.concatenate(kept)
         rows = rows[evenly(len(rows), 5000)]
         axes.plot(
-            time_s[rows], range_km[rows], **mark_of(style), zorder=2.0 + 1.0 / style[2],
+            time_s[rows], range_km[rows], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
         )  # fmt: skip
 
 

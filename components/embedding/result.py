@@ -1,4 +1,4 @@
-"""What one call says of the planes: where they were detected, by which sensors, how surely."""
+"""The result of one call: where planes were detected, by which sensors, how surely."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -53,7 +53,7 @@ class Sighting:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class EncounterResult:
     """What one call of `simulate` came to; sightings by plane name or position.
 
     Parameters

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from components.aircraft.aircraft import Aircraft
 from components.embedding.host_scene import load_for_host, planes_known_to, source_of, with_host
 from components.embedding.planes import FixedPath, number_of, plane_of
-from components.embedding.result import Result, Sighting, sightings_of
+from components.embedding.result import EncounterResult, Sighting, sightings_of
 from components.embedding.states import checked_rows, traffic_states
 from components.messages.detections import Detections, FusedDetections
 from dsa_des.embed import HostDriven, Step
@@ -189,7 +189,7 @@ class Simulator:
         time_s: object,
         *,
         plane: str | int | None = None,
-    ) -> Result:
+    ) -> EncounterResult:
         """Say where the planes are detected at an instant, by which sensors and how surely.
 
         Parameters
@@ -209,7 +209,7 @@ class Simulator:
 
         Returns
         -------
-        Result
+        EncounterResult
 
         Raises
         ------
@@ -232,14 +232,14 @@ class Simulator:
         moved = checked_rows("intruder", lla_intruder, att_intruder, len(free))
         tick = chain.tick_of(time_s)
         step = chain.due(tick)
-        everybody = range(len(self._planes)) if chosen is None else chosen
+        planes_asked = range(len(self._planes)) if chosen is None else chosen
         if step.scans:
             rows = moved
-            if len(free) != len(everybody):
-                rows = self._placed(moved, free, everybody, tick / chain.ticks_per_s)
+            if len(free) != len(planes_asked):
+                rows = self._placed(moved, free, planes_asked, tick / chain.ticks_per_s)
             traffic: Any = chain.components[self._source]
             chain.run(step, traffic_states(own, rows, tick, traffic.roster, chosen))
-        return self._result(step, everybody, chain.ticks_per_s)
+        return self._result(step, planes_asked, chain.ticks_per_s)
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -270,20 +270,22 @@ class Simulator:
             step = chain.due(chain.tick_of(chain.next_scan_s()))
             chain.run(step, traffic_states(own, rows, step.tick, traffic.roster, None))
 
-    def _placed(self, moved: Any, free: list[int], everybody: Sequence[int], time_s: float) -> Any:
+    def _placed(
+        self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
+    ) -> Any:
         """Return the rows of all planes: what the host said, and the fixed ones."""
-        rows = np.empty((len(everybody), 6))
-        for place, number in enumerate(everybody):
+        rows = np.empty((len(planes_asked), 6))
+        for place, number in enumerate(planes_asked):
             fixed = self._fixed.get(number)
             rows[place] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
         return rows
 
-    def _result(self, step: Step, everybody: Sequence[int], ticks_per_s: int) -> Result:
+    def _result(self, step: Step, planes_asked: Sequence[int], ticks_per_s: int) -> EncounterResult:
         messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
         reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
         seen, false = sightings_of(messages.get(self._fusion), reported)
-        sightings = tuple(seen.get(number) or self._unseen[number] for number in everybody)
-        return Result(
+        sightings = tuple(seen.get(number) or self._unseen[number] for number in planes_asked)
+        return EncounterResult(
             step.tick / ticks_per_s,
             sightings,
             () if self._plane_by_plane else false,

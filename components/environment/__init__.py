@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Accuracy", "Navigation", "Terrain", "Weather"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Accuracy": "components.environment.tables",
     "Navigation": "components.environment.tables",

@@ -1,1 +1,1 @@
-"""What makes the pages of the docs; it may import everything, nothing imports it."""
+"""Makers of the pages of the docs; they may import everything, nothing imports them."""

@@ -1,1 +1,1 @@
-"""Which detections of several sensors belong together, and what they say."""
+"""Fusion: detections of several sensors that belong together, and what they say."""

@@ -1,4 +1,4 @@
-"""Which detection of a sensor belongs to an instant and a target.
+"""The detection of a sensor that belongs to an instant and a target.
 
 Both rules return, for every (instant, target) asked about, the entry of the sensor's detections
 that counts there, or -1.

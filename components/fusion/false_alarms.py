@@ -1,4 +1,4 @@
-"""How a sensor's false alarms pass through fusion: alone, each with its sensor's name on it.
+"""The way of a sensor's false alarms through fusion: alone, with the sensor's name on them.
 
 Fusion knows which detections belong together by their targets, and a false alarm has none. So it
 is never merged, neither with a detection nor with another false alarm, not even of the same cell.

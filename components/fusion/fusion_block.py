@@ -1,10 +1,11 @@
-"""What fusion blocks have in common: who is ranked best, what is remembered, how rows are built."""
+"""The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
 from typing import Any
 
 import numpy as np
 
 from components.messages.detections import Detections, FusedDetections, SensorOffer, mask_type
+from components.sensor.marks import FUSION
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import offsets_of
@@ -26,10 +27,10 @@ class Fusion(Component):
     missing is taken from what there is.
     """
 
+    mark = FUSION
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     windowed = True
-    lockstep = True
     rewindable = True
 
     def setup(self) -> None:

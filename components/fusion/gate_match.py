@@ -1,10 +1,11 @@
-"""Which detection of another sensor lies nearest within gates of time, angle and range."""
+"""The nearest detection of another sensor within gates of time, angle and range."""
 
 from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray, IntArray
+from components.geometry.directions import angle_by_haversine
+from dsa_des.arrays.types import IntArray
 
 
 def nearest_in_gate(
@@ -47,7 +48,7 @@ def nearest_in_gate(
     start = np.repeat(np.cumsum(counts) - counts, counts)
     candidate = np.arange(len(which)) - start + np.repeat(first, counts)
     mine = anchors[which]
-    apart_rad = _angle_apart_rad(
+    apart_rad = angle_by_haversine(
         one.azimuth_rad[mine],
         one.elevation_rad[mine],
         other.azimuth_rad[candidate],
@@ -69,17 +70,3 @@ def nearest_in_gate(
     anchor, place = np.unique(which[chosen], return_index=True)
     best[anchor] = candidate[chosen[place]]
     return best
-
-
-def _angle_apart_rad(
-    azimuth_rad: FloatArray,
-    elevation_rad: FloatArray,
-    other_azimuth_rad: FloatArray,
-    other_elevation_rad: FloatArray,
-) -> FloatArray:
-    """Return the angle between two directions by the haversine, accurate when it is small."""
-    high = np.sin(0.5 * (elevation_rad - other_elevation_rad))
-    wide = np.sin(0.5 * (azimuth_rad - other_azimuth_rad))
-    share = high * high + np.cos(elevation_rad) * np.cos(other_elevation_rad) * wide * wide
-    apart: FloatArray = 2.0 * np.arcsin(np.sqrt(np.minimum(share, 1.0)))
-    return apart

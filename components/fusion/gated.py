@@ -42,6 +42,7 @@ class Gated(Fusion):
     """
 
     Parameters = GatedParameters
+    lockstep = True
     ladders = (FUSION,)
 
     def window_s(self) -> Any:

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.directions import unit_vectors
 from components.messages.true_entries import true_entries
-from components.sensor.ladder_values import angle_apart_mrad, direction
+from components.sensor.ladder_values import angle_apart_mrad
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -26,8 +27,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     line: FloatArray = np.full(shape, np.nan)
     distance: FloatArray = np.full(shape, np.nan)
     line[row, fused.target] = angle_apart_mrad(
-        direction(fused.azimuth_rad, fused.elevation_rad),
-        direction(fused.true_azimuth_rad, fused.true_elevation_rad),
+        unit_vectors(fused.azimuth_rad, fused.elevation_rad),
+        unit_vectors(fused.true_azimuth_rad, fused.true_elevation_rad),
     )
     distance[row, fused.target] = np.abs(fused.range_m - fused.true_range_m)
     return {"direction": line, "range": distance}

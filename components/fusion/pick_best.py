@@ -38,6 +38,7 @@ class PickBest(Fusion):
     """
 
     Parameters = PickBestParameters
+    lockstep = True
     ladders = (FUSION,)
 
     def window_s(self) -> Any:

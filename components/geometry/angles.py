@@ -1,4 +1,4 @@
-"""Wrapping angles and taking sines in degrees without losing digits."""
+"""Sines in degrees, arc tangents and differences of longitudes, without losing digits."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, common_shape, shaped, squarable
 
-TWO_PI = 2.0 * np.pi
-# What the double nearest to 2 pi leaves out of it (6.28318530717958647692528676655900577).
-_TWO_PI_REST = 2.4492935982947064e-16
 RAD_PER_DEG = np.pi / 180.0
 
 # No offset in metres between two aircraft squares to less than this, unless it is 0.
@@ -22,93 +19,13 @@ _LOOK_FOR_ONE_ANGLE = 64
 _LARGE_LONGITUDE_DEG = 1e12
 
 
-def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
-    """Wrap angles into (-pi, pi]; an angle already there keeps its bits.
-
-    Parameters
-    ----------
-    angle_rad : array_like
-        Any shape, radians.
-
-    Returns
-    -------
-    ndarray
-        The same shape, radians, reduced by the true 2 pi (not the double nearest to it), so that
-        many turns lose nothing beyond what the input itself had lost.
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
-    """
-    angle = squarable("angle_rad", angle_rad)
-    (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
-    return wrapped
-
-
-def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
-    """`wrap_pi` for a contiguous array that is known to be finite."""
-    result = angle + 0.0
-    size = np.abs(angle)
-    outside = (size > np.pi) | (angle == -np.pi)
-    if np.count_nonzero(outside) == 0:
-        return result
-    # Within three half turns the first difference is exact, and the second brings the true 2 pi.
-    once = angle - np.copysign(TWO_PI, angle)
-    once -= np.copysign(_TWO_PI_REST, angle)
-    far = size > 3.0 * np.pi
-    if np.count_nonzero(far):
-        # The library's sin and cos reduce by the true pi, for any size of argument.
-        once[far] = np.arctan2(np.sin(angle[far]), np.cos(angle[far]))
-    np.minimum(once, np.pi, out=once)
-    once[once <= -np.pi] = np.pi
-    once += 0.0
-    np.copyto(result, once, where=outside)
-    return result
-
-
-def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
-    """Wrap angles into [0, 2 pi); rounding never gives 2 pi itself.
-
-    Parameters
-    ----------
-    angle_rad : array_like
-        Any shape, radians.
-
-    Returns
-    -------
-    ndarray
-        The same shape, radians. An angle already there keeps its bits.
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
-    """
-    angle = squarable("angle_rad", angle_rad)
-    flat = np.atleast_1d(angle)
-    inside = (flat >= 0.0) & (flat < TWO_PI)
-    wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
-    (wrapped,) = shaped(angle.shape, wrapped)
-    return wrapped
-
-
-def positive_turn(angle: FloatArray) -> FloatArray:
-    """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
-    turned: FloatArray = np.multiply(angle < 0.0, TWO_PI, dtype=np.float64)
-    turned += angle
-    # -1e-17 + 2 pi rounds to 2 pi; the nearest direction inside the interval is 0.
-    turned[turned >= TWO_PI] = 0.0
-    return turned
-
-
 def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Take sine and cosine; once, where all angles are the same.
 
     Parameters
     ----------
     angle_rad : ndarray
-        Contiguous, at least one axis. The pitch and the roll of whoever flies straight and level.
+        Contiguous, at least one axis. Pitch and roll are the same in level flight, for example.
 
     Returns
     -------
@@ -241,36 +158,3 @@ def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatA
             over, difference - np.where(difference > 0.0, 360.0, -360.0), difference
         )
     return difference, rest
-
-
-def sincosd(angle_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Take sine and cosine of an angle in degrees, reduced to one quadrant before rounding.
-
-    Parameters
-    ----------
-    angle_deg : array_like
-        Any shape, degrees, any size.
-
-    Returns
-    -------
-    sine, cosine : ndarray
-        The same shape. Exactly 0 and ±1 at whole quadrants; near a zero all digits are kept
-        (the cosine of 89.9999999999999 degrees, where radians keep one digit).
-
-    Raises
-    ------
-    ValueError
-        NaN or infinity.
-    """
-    angle = squarable("angle_deg", angle_deg)
-    rest = np.fmod(np.atleast_1d(angle), 360.0)
-    quadrant = np.rint(rest / 90.0)
-    rest = (rest - 90.0 * quadrant) * RAD_PER_DEG
-    sine, cosine = np.sin(rest), np.cos(rest)
-    turn = quadrant.astype(np.int64) & 3
-    odd = (turn & 1).astype(bool)
-    # + 0.0 turns a negative zero into zero.
-    sin_out = np.where(odd, cosine, sine) * np.where(turn >= 2, -1.0, 1.0) + 0.0
-    cos_out = np.where(odd, sine, cosine) * np.where((turn == 1) | (turn == 2), -1.0, 1.0) + 0.0
-    sin_out, cos_out = shaped(angle.shape, sin_out, cos_out)
-    return sin_out, cos_out

@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, common_shape, shaped, squarable
-from components.geometry.angles import (
-    sine_and_cosine,
-    wrap_pi,
-)
+from components.geometry.angles import sine_and_cosine
+from components.geometry.wrapping import wrap_pi
 
 Triple = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -135,10 +133,10 @@ def body_angles(
 
     Returns
     -------
-    p_rad : ndarray
+    body_azimuth_rad : ndarray
         Azimuth from the nose towards the right wing, in (-pi, pi]; 0 within 9e-16 rad of
         straight up and straight down (where only rounding would be left) and for a zero vector.
-    q_rad : ndarray
+    body_elevation_rad : ndarray
         Elevation above the plane of the wings, in [-pi/2, pi/2].
 
     Raises

@@ -77,13 +77,13 @@ class Envelope:
     Parameters
     ----------
     range_max_m : float
-        Longest line of sight that anybody looks at.
+        Longest line of sight that a sensor looks along.
     own_lat_deg, own_alt_m, target_alt_m : (low, high)
         Geodetic latitude of the ownship, altitudes of the ownship and of its targets.
     target_lat_deg : (low, high), optional
         Left out: whatever the range allows.
     steepest_rad : float
-        Largest size of a body elevation that anybody reads; pi/2 bounds no azimuth.
+        Largest size of a body elevation that a sensor reads; pi/2 bounds no azimuth.
     pitch_rad, roll_rad : float
         Largest sizes of the ownship's pitch and roll.
     """

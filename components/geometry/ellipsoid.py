@@ -10,9 +10,9 @@ from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
     longitude_difference_rounded,
-    positive_turn,
     slope_angle,
 )
+from components.geometry.wrapping import positive_turn
 
 SEMI_MAJOR_AXIS_M = 6378137.0
 """WGS-84 equatorial radius (NIMA TR8350.2)."""

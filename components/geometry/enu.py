@@ -10,13 +10,10 @@ from components.geometry.ellipsoid import (
     FLATTENING,
     SEMI_MAJOR_AXIS_M,
     line_of_sight_ned,
-)
-from components.geometry.normals import (
-    FloatArray,
-    local_axes,
     radii_of_curvature,
-    wrap_longitude_deg,
 )
+from components.geometry.normals import FloatArray, local_axes
+from components.geometry.wrapping import wrap_longitude_deg
 
 LARGEST_OFFSET_M = 5e6
 """Offsets are refused beyond this: a tangent plane that long has left the Earth."""
@@ -90,41 +87,12 @@ def enu_to_geodetic(
     return lat.reshape(shape)[()], lon.reshape(shape)[()], alt.reshape(shape)[()]
 
 
-def geodetic_to_enu(
-    lat_deg: npt.ArrayLike,
-    lon_deg: npt.ArrayLike,
-    alt_m: npt.ArrayLike,
-    *,
-    reference_lat_deg: float,
-    reference_lon_deg: float,
-    reference_alt_m: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find east, north and up of a geodetic position in a reference point's tangent frame.
-
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m : array_like
-        Degrees and metres; they broadcast.
-    reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        The reference point.
-
-    Returns
-    -------
-    east_m, north_m, up_m : ndarray
-        Metres; accurate to 1e-12 m + 1e-13 of the distance (`geometry.ellipsoid`).
-    """
-    north, east, down = line_of_sight_ned(
-        reference_lat_deg, reference_lon_deg, reference_alt_m, lat_deg, lon_deg, alt_m
-    )
-    return east, north, -down
-
-
 def _first_guess(
     east: FloatArray, north: FloatArray, up: FloatArray, lat0: float, lon0: float, alt0: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bowring's one-step latitude, in the reference meridian's plane."""
     sin0, cos0 = np.sin(np.radians(lat0)), np.cos(np.radians(lat0))
-    n0 = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin0 * sin0)
+    n0 = radii_of_curvature(lat0)[1]
     outward = (n0 + alt0) * cos0 - north * sin0 + up * cos0
     z = (n0 * (1.0 - ECCENTRICITY_SQUARED) + alt0) * sin0 + north * cos0 + up * sin0
     to_axis = np.hypot(outward, east)

@@ -18,17 +18,15 @@ from components.geometry.earth_model_error import (
     geodesic_error,
     local_radii_error,
 )
+from components.geometry.line_of_sight import EARTH_MODELS
 
 __all__ = [
-    "EARTH_MODELS",
     "Envelope",
     "ErrorBound",
     "attitude_error_rad",
     "azimuth_error_rad",
     "error_bound",
 ]
-
-EARTH_MODELS = ("flat_earth", "local_radii", "geodesic", "ellipsoid")
 
 # Rounding: the exact form errs by 1.1e-15 of the range (measured), the others by no more than
 # some roundings of coordinates and sines.

@@ -1,4 +1,4 @@
-"""Whether a direction lies in a sensor's field of view, and a range in its reach."""
+"""The field of view of a sensor: a test of directions, and its width."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, common_shape, squarable
-from components.geometry.angles import TWO_PI, wrap_pi_unchecked
+from components.geometry.wrapping import TWO_PI, wrap_pi_unchecked
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -18,8 +18,8 @@ _WRAP_TOLERANCE_RAD = 8.0 * _EPS
 
 
 def inside(
-    p_rad: npt.ArrayLike,
-    q_rad: npt.ArrayLike,
+    azimuth_rad: npt.ArrayLike,
+    elevation_rad: npt.ArrayLike,
     *,
     azimuth_min_rad: float,
     azimuth_max_rad: float,
@@ -30,7 +30,7 @@ def inside(
 
     Parameters
     ----------
-    p_rad, q_rad : array_like
+    azimuth_rad, elevation_rad : array_like
         Azimuth and elevation in the sensor's body axes, broadcast. Any number of turns of azimuth.
     azimuth_min_rad, azimuth_max_rad : float
         The field runs clockwise from min to max, each in [-2 pi, 2 pi]. It may be wider than pi
@@ -59,8 +59,8 @@ def inside(
             f"elevation_min_rad is {elevation_min_rad}: it must not exceed elevation_max_rad, "
             f"{elevation_max_rad}"
         )
-    p, q = squarable("p_rad", p_rad), squarable("q_rad", q_rad)
-    shape = common_shape(p_rad=p, q_rad=q)
+    p, q = squarable("azimuth_rad", azimuth_rad), squarable("elevation_rad", elevation_rad)
+    shape = common_shape(azimuth_rad=p, elevation_rad=q)
     in_elevation = (q >= elevation_min_rad) & (q <= elevation_max_rad)
     if high - low >= TWO_PI:
         return np.array(np.broadcast_to(in_elevation, shape))[()]
@@ -93,59 +93,33 @@ class FieldOfView:
         self._lowest, self._highest = elevation_rad
         self._turns = bool(_turns(self._low, self._high))
 
-    def holds(self, p_rad: FloatArray, q_rad: FloatArray) -> BoolArray:
+    def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
         """Tell which directions lie inside, as `inside` does."""
-        found = q_rad >= self._lowest
-        found &= q_rad <= self._highest
+        found = elevation_rad >= self._lowest
+        found &= elevation_rad <= self._highest
         if self._high - self._low < TWO_PI:
-            within = p_rad >= self._low
-            within &= p_rad <= self._high
+            within = azimuth_rad >= self._low
+            within &= azimuth_rad <= self._high
             if self._turns:
-                within = _at_other_turns(p_rad, p_rad, self._low, self._high, within)
+                within = _at_other_turns(azimuth_rad, azimuth_rad, self._low, self._high, within)
             found &= within
         return found
 
 
-def within_range(
-    range_m: npt.ArrayLike, *, range_min_m: float = 0.0, range_max_m: float = math.inf
-) -> BoolArray:
-    """Tell which ranges lie between a sensor's nearest and farthest range, bounds included.
+def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
+    """Give a sector's bounds with the upper one a turn on where it was below the lower one."""
+    return low_rad, high_rad + TWO_PI if high_rad < low_rad else high_rad
 
-    Parameters
-    ----------
-    range_m : array_like
-        Slant range, metres, not negative.
-    range_min_m, range_max_m : float
-        Metres; the farthest may be infinite.
 
-    Returns
-    -------
-    ndarray of bool
-        The shape of `range_m`.
-
-    Raises
-    ------
-    ValueError
-        A range that is negative or not finite, or bounds that are negative or out of order.
-    """
-    if not 0.0 <= range_min_m < math.inf:
-        raise ValueError(f"range_min_m is {range_min_m}: it must be finite and not negative")
-    if not range_max_m >= range_min_m:
-        raise ValueError(
-            f"range_max_m is {range_max_m}: it must not be less than range_min_m, {range_min_m}"
-        )
-    distance = squarable("range_m", range_m)
-    if distance.size and distance.min() < 0.0:
-        raise ValueError(f"range_m is {distance.min()}: it must not be negative")
-    return (distance >= range_min_m) & (distance <= range_max_m)
+def sector_width_rad(low_rad: float, high_rad: float) -> float:
+    """Give the angle clockwise from the first azimuth to the second, in (0, 2 pi] and rounding."""
+    return high_rad - low_rad if high_rad > low_rad else high_rad - low_rad + TWO_PI
 
 
 def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
     _require("azimuth_min_rad", azimuth_min_rad, TWO_PI, "[-2 pi, 2 pi]")
     _require("azimuth_max_rad", azimuth_max_rad, TWO_PI, "[-2 pi, 2 pi]")
-    low, high = float(azimuth_min_rad), float(azimuth_max_rad)
-    if high < low:
-        high += TWO_PI
+    low, high = rising_sector(float(azimuth_min_rad), float(azimuth_max_rad))
     if high < low:
         raise ValueError(
             f"azimuth_min_rad is {azimuth_min_rad}: it must be at most one turn above "

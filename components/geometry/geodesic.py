@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, positions, shaped
-from components.geometry.angles import RAD_PER_DEG, positive_turn
+from components.geometry.angles import RAD_PER_DEG
+from components.geometry.wrapping import positive_turn
 
 BACKENDS = ("geographiclib", "pyproj")
 

@@ -5,33 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M
-
 FloatArray = npt.NDArray[np.float64]
 Vector = tuple[FloatArray, FloatArray, FloatArray]
 
-TWO_PI = 2.0 * np.pi
 DEG_PER_RAD = 180.0 / np.pi
 RAD_PER_DEG = np.pi / 180.0
-
-
-def radii_of_curvature(lat_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Find the meridian radius M and the prime-vertical radius N of WGS-84, in metres.
-
-    Parameters
-    ----------
-    lat_deg : array_like
-        Geodetic latitude, degrees.
-
-    Returns
-    -------
-    meridian_m, prime_vertical_m : ndarray
-        Metres on the ellipsoid; at altitude h add h to either.
-    """
-    sine = np.sin(np.asarray(lat_deg, dtype=np.float64) * RAD_PER_DEG)
-    w_squared = 1.0 - ECCENTRICITY_SQUARED * sine * sine
-    prime_vertical = SEMI_MAJOR_AXIS_M / np.sqrt(w_squared)
-    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / w_squared, prime_vertical
 
 
 def local_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector, Vector]:
@@ -74,29 +52,3 @@ def normal_to_degrees(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[Floa
     lon *= DEG_PER_RAD
     # pi in degrees is exactly 180, which belongs to the other end of the interval.
     return lat, np.where(lon >= 180.0, -180.0, lon)
-
-
-def wrap_longitude_deg(lon_deg: FloatArray) -> FloatArray:
-    """Wrap degrees into [-180, 180); a value already there keeps its bits."""
-    inside = (lon_deg >= -180.0) & (lon_deg < 180.0)
-    if inside.all():
-        return lon_deg
-    wrapped = lon_deg - 360.0 * np.floor((lon_deg + 180.0) / 360.0)
-    wrapped = np.where(inside, lon_deg, wrapped)
-    return np.where(wrapped >= 180.0, -180.0, np.where(wrapped < -180.0, -180.0, wrapped))
-
-
-def wrap_difference_rad(angle: FloatArray) -> FloatArray:
-    """Wrap radians into [-pi, pi], for differences of two angles a few turns apart at most."""
-    return angle - TWO_PI * np.rint(angle * (1.0 / TWO_PI))
-
-
-def wrap_heading_rad(angle: FloatArray) -> FloatArray:
-    """Wrap radians into [0, 2 pi); a value already there keeps its bits."""
-    inside = (angle >= 0.0) & (angle < TWO_PI)
-    if inside.all():
-        return angle
-    wrapped = angle - TWO_PI * np.floor(angle * (1.0 / TWO_PI))
-    wrapped = np.where(inside, angle, wrapped)
-    # A tiny negative angle plus 2 pi rounds to 2 pi; the direction meant is 0.
-    return np.where((wrapped >= TWO_PI) | (wrapped < 0.0), 0.0, wrapped)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import FloatArray, shaped
-from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
+from components.geometry.angles import direction_angle, slope_angle
 from components.geometry.attitude import (
     azimuth_off_nose,
     body_angles,
@@ -20,6 +20,7 @@ from components.geometry.attitude import (
     unit_vector,
     unit_vector_unchecked,
 )
+from components.geometry.wrapping import wrap_pi_unchecked
 
 MODELS = ("exact", "small_angle")
 
@@ -53,9 +54,9 @@ def sensor_angles(
 
     Returns
     -------
-    p_rad : ndarray
+    body_azimuth_rad : ndarray
         Azimuth from the nose, clockwise seen from above, in (-pi, pi].
-    q_rad : ndarray
+    body_elevation_rad : ndarray
         Elevation, in [-pi/2, pi/2]. Where elevation - pitch passes straight up or down, the
         direction comes down on the other side: q becomes ±pi - q, and p turns by pi.
 
@@ -124,7 +125,7 @@ def sensor_angles_of_offsets(
 
     Returns
     -------
-    p_rad, q_rad : ndarray
+    body_azimuth_rad, body_elevation_rad : ndarray
         As from `sensor_angles`, to the last digit or two; at a third to half of its cost, because
         the direction need not be taken apart into angles first.
     """

@@ -1,1 +1,1 @@
-"""What blocks compute, computed again at 40 digits."""
+"""The quantities that blocks compute, computed again at 40 digits."""

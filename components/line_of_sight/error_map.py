@@ -7,21 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.attitude import unit_vector
+from components.geometry.directions import angle_of_chord, chord_between
 from components.geometry.enu import enu_to_geodetic
+from components.geometry.line_of_sight import EARTH_MODELS, LineOfSight
+from components.geometry.wrapping import wrap_by_sines
 from dsa_des.arrays.types import FloatArray
 
 ALTITUDE_M = 1000.0
 RADAR_DEG, CAMERA_DEG = 1.0, 0.03
 RADAR_RANGE_M, FINE_RANGE_M = 76.2, 1.0
 
-_MODELS = {
-    "flat_earth": flat_earth.line_of_sight,
-    "local_radii": local_radii.line_of_sight,
-    "geodesic": geodesic.line_of_sight,
-    "ellipsoid": ellipsoid.line_of_sight,
-}
 # East and west are alike; the northern bearings differ from the southern ones.
 _BEARINGS_RAD = np.radians(np.linspace(0.0, 180.0, 9))
 _COLOURS = "viridis"
@@ -102,17 +98,17 @@ def error_maps(
         *placed, reference_lat_deg=phi, reference_lon_deg=0.0, reference_alt_m=ALTITUDE_M
     )
     pairs = (phi, 0.0, ALTITUDE_M, *target)
-    true = ellipsoid.line_of_sight(*pairs)
-    truth = dict.fromkeys(_MODELS, true)
+    true = LineOfSight().in_ned(*pairs)
+    truth = dict.fromkeys(EARTH_MODELS, true)
     truth["ellipsoid"] = (bearing, np.arctan2(up, level), distance)
     maps = []
-    for name, model in _MODELS.items():
-        azimuth, elevation, slant_range = model(*pairs)
+    for name in EARTH_MODELS:
+        azimuth, elevation, slant_range = LineOfSight(name).in_ned(*pairs)
         turn = azimuth - truth[name][0]
-        chord = np.array(unit_vector(azimuth, elevation)) - np.array(unit_vector(*truth[name][:2]))
+        chord = chord_between(unit_vector(azimuth, elevation), unit_vector(*truth[name][:2]))
         errors = (
-            2.0 * np.arcsin(np.minimum(1.0, 0.5 * np.sqrt((chord**2).sum(axis=0)))),
-            np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
+            angle_of_chord(chord),
+            np.abs(wrap_by_sines(turn)),
             np.abs(elevation - truth[name][1]),
             np.abs(slant_range - truth[name][2]),
         )

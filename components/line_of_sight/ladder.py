@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.directions import unit_vectors
 from components.sensor.ladder_values import (
     angle_apart_mrad,
-    direction,
     over_roster,
     wrapped_apart_mrad,
 )
@@ -31,7 +31,9 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     """Return the lines of sight that a transform gives, in body axes."""
     seen: Any = block.run(wake)
     return {
-        "direction": over_roster(seen, direction(seen.body_azimuth_rad, seen.body_elevation_rad)),
+        "direction": over_roster(
+            seen, unit_vectors(seen.body_azimuth_rad, seen.body_elevation_rad)
+        ),
         "azimuth": over_roster(seen, seen.body_azimuth_rad),
         "elevation": over_roster(seen, seen.body_elevation_rad),
         "range": over_roster(seen, seen.range_m),

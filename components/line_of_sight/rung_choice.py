@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 
-from components.geometry.error_bounds import EARTH_MODELS, Envelope, ErrorBound, error_bound
+from components.geometry.error_bounds import Envelope, ErrorBound, error_bound
+from components.geometry.line_of_sight import EARTH_MODELS
 from components.messages.reach import REACH_MARGIN
 
 # CPU time per line of sight in blocks of 10,000, relative to flat earth; only the order matters.
@@ -59,7 +60,7 @@ class Allowance:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ModelChoice:
     """What was chosen, with its bound, and why each cheaper one was not.
 
     Parameters
@@ -81,7 +82,7 @@ def choose(
     attitudes: tuple[str, ...],
     envelopes: Sequence[Envelope],
     allowed: Allowance,
-) -> Choice:
+) -> ModelChoice:
     """Return the cheapest pair of models whose proven error is allowed.
 
     Parameters
@@ -89,7 +90,7 @@ def choose(
     earths, attitudes : tuple of str
         What there is to choose from; if nothing is good enough, the exact one of each.
     envelopes : sequence of Envelope
-        One for each sensor; none where nobody looks.
+        One for each sensor; none where no sensor looks.
     allowed : Allowance
         The error of the two models together must stay within it.
     """
@@ -108,7 +109,7 @@ def choose(
     else:
         earth, attitude = max(earths, key=EARTH_MODELS.index), min(attitudes)
         bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
-    return Choice(earth, attitude, bound, tuple(refused.values()))
+    return ModelChoice(earth, attitude, bound, tuple(refused.values()))
 
 
 def _worst(bounds: Sequence[ErrorBound]) -> ErrorBound:

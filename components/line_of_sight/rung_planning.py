@@ -19,7 +19,7 @@ from components.messages.reach import FarthestLook, farthest_look
 
 
 @dataclass(frozen=True)
-class Rung:
+class PickedModels:
     """The models a transform computes with.
 
     Parameters
@@ -37,7 +37,7 @@ class Rung:
     sentences: tuple[str, ...] = ()
 
 
-def pick_rung(transform: Any) -> Rung:
+def pick_rung(transform: Any) -> PickedModels:
     """Pick a transform's models, once its consumers and producers are known.
 
     What the scene names is taken. Exact models, and those that are left to ``auto``, give way to
@@ -63,12 +63,12 @@ def pick_rung(transform: Any) -> Rung:
         )
     ]  # fmt: skip
 
-    def stay(because: str) -> Rung:
+    def stay(because: str) -> PickedModels:
         sentence = f"geometry: {name_of(*exact)}, {because}"
-        return Rung(*exact, sentences=(sentence,) if auto or given else ())
+        return PickedModels(*exact, sentences=(sentence,) if auto or given else ())
 
     if not any(free) or not (auto or len(given) == 2):
-        return Rung(*exact)
+        return PickedModels(*exact)
     if transform.context.simulate_everything:
         return stay("the reference: everything is simulated")
     if not given:
@@ -101,7 +101,7 @@ def pick_rung(transform: Any) -> Rung:
     silent = [key for key in ("angle_deg", "range_m") if key not in tolerance]
     judged += [f"[accuracy] {key} is not given and not judged" for key in silent]
     picked = f"geometry: {name_of(choice.earth, choice.attitude)}, {'; '.join(judged)}"
-    return Rung(
+    return PickedModels(
         choice.earth,
         choice.attitude,
         choice.bound,

@@ -14,13 +14,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
-from components.geometry.angles import wrap_pi_unchecked
-from components.geometry.ellipsoid import spherical_from_enu
-from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
+from components.geometry.line_of_sight import LineOfSight
+from components.geometry.wrapping import wrap_pi_unchecked
 from components.line_of_sight.ladder import ATTITUDE, EARTH
 from components.line_of_sight.rung_choice import REFERENCE
-from components.line_of_sight.rung_planning import Rung, pick_rung
+from components.line_of_sight.rung_planning import PickedModels, pick_rung
 from components.line_of_sight.true_reach import true_reach_m
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
@@ -30,19 +28,6 @@ from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
-
-LINES_OF_SIGHT: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
-    "flat_earth": flat_earth.line_of_sight,
-    "local_radii": local_radii.line_of_sight,
-    "geodesic": geodesic.line_of_sight,
-    "ellipsoid": ellipsoid.line_of_sight,
-}
-# Those that find offsets first; the directions' angles in body axes then need no sines of angles.
-OFFSETS: dict[str, Callable[..., tuple[Any, Any, Any]]] = {
-    "flat_earth": flat_earth.north_east_up,
-    "local_radii": local_radii.north_east_up,
-    "ellipsoid": ellipsoid.north_east_up,
-}
 
 _PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 
@@ -87,7 +72,7 @@ class Transform(Component):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.rung: Rung | None = None
+        self.rung: PickedModels | None = None
 
     def setup(self) -> None:
         """Take what the ownship believes of itself, and the models to compute with."""
@@ -95,12 +80,10 @@ class Transform(Component):
             "ownship"
         )
         self.rung = pick_rung(self)
-        self._line_of_sight = LINES_OF_SIGHT[self.rung.earth]
-        exact = self.rung.attitude == "exact"
-        self._offsets = OFFSETS.get(self.rung.earth) if exact else None
+        self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that somebody downstream may look at, by their true ranges."""
+        """Ask for the targets that a sensor downstream may look at, by their true ranges."""
         look = farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
         return replace(look, range_m=true_reach_m(self.context, earth, look))
@@ -151,27 +134,11 @@ class Transform(Component):
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
-        assert self.rung is not None
-        places = own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
-        attitude = own.yaw_rad, own.pitch_rad, own.roll_rad
-        if self._offsets is None:
-            azimuth, elevation, range_m = self._line_of_sight(*places, validate=False)
-            p, q = sensor_angles(
-                azimuth, elevation, *attitude, model=self.rung.attitude, validate=False
-            )
-        else:
-            with np.errstate(under="ignore"):  # what is too small for a double is zero
-                offsets = self._offsets(*places)
-                azimuth, elevation, range_m = spherical_from_enu(*offsets)
-                p, q = sensor_angles_of_offsets(*offsets, *attitude)
-        heading = wrap_pi_unchecked(other.yaw_rad - azimuth)
-        _require_numbers(p, heading, other.pitch_rad, other.roll_rad)
+        seen = self._line_of_sight.from_ownship(own, other)
+        heading = wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)
+        _require_numbers(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
         return {
-            "azimuth_rad": azimuth,
-            "elevation_rad": elevation,
-            "range_m": range_m,
-            "body_azimuth_rad": p,
-            "body_elevation_rad": q,
+            **seen._asdict(),
             "relative_heading_rad": heading,
             "target_pitch_rad": other.pitch_rad,
             "target_roll_rad": other.roll_rad,
@@ -218,21 +185,25 @@ class FlatEarth(Transform):
     """Line of sight over a flat Earth with 111,195 m per degree (thesis eq. 1-5, corrected)."""
 
     earth = "flat_earth"
+    lockstep = True
 
 
 class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
     earth = "local_radii"
+    lockstep = True
 
 
 class Geodesic(Transform):
     """Bearing and distance along the geodesic (GeographicLib), elevation from the heights."""
 
     earth = "geodesic"
+    lockstep = True
 
 
 class Ellipsoid(Transform):
     """Exact line of sight on the WGS-84 ellipsoid."""
 
     earth = "ellipsoid"
+    lockstep = True

@@ -14,7 +14,7 @@ _LARGEST_RELATIVE_ERROR = 0.5
 def true_reach_m(context: Context, earth: str, look: FarthestLook) -> float:
     """Return a true range beyond which no target seems to be within the range of a look.
 
-    Whoever leaves far targets out goes by their true ranges; sensors go by those of the model.
+    Traffic leaves far targets out by their true ranges; sensors go by those of the model.
     With a relative error e of the range, proven for all targets that seem to be in reach, these
     are within R / (1 - e).
 

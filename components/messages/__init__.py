@@ -1,4 +1,4 @@
-"""What blocks tell each other: targets, detections, manoeuvres, reach."""
+"""Messages between blocks: targets, detections, manoeuvres, reach."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ __all__ = [
     "TrafficStates",
 ]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Detections": "components.messages.detections",
     "FusedDetections": "components.messages.detections",

@@ -1,4 +1,4 @@
-"""What every column of a run folder's tables means, its unit and its frame.
+"""The meaning, unit and frame of every column of a run folder's tables.
 
 Beside the messages' ``recorded``, which has the types; a test sees that none is missing.
 """
@@ -81,7 +81,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "entered_s": ("s", "", "when the message came to the processor"),
         "started_s": ("s", "", "when work on it began; null if never"),
         "age_s": ("s", "", "from the instant it is about to its delivery"),
-        "queue_length": ("messages", "", "messages in line when it came"),
+        "queue_length": ("messages", "", "messages that waited behind it at its outcome"),
         "outcome": ("", "", "whether it was done, dropped or skipped"),
     },
 }

@@ -1,4 +1,4 @@
-"""What the sensors report, and what becomes of it: detections, fused lines of sight, tracks.
+"""Messages of and after the sensors: detections, fused lines of sight, tracks.
 
 All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
 is clockwise and elevation upward.
@@ -44,7 +44,7 @@ EXTRAS = {
 
 @dataclass(frozen=True)
 class SensorOffer:
-    """What a sensor says of its detections to whoever receives them.
+    """What a sensor says of its detections to the blocks that receive them.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Detections(Message):
 
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
-        # A sensor without a rule declares what it detects; nobody is behind a false alarm.
+        # A sensor without a rule declares what it detects; no target is behind a false alarm.
         return {"declared": self.target >= 0, **self.extras}
 
 

@@ -1,7 +1,7 @@
 """The flights that the traffic passes on with its rows, for who must know other instants.
 
 What is known of a flight depends on when it is asked: an ownship that is steered will turn where
-nobody expects it yet. So every row carries the flights as they are known at its own instant, and
+it is not expected yet. So every row carries the flights as they are known at its own instant, and
 keeps them whatever the other rows of its message know.
 """
 
@@ -77,7 +77,7 @@ class KnownFlights:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Flights as somebody sees them; equal where the flights and the onlooker are."""
+    """Flights as an onlooker sees them; equal where the flights and the onlooker are."""
 
     flight: Flights
     seen: Callable[..., Mapping[str, AnyArray]]

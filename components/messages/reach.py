@@ -60,19 +60,23 @@ class Reach:
         return _field_of_view(self.azimuth_rad, self.elevation_rad)
 
     def decide(
-        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
+        self,
+        body_azimuth_rad: FloatArray,
+        body_elevation_rad: FloatArray,
+        range_m: FloatArray,
+        present: BoolArray,
     ) -> ReasonArray:
         """Return the reason why each target is skipped, or EVALUATE.
 
         Parameters
         ----------
-        p_rad, q_rad, range_m, present : arrays of one shape
+        body_azimuth_rad, body_elevation_rad, range_m, present : arrays of one shape
             Body azimuth in (-pi, pi] and elevation, slant range, and whether the target is there;
             finite.
         """
         if not self.enabled:
             return np.where(present, _OFF, _ABSENT)
-        seen = self._field.holds(p_rad, q_rad)
+        seen = self._field.holds(body_azimuth_rad, body_elevation_rad)
         reason = np.where(seen, _EVALUATE, _FIELD_OF_VIEW)
         if self.range_max_m < math.inf:
             seen &= range_m > self.range_max_m
@@ -84,12 +88,12 @@ class Reach:
 
 @dataclass(frozen=True)
 class FarthestLook:
-    """What a block asks of the traffic: targets up to this range; farther ones matter to nobody.
+    """What a block asks of the traffic: targets up to this range; farther ones do not matter.
 
     Parameters
     ----------
     range_m : float
-        Infinite where somebody has no limit.
+        Infinite where a sensor has no limit.
     views : tuple of (range, elevation)
         For each sensor its range in m and the largest size of an elevation in body axes at which
         it looks.

@@ -1,4 +1,4 @@
-"""What an avoidance block tells the ownship to do."""
+"""The message of an avoidance block to the ownship."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where the aircraft are: what flows from the traffic to the sensors.
+"""Messages from the traffic to the sensors: where the aircraft are.
 
 All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
 is clockwise and elevation upward.
@@ -32,13 +32,13 @@ class TrafficStates(Message):
     roster : Roster
         What all targets of the run are.
     columns : (targets,) of int
-        Which of them the arrays hold, ascending; the others are out of everybody's reach.
+        Which of them the arrays hold, ascending; the others are out of all sensors' reach.
     culled : (rows,) of int, or None
-        How many of the roster are out of everybody's reach at each instant; those among the
+        How many of the roster are out of all sensors' reach at each instant; those among the
         columns are not `present`. None where all are moved.
     flights : KnownFlights or None
         The flights as each row knows them, for a beam that sweeps: it must know them at other
-        instants. None where nobody does.
+        instants. None where no block does.
     """
 
     own_lat_deg: FloatArray

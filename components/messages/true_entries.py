@@ -1,4 +1,4 @@
-"""What is left of detections without those that have no target."""
+"""Detections without those that have no target."""
 
 from dataclasses import fields, replace
 from typing import Any, TypeVar

@@ -1,1 +1,1 @@
-"""What a study measures of an encounter: detection, declaration, fusion, tracks."""
+"""Metrics of an encounter: detection, declaration, fusion, tracks."""

@@ -1,4 +1,4 @@
-"""How often two periodic clocks meet within a gate, in exact rational numbers.
+"""The share of meetings of two periodic clocks within a gate, in exact rational numbers.
 
 The scans of one clock fall on finitely many phases of the other's period: q equally spaced ones,
 where f1/f2 = p/q in lowest terms. Counting them is exact.

@@ -1,13 +1,14 @@
-"""When a target is declared: m detections in n scans (``declaration``)."""
+"""The time at which a target is declared: m detections in n scans (``declaration``)."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from components.metrics.rows import (
-    SensorParameters,
+    SensorMetricParameters,
     TargetMetric,
     first_rows,
     is_named,
@@ -15,14 +16,15 @@ from components.metrics.rows import (
     sensors_of,
     taken,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from components.metrics.run_ends import SCANS, at_start, start_or_never
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, Told
 
 ANY = "any"
 
 
-class DeclarationParameters(SensorParameters):
+class DeclarationParameters(SensorMetricParameters):
     """Parameters of declaration metrics."""
 
     m: int | None = Field(
@@ -41,6 +43,10 @@ class DeclarationParameters(SensorParameters):
         return self
 
 
+#: Columns of detections that `declarations` needs.
+DECLARED = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
+
+
 class Declaration(TargetMetric):
     """Time and true slant range of the first declaration, per sensor and of any of them.
 
@@ -49,7 +55,7 @@ class Declaration(TargetMetric):
     """
 
     Parameters = DeclarationParameters
-    tables = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
+    tables = {**DECLARED, **SCANS}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -60,24 +66,34 @@ class Declaration(TargetMetric):
         """Return four results per sensor."""
         found = []
         for name in self.names:
+            cut = f"declaration_cut_off.{name}"
+            who = "any of the sensors" if name == ANY else name
             found += [
-                Result(f"declared.{name}", EVENT, "whether the target is declared"),
-                Result(f"declaration_time_s.{name}", NUMBER, "first declaration, s"),
-                Result(f"declaration_range_m.{name}", NUMBER, "true slant range then, m"),
+                Result(
+                    f"declared.{name}", EVENT, "whether the target is declared",
+                    told=Told(who, "no longer declares any target", "now declares a target"),
+                ),
+                Result(
+                    f"declaration_time_s.{name}", NUMBER, "first declaration, s", cut,
+                    Told(who, "declares a target earlier", "declares a target later"),
+                ),
+                Result(f"declaration_range_m.{name}", NUMBER, "true slant range then, m", cut),
                 Result(
                     f"declaration_delay_s.{name}", NUMBER, "from first detection to declaration, s"
                 ),
-            ]
+            ]  # fmt: skip
         return found
 
-    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return the first declaration of every replica."""
-        found: dict[str, FloatArray] = {}
-        for name, (time_s, range_m, first_s) in declarations(group, self.p, self.sensors).items():
-            found[f"declared.{name}"] = (~np.isnan(time_s)).astype(float)
-            found[f"declaration_time_s.{name}"] = time_s
-            found[f"declaration_range_m.{name}"] = range_m
-            found[f"declaration_delay_s.{name}"] = time_s - first_s
+        found: dict[str, AnyArray] = {}
+        for name, first in declarations(group, self.p, self.sensors).items():
+            found[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
+            found[f"declaration_time_s.{name}"] = first.time_s
+            found[f"declaration_range_m.{name}"] = first.range_m
+            found[f"declaration_delay_s.{name}"] = first.time_s - first.seen_s
+            cut = start_or_never(first.at_start, first.time_s)
+            found[f"declaration_cut_off.{name}"] = cut
         return found
 
     def expected(self, scene: Scene) -> Mapping[str, float]:
@@ -86,28 +102,48 @@ class Declaration(TargetMetric):
         for name in self.sensors:
             parameters = scene.blocks[name].parameters
             clock = scene.blocks[name].cls.clock_of(parameters)
-            m = self.p.m or getattr(parameters, "declare_m", None) or 1
+            m = needed(self.p.m, scene, name)
             if clock is not None:
                 found[f"declaration_delay_s.{name}"] = float(clock.period_s * (m - 1))
         return found
 
 
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """The first declaration of a target by a sensor, per replica.
+
+    Parameters
+    ----------
+    time_s, range_m : (replicas,)
+        When it is and the true slant range then; NaN where there is none.
+    seen_s : (replicas,)
+        Time of the first detection; NaN where there is none.
+    at_start, seen_at_start : (replicas,)
+        Whether the declaration, or the detection, is as early as the start of the run lets it.
+    """
+
+    time_s: FloatArray
+    range_m: FloatArray
+    seen_s: FloatArray
+    at_start: BoolArray
+    seen_at_start: BoolArray
+
+
 def declarations(
     group: Group, parameters: DeclarationParameters, sensors: list[str]
-) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return sensor (or "any") → time (s) and true range (m) of the first declaration, and the
-    time (s) of the first detection, per replica."""
+) -> dict[str, Declared]:
+    """Return sensor (or "any") → its first declarations."""
     key = ("declarations", parameters.m, parameters.n, parameters.target, tuple(sensors))
     return group.once(key, lambda: _declarations(group, parameters, sensors))
 
 
 def _declarations(
     group: Group, parameters: DeclarationParameters, sensors: list[str]
-) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:
+) -> dict[str, Declared]:
     columns: Any = group.tables["detections"]
     known = of_target(columns, parameters.target)
     count = len(group)
-    found: dict[str, tuple[FloatArray, FloatArray, FloatArray]] = {}
+    found: dict[str, Declared] = {}
     for name in sensors:
         rows = np.flatnonzero(known & is_named(columns["block"], name))
         if parameters.m is None or parameters.n is None:
@@ -121,22 +157,41 @@ def _declarations(
                 parameters.n,
             )
         first = first_rows(columns, rows[declared], count)
-        found[name] = (
-            taken(columns, "time_s", first),
+        time_s = taken(columns, "time_s", first)
+        seen_s = taken(columns, "time_s", first_rows(columns, rows, count))
+        scans = needed(parameters.m, group.scene, name)
+        found[name] = Declared(
+            time_s,
             taken(columns, "true_range_m", first),
-            taken(columns, "time_s", first_rows(columns, rows, count)),
+            seen_s,
+            at_start(group, name, time_s, scans),
+            at_start(group, name, seen_s),
         )
-    each = list(found.values())
-    times, ranges, firsts = (
-        np.array([part[k] for part in each]).reshape(len(each), count) for k in range(3)
-    )
-    which = np.argmin(np.where(np.isnan(times), np.inf, times), axis=0)[np.newaxis]
-    found[ANY] = (
-        np.take_along_axis(times, which, axis=0)[0],
-        np.take_along_axis(ranges, which, axis=0)[0],
-        np.min(np.where(np.isnan(firsts), np.inf, firsts), axis=0),
-    )
+    found[ANY] = _earliest(list(found.values()), count)
     return found
+
+
+def needed(m: int | None, scene: Scene, name: str) -> int:
+    """Return how many detections declare: `m`, or what the sensor's own rule says."""
+    return int(m or getattr(scene.blocks[name].parameters, "declare_m", None) or 1)
+
+
+def _earliest(each: list[Declared], count: int) -> Declared:
+    """Return the first declaration, and the first detection, of any sensor."""
+
+    def joined(name: str) -> AnyArray:
+        return np.array([getattr(one, name) for one in each]).reshape(len(each), count)
+
+    def first(time_s: AnyArray) -> Any:
+        return np.argmin(np.where(np.isnan(time_s), np.inf, time_s), axis=0)[np.newaxis]
+
+    declared, seen = first(joined("time_s")), first(joined("seen_s"))
+    values = [
+        np.take_along_axis(joined(name), which, axis=0)[0]
+        for name, which in (("time_s", declared), ("range_m", declared), ("seen_s", seen),
+                            ("at_start", declared), ("seen_at_start", seen))
+    ]  # fmt: skip
+    return Declared(*values)
 
 
 def _m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:

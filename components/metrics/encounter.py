@@ -1,4 +1,4 @@
-"""What an encounter comes to, and how long before it somebody knew (``closest_approach``,
+"""The outcome of an encounter, and the warning time before it (``closest_approach``,
 ``well_clear``).
 
 Loss of well clear is that of ASTM F3442 for small unmanned aircraft, 2000 ft horizontally and
@@ -11,14 +11,27 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.declaration import ANY, DeclarationParameters, declarations
+from components.metrics.declaration import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.rows import TargetMetric, sensors_of
-from components.metrics.separation import Flight, closest, first_inside, separations, traffic_block
-from dsa_des.arrays.types import FloatArray
+from components.metrics.run_ends import SCANS
+from components.metrics.separation import (
+    RelativeFlight,
+    closest,
+    first_inside,
+    separations,
+    traffic_block,
+)
+from components.sensor.cut_off import END, START, in_scan, said
+from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
 FOOT_M = 0.3048
+#: Where a closest approach may be cut off, see `components.traffic.censored.end_of_look`.
+_ENDS = ("", START, END, "the start of its flight", "the end of its flight")
+_NOWHERE = (float("inf"), float("nan"), "")
+_BEFORE = ("detection", "declaration")
+_CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
 WELL_CLEAR_M = (2000 * FOOT_M, 250 * FOOT_M)
 NMAC_M = (500 * FOOT_M, 100 * FOOT_M)
 
@@ -33,7 +46,7 @@ class EncounterParameters(DeclarationParameters):
 
 class _Encounter(TargetMetric):
     Parameters = EncounterParameters
-    tables = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
+    tables = {**DECLARED, **SCANS}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -41,7 +54,7 @@ class _Encounter(TargetMetric):
         self.sensors = sensors_of(scene, parameters.sensors)
 
     def of_flights(
-        self, group: Group, read: Callable[[list[Flight]], tuple[float, ...]], width: int
+        self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
     ) -> FloatArray:
         """Return what `read` makes of every replica's flights, shape (width, replicas).
 
@@ -71,27 +84,37 @@ class ClosestApproach(_Encounter):
     def results(self) -> list[Result]:
         """Return distance, time, and times from detection and declaration."""
         found = [
-            Result("closest_approach_m", NUMBER, "smallest slant range, m"),
-            Result("closest_approach_time_s", NUMBER, "when that is, s"),
+            Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF),
+            Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF),
         ]
         for name in [*self.sensors, ANY]:
+            seen, declared = (f"{what}_to_closest_cut_off.{name}" for what in _BEFORE)
             found += [
-                Result(f"detection_to_closest_s.{name}", NUMBER, "from first detection to it, s"),
-                Result(f"declaration_to_closest_s.{name}", NUMBER, "from declaration to it, s"),
-            ]
+                Result(
+                    f"detection_to_closest_s.{name}", NUMBER, "from first detection to it, s", seen
+                ),
+                Result(
+                    f"declaration_to_closest_s.{name}", NUMBER, "from declaration to it, s",
+                    declared,
+                ),
+            ]  # fmt: skip
         return found
 
-    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        distance, time_s = self.of_flights(group, _closest, 2)
-        found: dict[str, FloatArray] = {
+        distance, time_s, code = self.of_flights(group, _closest, 3)
+        at = np.array(_ENDS)[code.astype(int)]
+        found: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,
+            _CUT_OFF: said(at, distance),
         }
-        for name, (declared_s, _, first_s) in declarations(group, self.p, self.sensors).items():
-            seen_s = np.where(np.isfinite(first_s), first_s, np.nan)
-            found[f"detection_to_closest_s.{name}"] = time_s - seen_s
-            found[f"declaration_to_closest_s.{name}"] = time_s - declared_s
+        for name, first in declarations(group, self.p, self.sensors).items():
+            parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
+            for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
+                value = time_s - when_s
+                found[f"{what}_to_closest_s.{name}"] = value
+                found[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
         return found
 
 
@@ -103,39 +126,47 @@ class WellClear(_Encounter):
         found = [
             Result("well_clear_lost", EVENT, "within 2000 ft and 250 ft (ASTM F3442)"),
             Result("nmac", EVENT, "within 500 ft and 100 ft"),
-            Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s"),
+            Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
         found += [
-            Result(f"warning_time_s.{name}", NUMBER, "from declaration to the loss, s")
+            Result(
+                f"warning_time_s.{name}", NUMBER, "from declaration to the loss, s",
+                f"warning_cut_off.{name}",
+            )
             for name in [*self.sensors, ANY]
-        ]
+        ]  # fmt: skip
         return found
 
-    def measure(self, group: Group) -> Mapping[str, FloatArray]:
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s = self.of_flights(group, _losses, 2)
-        found: dict[str, FloatArray] = {
+        lost_s, collision_s, begun_s = self.of_flights(group, _losses, 3)
+        lost_at_start = in_scan(lost_s, begun_s)
+        found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
             "nmac": (~np.isnan(collision_s)).astype(float),
             "well_clear_loss_time_s": lost_s,
+            _LOSS_CUT_OFF: said(np.where(lost_at_start, START, "")),
         }
-        for name, (declared_s, _, _) in declarations(group, self.p, self.sensors).items():
-            found[f"warning_time_s.{name}"] = lost_s - declared_s
+        for name, first in declarations(group, self.p, self.sensors).items():
+            warning_s = lost_s - first.time_s
+            found[f"warning_time_s.{name}"] = warning_s
+            cut = (first.at_start | lost_at_start) & ~np.isnan(warning_s)
+            found[f"warning_cut_off.{name}"] = said(np.where(cut, START, ""))
         return found
 
 
-def _closest(flights: list[Flight]) -> tuple[float, ...]:
-    """Return smallest range (m) and its time (s)."""
-    best = (float("inf"), float("nan"))
-    for flight in flights:
-        best = min(best, closest(flight))
-    return best if np.isfinite(best[0]) else (float("nan"), float("nan"))
+def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
+    """Return smallest range (m), its time (s), and the place in `_ENDS` of where it is cut off."""
+    best = min((closest(flight) for flight in flights), default=_NOWHERE)
+    if not np.isfinite(best[0]):
+        return float("nan"), float("nan"), 0.0
+    return best[0], best[1], float(_ENDS.index(best[2]))
 
 
-def _losses(flights: list[Flight]) -> tuple[float, ...]:
-    """Return when well clear is first lost and when a collision first threatens, s."""
+def _losses(flights: list[RelativeFlight]) -> tuple[float, ...]:
+    """Return when well clear is first lost, when a collision first threatens, and the start, s."""
     if not flights:
-        return float("nan"), float("nan")
+        return (float("nan"),) * 3
     first = np.array([first_inside(flight, WELL_CLEAR_M, NMAC_M) for flight in flights])
     lost_s, collision_s = np.fmin.reduce(first).tolist()
-    return lost_s, collision_s
+    return lost_s, collision_s, 0.0

@@ -1,4 +1,4 @@
-"""How often two sensors' detections are fused with each other (``fused_share``)."""
+"""The share of two sensors' detections that are fused with each other (``fused_share``)."""
 
 import itertools
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from components.metrics.clock_coincidence import coincidence_share
 from components.metrics.jittered_coincidence import mean_coincidence_share
 from components.metrics.rows import (
     FUSED,
-    SensorParameters,
+    SensorMetricParameters,
     TargetMetric,
     chosen,
     is_named,
@@ -33,7 +33,7 @@ class FusedShare(TargetMetric):
     instant or while they are held, in a fused line of sight to which radar contributed.
     """
 
-    Parameters = SensorParameters
+    Parameters = SensorMetricParameters
     tables = {
         "detections": ("block", "target", "time_s"),
         FUSED: ("target", "sensors", "time_s", "block"),

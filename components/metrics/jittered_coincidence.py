@@ -1,4 +1,4 @@
-"""How often two clocks meet within a gate when they jitter or run at slightly wrong rates.
+"""The share of meetings of two clocks that jitter or run at slightly wrong rates.
 
 Between the grid instants everything is exact ticks; jitter is normal and independent from scan to
 scan, so the difference of two instants is normal about the grid's difference.

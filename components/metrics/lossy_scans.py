@@ -1,4 +1,4 @@
-"""What a periodic sensor gives when each of its scans comes through with a fixed probability.
+"""Age and intervals of a periodic sensor whose scans come through with a fixed probability.
 
 Scans come through independently, so the number of periods between two that do is geometric:
 E[N] = 1/q, E[N²] = (2 - q)/q².

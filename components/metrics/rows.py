@@ -25,7 +25,7 @@ class TargetParameters(Parameters):
     )
 
 
-class SensorParameters(TargetParameters):
+class SensorMetricParameters(TargetParameters):
     """A target, and whose reports count."""
 
     sensors: tuple[str, ...] | None = Field(

@@ -1,4 +1,4 @@
-"""How far apart the aircraft of an encounter truly are: slant, horizontal and vertical distance.
+"""True distances of the aircraft of an encounter: slant, horizontal and vertical.
 
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.censored import end_of_look, present_together_s
 from components.traffic.sample_times import (
     SampleTimes,
     SharedTimes,
@@ -68,7 +69,7 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
-def separations(scene: Scene, step_s: float) -> "list[Flight]":
+def separations(scene: Scene, step_s: float) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -83,10 +84,14 @@ def separations(scene: Scene, step_s: float) -> "list[Flight]":
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
     count = regular_count(step_s, float(duration))
-    return [Flight(source, number, step_s, count) for number in range(len(source.targets))]
+    end_s = float(duration)
+    return [
+        RelativeFlight(source, number, step_s, count, end_s)
+        for number in range(len(source.targets))
+    ]
 
 
-class Flight:
+class RelativeFlight:
     """The distances of one target from the ownship, in pieces of time one after the other.
 
     Parameters
@@ -98,13 +103,20 @@ class Flight:
         Spacing of the grid.
     count : int
         Number of its times.
+    end_s : float
+        Of the run.
     """
 
-    def __init__(self, source: Any, number: int, step_s: float, count: int) -> None:
+    def __init__(self, source: Any, number: int, step_s: float, count: int, end_s: float) -> None:
         self._source, self._number = source, number
         self._target = source.targets[number]
         self.name: str = self._target.name
         self._step_s, self._count = step_s, count
+        self.end_s = end_s
+
+    def present_s(self) -> tuple[FloatArray, FloatArray]:
+        """Return the first and the last time (1,) at which both aircraft may be there, s."""
+        return present_together_s(self._source.own, [self._target], self.end_s)
 
     def pieces(self) -> Iterator[Separation]:
         """Give the distances, about `MOST_AT_ONCE` at a time."""
@@ -151,14 +163,22 @@ def _separation(source: Any, target: Any, time_s: FloatArray) -> Separation:
     )
 
 
-def closest(flight: Flight) -> tuple[float, float]:
-    """Return the smallest range (m) and its time (s), the first of several."""
+def closest(flight: RelativeFlight) -> tuple[float, float, str]:
+    """Return the smallest range (m), its time (s), the first of several, and where it is cut off.
+
+    See `components.traffic.censored.end_of_look`.
+    """
     best = (float("inf"), float("nan"))
+    looked_s = np.full(2, np.nan)
     for piece in flight.pieces():
         place = int(np.argmin(piece.range_m))
         if piece.range_m[place] < best[0]:
             best = float(piece.range_m[place]), float(piece.time_s[place])
-    return best
+        there_s = piece.time_s[np.isfinite(piece.range_m)]
+        if len(there_s):
+            looked_s = np.array([np.fmin(looked_s[0], there_s[0]), there_s[-1]])
+    present_s = np.array(flight.present_s())[:, 0]
+    return *best, end_of_look(best[1], looked_s, present_s, flight.end_s)
 
 
 def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
@@ -166,7 +186,7 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
 
     Parameters
     ----------
-    flight : Flight
+    flight : RelativeFlight
     *limits_m : (horizontal, vertical)
     """
     found = [float("nan")] * len(limits_m)

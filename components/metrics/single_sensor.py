@@ -1,4 +1,4 @@
-"""Who alone feeds the fusion, and how many of its scans come through: for analytic answers."""
+"""The sensor that alone feeds the fusion, and its scans that come through, analytically."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How fresh, how steady and how right the fused picture is (``age_of_information``,
+"""Freshness, steadiness and errors of the fused picture (``age_of_information``,
 ``track_updates``, ``position_error``)."""
 
 from collections.abc import Mapping
@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.geometry.attitude import unit_vector_unchecked
+from components.geometry.directions import angle_of_chord, chord_between
 from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
 from components.metrics.rows import (
     FUSED,
@@ -244,10 +246,10 @@ class PositionError(TargetMetric):
         """Return both errors of every replica."""
         columns: Any = group.tables[FUSED]
         rows = chosen(columns, of_target(columns, self.p.target), *self.tables[FUSED][1:])
-        seen = _direction(rows["azimuth_rad"], rows["elevation_rad"])
-        true = _direction(rows["true_azimuth_rad"], rows["true_elevation_rad"])
-        chord = np.sqrt(sum((s - t) ** 2 for s, t in zip(seen, true, strict=True)))
-        angle = 2.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
+        seen = unit_vector_unchecked(rows["azimuth_rad"], rows["elevation_rad"])
+        true = unit_vector_unchecked(rows["true_azimuth_rad"], rows["true_elevation_rad"])
+        chord = chord_between(seen, true)
+        angle = angle_of_chord(chord)
         replica, count = rows["replica"], len(group)
         ranged = np.flatnonzero(~np.isnan(rows["range_m"]))
         r, t = rows["range_m"][ranged], rows["true_range_m"][ranged]
@@ -257,8 +259,3 @@ class PositionError(TargetMetric):
             "fused_position_error_m": np.sqrt(_means(replica[ranged], square, count)),
             "fused_angle_error_deg": np.degrees(np.sqrt(_means(replica, angle**2, count))),
         }
-
-
-def _direction(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> tuple[FloatArray, ...]:
-    level = np.cos(elevation_rad)
-    return level * np.cos(azimuth_rad), level * np.sin(azimuth_rad), np.sin(elevation_rad)

@@ -1,1 +1,1 @@
-"""What the ownship believes of its own position and attitude."""
+"""The ownship's belief of its own position and attitude."""

@@ -1,4 +1,4 @@
-"""What the ownship's own navigation does to what its sensors report.
+"""The effect of the ownship's own navigation on what its sensors report.
 
 Sensors measure in body axes, and physics knows no navigation error: body angles, detections and
 whatever follows from them stay as they are. What an error touches is the conversion to the
@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import wrap_two_pi
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
+from components.geometry.wrapping import wrap_two_pi
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.error_model import attitude_with_error, position_with_error
@@ -30,8 +30,8 @@ _SCAN_BITS = 48
 
 class _Navigation(Effect):
     name = "navigation"
-    # Without it there is nothing to tell: the columns are null.
     neutral = False
+    outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[navigation]``."""

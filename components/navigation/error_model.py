@@ -21,10 +21,7 @@ from components.arguments.checks import (
     require_between,
     unflatten,
 )
-
-_EQUATORIAL_RADIUS_M = 6_378_137.0
-_FLATTENING = 1.0 / 298.257223563
-_E2 = _FLATTENING * (2.0 - _FLATTENING)
+from components.geometry.ellipsoid import radii_of_curvature
 
 # Beyond this a displacement along the tangent plane would no longer be a small error.
 LARGEST_POSITION_ERROR_M = 100_000.0
@@ -174,9 +171,7 @@ def _displaced(
 ) -> tuple[FloatArray, FloatArray]:
     lat = np.radians(lat_deg)
     sine, cosine = np.sin(lat), np.cos(lat)
-    w2 = 1.0 - _E2 * sine * sine
-    across = _EQUATORIAL_RADIUS_M / np.sqrt(w2)
-    along = across * (1.0 - _E2) / w2
+    along, across = radii_of_curvature(lat_deg)
     a, b = north / (along + alt), east / (across + alt)
     arc = np.hypot(a, b)
     moved = arc > 0.0

@@ -1,4 +1,4 @@
-"""What daylight does to a target's contrast: sun, sky and ground behind it."""
+"""The effect of daylight on a target's contrast: sun, sky and ground behind it."""
 
 import math
 from collections.abc import Callable
@@ -18,8 +18,8 @@ class Background(Effect):
     lockstep = True
     name = "background and sun"
     acts_on = "contrast"
-    # There is no sun under which every target's contrast against its background is exactly 1.
     neutral = False
+    outside_the_proof = "no sun leaves every target's contrast exactly as it is"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``background``."""

@@ -1,6 +1,5 @@
-"""What EO and IR cameras have in common: pixels, signature, threshold (thesis §3.5.2)."""
+"""The base class of EO and IR cameras: pixels, signature, threshold (thesis §3.5.2)."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, Literal
@@ -8,6 +7,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from components.aircraft.known_targets import known_targets
+from components.geometry.field_of_view import sector_width_rad
 from components.optical.area_of_cells import check_silhouette
 from components.optical.dynamic_signature import DynamicSignature
 from components.optical.farthest_range import farthest_detection_m
@@ -77,8 +77,7 @@ class Camera(Sensor):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        low, high = self.reach.azimuth_rad
-        width = high - low if high > low else high - low + 2.0 * math.pi
+        width = sector_width_rad(*self.reach.azimuth_rad)
         height = self.reach.elevation_rad[1] - self.reach.elevation_rad[0]
         self.pixel_azimuth_rad = width / parameters.azimuth_pixels
         self.pixel_elevation_rad = height / parameters.elevation_pixels

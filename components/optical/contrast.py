@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
 from components.atmosphere.visibility import KOSCHMIEDER
-from components.optical.line_of_sight_rate import angle_between
+from components.geometry.directions import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
 
 

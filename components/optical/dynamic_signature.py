@@ -1,4 +1,4 @@
-"""What a target's motion across the picture adds to its signature (thesis eq. 16-18)."""
+"""The signature that a target's motion across the picture adds (thesis eq. 16-18)."""
 
 from collections.abc import Callable
 from typing import Any

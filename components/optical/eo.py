@@ -9,6 +9,7 @@ from components.optical.background import Background
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import VISIBLE
 from components.sensor.look import Cells
+from components.sensor.marks import EO
 from dsa_des.arrays.types import FloatArray
 
 
@@ -46,7 +47,9 @@ class ElectroOpticalParameters(CameraParameters):
 class ElectroOptical(Camera):
     """An electro-optical camera that sees a target's silhouette against its background."""
 
+    mark = EO
     Parameters = ElectroOpticalParameters
+    lockstep = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), *Camera.effects)
     ladders = (VISIBLE,)

@@ -1,10 +1,10 @@
 """The false alarms of a camera, frame by frame."""
 
-import math
 from typing import Any
 
 import numpy as np
 
+from components.geometry.field_of_view import sector_width_rad
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.optical.false_alarms import false_alarm_direction, false_alarm_in_frame
@@ -30,12 +30,12 @@ class FrameFalseAlarms(Effect):
         share = block.p.false_alarms_per_frame
         return Verdict(share > 0, f"false_alarms_per_frame is {share:g}")
 
-    def build(self, block: Any) -> "FalseAlarms":
+    def build(self, block: Any) -> "AddedFalseAlarms":
         """Return what adds the false alarms to the report."""
-        return FalseAlarms(block, block.p.false_alarms_per_frame if block.p.enabled else 0.0)
+        return AddedFalseAlarms(block, block.p.false_alarms_per_frame if block.p.enabled else 0.0)
 
 
-class FalseAlarms:
+class AddedFalseAlarms:
     """Draws the false alarms of a camera, keyed by its scans.
 
     A false alarm is reported on the pixel grid, like a target; its confidence is 0, just at the
@@ -61,12 +61,11 @@ class FalseAlarms:
             return detections
         scan = detections.scan[row]
         block, reach = self._block, self._block.reach
-        low, high = reach.azimuth_rad
         across, upward = false_alarm_direction(
             self._draws.uniform(_NO_TARGET, scan, _AZIMUTH),
             self._draws.uniform(_NO_TARGET, scan, _ELEVATION),
-            azimuth_start_rad=low,
-            azimuth_width_rad=high - low if high > low else high - low + 2.0 * math.pi,
+            azimuth_start_rad=reach.azimuth_rad[0],
+            azimuth_width_rad=sector_width_rad(*reach.azimuth_rad),
             lowest_elevation_rad=reach.elevation_rad[0],
             highest_elevation_rad=reach.elevation_rad[1],
         )

@@ -7,6 +7,7 @@ from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import INFRARED
 from components.optical.plume import Plume
 from components.sensor.look import Cells
+from components.sensor.marks import IR
 from dsa_des.arrays.types import FloatArray
 
 
@@ -23,7 +24,9 @@ class InfraredParameters(CameraParameters):
 class Infrared(Camera):
     """An infrared camera that sees a target's warm areas, its front and back unequal."""
 
+    mark = IR
     Parameters = InfraredParameters
+    lockstep = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), *Camera.effects)
     ladders = (INFRARED,)

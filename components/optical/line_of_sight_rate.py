@@ -8,49 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, positive, unflatten
-
-
-def angle_between(
-    first_azimuth_rad: ArrayLike,
-    first_elevation_rad: ArrayLike,
-    second_azimuth_rad: ArrayLike,
-    second_elevation_rad: ArrayLike,
-) -> Any:
-    """Give the angle between two directions, exact at every separation.
-
-    atan2(|a × b|, a·b) of the two unit vectors, with cross and dot product written in differences
-    of the angles so that a small separation keeps its digits: azimuths that wrap and directions
-    near the zenith are nothing special.
-
-    Parameters
-    ----------
-    first_azimuth_rad, first_elevation_rad, second_azimuth_rad, second_elevation_rad : array_like
-        Directions in any one frame, rad.
-
-    Returns
-    -------
-    array of the broadcast shape, rad
-        In [0, pi].
-
-    Raises
-    ------
-    ValueError
-        If an angle is not finite.
-    """
-    shape, flat = broadcast_flat(
-        first_azimuth_rad=angle("first_azimuth_rad", first_azimuth_rad),
-        first_elevation_rad=angle("first_elevation_rad", first_elevation_rad),
-        second_azimuth_rad=angle("second_azimuth_rad", second_azimuth_rad),
-        second_elevation_rad=angle("second_elevation_rad", second_elevation_rad),
-    )
-    p1, q1, p2, q2 = flat
-    turn, climb = p2 - p1, q2 - q1
-    cos1, cos2, sin1 = np.cos(q1), np.cos(q2), np.sin(q1)
-    versine = 2.0 * np.square(np.sin(0.5 * turn))
-    across = cos2 * np.sin(turn)
-    upward = np.sin(climb) + sin1 * cos2 * versine
-    along = np.cos(climb) - cos1 * cos2 * versine
-    return unflatten(np.arctan2(np.hypot(across, upward), along), shape)
+from components.geometry.directions import angle_between
+from components.geometry.wrapping import wrap_by_sines
 
 
 def line_of_sight_rate(
@@ -125,8 +84,7 @@ def line_of_sight_rate(
         moved = angle_between(p_before, q_before, p, q)
     else:
         turn = p - p_before
-        turn = np.arctan2(np.sin(turn), np.cos(turn))
-        moved = np.hypot(turn, q - q_before)
+        moved = np.hypot(wrap_by_sines(turn), q - q_before)
     return unflatten(np.where(seen_flag > 0.0, moved, 0.0) / time, shape)
 
 

@@ -17,7 +17,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.optical.line_of_sight_rate import angle_between
+from components.geometry.directions import angle_between
 from components.optical.sun_and_sky import (
     beam_illuminance,
     daylight_sun,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from components.aircraft.silhouette_table import AspectTable
+from components.aircraft.silhouette_table import SilhouetteTable
 from components.arguments.checks import FloatArray, finite
 from dsa_des.files.input_files import InputFileError, status_of
 from dsa_des.text.safe_text import shortened
@@ -117,7 +117,7 @@ class TriangleMesh:
         ]
         return np.array(areas, dtype=np.float64).reshape(shape)[()]
 
-    def tabulate(self, step_deg: float = 5.0) -> AspectTable:
+    def tabulate(self, step_deg: float = 5.0) -> SilhouetteTable:
         """Build an aspect table of the silhouette, for use inside a simulation.
 
         The mesh's own error stays; bilinear interpolation adds to it, most where wings turn
@@ -132,7 +132,7 @@ class TriangleMesh:
 
         Returns
         -------
-        AspectTable
+        SilhouetteTable
 
         Raises
         ------
@@ -147,7 +147,7 @@ class TriangleMesh:
         az, el = np.meshgrid(np.radians(azimuth_deg), np.radians(elevation_deg))
         # The observer's direction is -u; the silhouette from both ends of a line is the same.
         area = self.projected_area(np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), -np.sin(el))
-        return AspectTable(azimuth_deg, elevation_deg, area)
+        return SilhouetteTable(azimuth_deg, elevation_deg, area)
 
 
 def load_mesh(

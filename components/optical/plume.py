@@ -1,4 +1,4 @@
-"""What an engine's hot exhaust adds to the area an infrared camera sees."""
+"""The area that an engine's hot exhaust adds for an infrared camera."""
 
 from collections.abc import Callable
 from typing import Any

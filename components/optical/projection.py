@@ -9,6 +9,7 @@ from pydantic import Field
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import INFRARED, VISIBLE
 from components.sensor.look import Cells
+from components.sensor.marks import EO
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.ladder import Ladder
 
@@ -29,7 +30,9 @@ class Projection(Camera):
     fuselage, whatever the aspect, and the signature counts the pixels along it.
     """
 
+    mark = EO
     Parameters = ProjectionParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     @classmethod

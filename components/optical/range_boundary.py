@@ -5,11 +5,12 @@ from pydantic import Field
 
 from components.optical.ladder import VISIBLE
 from components.sensor.look import Cells, Look
+from components.sensor.marks import EO
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 
 
-class RangeBoundaryParameters(SensorParameters):
+class CameraBoundaryParameters(SensorParameters):
     """Parameters of a range boundary camera; the defaults are TECVOL's."""
 
     range_km: float = Field(
@@ -30,7 +31,9 @@ class OpticalRangeBoundary(Sensor):
     have whose target is just detected at the limit.
     """
 
-    Parameters = RangeBoundaryParameters
+    mark = EO
+    Parameters = CameraBoundaryParameters
+    lockstep = True
     ladders = (VISIBLE,)
 
     def look(self, cells: Cells) -> Look:

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from components.aircraft.silhouette_table import AspectTable
+from components.aircraft.silhouette_table import SilhouetteTable
 from components.arguments.checks import FloatArray
 from components.optical.convex_hull import PLATE_ASPECT_RATIO, union_area
 from components.optical.mesh import TriangleMesh
@@ -22,7 +22,7 @@ MESH_ROWS = 64
 @lru_cache(maxsize=256)
 def sampled_table(
     front_m2: float, side_m2: float, horizontal_m2: float, back_m2: float | None = None
-) -> AspectTable:
+) -> SilhouetteTable:
     """Return the silhouette of the union of the three bodies at every 5 degrees of aspect.
 
     Parameters
@@ -32,7 +32,7 @@ def sampled_table(
 
     Returns
     -------
-    AspectTable
+    SilhouetteTable
         Bilinear between its nodes.
     """
     azimuth_deg = np.arange(0.0, 360.0, STEP_DEG)
@@ -50,7 +50,7 @@ def sampled_table(
         filled(front_m2), filled(side_m2), filled(horizontal_m2),
         None if back_m2 is None else filled(back_m2),
     )  # fmt: skip
-    return AspectTable(
+    return SilhouetteTable(
         azimuth_deg, elevation_deg, area.reshape(elevation_deg.size, azimuth_deg.size)
     )
 

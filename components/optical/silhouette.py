@@ -14,7 +14,7 @@ from components.optical.silhouette_exact import exact_area, line_of_sight_in_tar
 from components.optical.silhouette_thesis import thesis_area
 
 if TYPE_CHECKING:
-    from components.aircraft.silhouette_table import AspectTable
+    from components.aircraft.silhouette_table import SilhouetteTable
     from components.optical.mesh import TriangleMesh
 
 MODELS = ("exact", "thesis", "aspect_table", "convex_hull")
@@ -37,7 +37,7 @@ def visible_area(
     horizontal_m2: ArrayLike | None = None,
     back_m2: ArrayLike | None = None,
     model: str = "exact",
-    table: AspectTable | None = None,
+    table: SilhouetteTable | None = None,
     mesh: TriangleMesh | None = None,
     validate: bool = True,
 ) -> Any:
@@ -74,7 +74,7 @@ def visible_area(
         Back sphere, for infrared (Table 3.2); equal to the front if not given.
     model : {"exact", "thesis", "aspect_table", "convex_hull"}
         Which rung.
-    table : AspectTable, optional
+    table : SilhouetteTable, optional
         For ``aspect_table``.
     mesh : TriangleMesh, optional
         For ``convex_hull``.
@@ -132,7 +132,7 @@ def visible_area(
 def _measured_area(
     angles: dict[str, FloatArray],
     model: str,
-    table: AspectTable | None,
+    table: SilhouetteTable | None,
     mesh: TriangleMesh | None,
 ) -> Any:
     """Look the area up in a table or project the mesh."""
@@ -141,7 +141,7 @@ def _measured_area(
     if mesh is not None and model == "convex_hull":
         return unflatten(mesh.projected_area(u_x, u_y, u_z), shape)
     if table is None:
-        raise ValueError("table is None: model 'aspect_table' needs an AspectTable")
+        raise ValueError("table is None: model 'aspect_table' needs a SilhouetteTable")
     # The table is indexed by where the observer stands as seen from the target: -u.
     azimuth_rad = np.arctan2(-u_y, -u_x)
     elevation_rad = np.arctan2(u_z, np.hypot(u_x, u_y))

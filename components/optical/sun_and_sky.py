@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, angle, broadcast_flat, refuse, unflatten
-from components.optical.line_of_sight_rate import angle_between
+from components.geometry.directions import angle_between
 
 # Illuminance of the sun's beam outside the atmosphere, lux (IES RP-21, 1984).
 EXTRATERRESTRIAL_LUX = 127_500.0

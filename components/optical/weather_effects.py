@@ -1,4 +1,4 @@
-"""What haze, fog and rain take from a camera's contrast."""
+"""The contrast that haze, fog and rain take from a camera."""
 
 from collections.abc import Callable
 from typing import Any

@@ -26,8 +26,8 @@ class BeamSweep(Effect):
 
     name = "beam sweep"
     acts_on = "report"
-    # It fills a column that is null without it.
     neutral = False
+    outside_the_proof = "it fills a column that is null without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``beam_sweep``."""

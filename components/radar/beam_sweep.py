@@ -6,7 +6,6 @@ what is left of the period: it looks one way only.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -14,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, positive, unflatten
-from components.geometry.angles import wrap_pi
+from components.geometry.wrapping import TWO_PI, wrap_pi
 from dsa_des.arrays.types import BoolArray
 
-_TURN = 2.0 * math.pi
 # Where the beam counts as meeting the target: far below any beam's width, and above the rounding
 # of times in a run of days.
 _MET_RAD = 1e-9
@@ -67,7 +65,7 @@ def illumination_offset_s(
     late by about r/w of the offset: 0.5 % for 1 deg/s under a beam of 220 deg/s.
     """
     positive("width_rad", width_rad)
-    if not width_rad <= _TURN * (1.0 + 1e-12):
+    if not width_rad <= TWO_PI * (1.0 + 1e-12):
         raise ValueError(f"width_rad is {width_rad:g}: it must be at most 2π")
     positive("scan_period_s", scan_period_s)
     if not 0.0 < sweep_fraction <= 1.0:
@@ -131,9 +129,10 @@ def first_illumination(
     the first counts.
     """
     beam_rate = width_rad / scan_period_s
-    swept = np.mod(azimuth_rad - start_rad, _TURN)
+    # The bare remainder: what lies a rounding before the start is lit last, not first.
+    swept = np.mod(azimuth_rad - start_rad, TWO_PI)
     # Outside the field of view it is ahead of the nearer edge, or behind it.
-    swept = np.where(swept > 0.5 * (width_rad + _TURN), swept - _TURN, swept)
+    swept = np.where(swept > 0.5 * (width_rad + TWO_PI), swept - TWO_PI, swept)
 
     def lead(offset: FloatArray) -> FloatArray:
         """Return how far the target is ahead of the beam."""
@@ -169,7 +168,7 @@ def first_illumination(
 
 def _into_sweep(angle: FloatArray, width: float) -> FloatArray:
     """Return the angle clockwise from the start, [0, width]; outside, the nearer edge."""
-    angle = np.mod(angle, _TURN)
+    angle = np.mod(angle, TWO_PI)
     past_the_end = angle > width
-    nearer_to_start = _TURN - angle < angle - width
+    nearer_to_start = TWO_PI - angle < angle - width
     return np.where(past_the_end, np.where(nearer_to_start, 0.0, width), angle)

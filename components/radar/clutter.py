@@ -128,39 +128,6 @@ def clutter_detection_probability(
     return unflatten(result, shape)
 
 
-def clutter_false_alarm_probability(
-    cnr: ArrayLike,
-    *,
-    false_alarm_probability: float,
-    clutter: str = "fluctuating",
-    diffuse_cnr: ArrayLike = 0.0,
-) -> Any:
-    """Return the probability that a cell with clutter and no target crosses the noise threshold.
-
-    Parameters
-    ----------
-    cnr, false_alarm_probability, clutter, diffuse_cnr
-        As for `clutter_detection_probability`.
-
-    Returns
-    -------
-    array of the broadcast shape
-        From `false_alarm_probability` without clutter up to 1.
-
-    Raises
-    ------
-    ValueError
-        As for `clutter_detection_probability`.
-    """
-    return clutter_detection_probability(
-        0.0,
-        cnr,
-        false_alarm_probability=false_alarm_probability,
-        clutter=clutter,
-        diffuse_cnr=diffuse_cnr,
-    )
-
-
 def _fluctuating(
     model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float
 ) -> FloatArray:

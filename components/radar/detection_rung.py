@@ -1,4 +1,4 @@
-"""Whether a scene's accuracy needs the exact probability of detection or the table will do."""
+"""The choice between the exact probability of detection and its table, by accuracy."""
 
 from typing import Any
 
@@ -19,6 +19,7 @@ class ExactDetection(Effect):
     name = "exact Pd"
     acts_on = "method of Pd"
     neutral = False
+    outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""
@@ -66,7 +67,7 @@ def picked_method(block: Any, method: str) -> list[str]:
     error = GRAM_CHARLIER_ERROR[max(n for n in GRAM_CHARLIER_ERROR if n <= block.p.pulses)]
     return [
         f"Pd: {said}",
-        f"Pd: not gram_charlier: 11 times as slow as the table, and it errs by up to {error:g}",
+        f"Pd: not gram_charlier: it errs by up to {error:g}, and the table by less",
     ]
 
 

@@ -27,8 +27,8 @@ class FalseAlarms(Effect):
     lockstep = True
     name = "false alarms"
     acts_on = "report"
-    # A report that holds none is what there is without it.
     neutral = False
+    outside_the_proof = "a report without false alarms is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``false_alarms``, and whether the radar is switched on."""

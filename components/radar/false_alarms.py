@@ -15,13 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from components.arguments.checks import (
     FloatArray,
     as_numbers,
-    broadcast_flat,
     checked_probability,
     checked_pulses,
     refuse,
     unflatten,
 )
-from components.radar.resolution_cells import MOST_CELLS, ResolutionCells
+from components.radar.resolution_cells import MOST_CELLS
 from components.radar.threshold import detection_threshold
 
 MOST_FALSE_ALARMS = 1e7
@@ -75,50 +74,6 @@ def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability
     return unflatten(found.astype(np.int64), draws.shape)
 
 
-def false_alarm_positions(
-    azimuth_uniform: ArrayLike,
-    elevation_uniform: ArrayLike,
-    range_uniform: ArrayLike,
-    cells: ResolutionCells,
-) -> tuple[Any, Any, Any]:
-    """Return where false alarms appear: at the centre of a cell, every cell being as likely.
-
-    Two false alarms of a scan may fall into the same cell. That happens to a share of about Pfa/2
-    of them; a block that minds takes each cell once.
-
-    Parameters
-    ----------
-    azimuth_uniform, elevation_uniform, range_uniform : array_like
-        In [0, 1), one of each per false alarm.
-    cells : ResolutionCells
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad, range_m : arrays of the broadcast shape
-        In the frame in which the field of view was given; azimuth not wrapped.
-
-    Raises
-    ------
-    ValueError
-        If a number is outside [0, 1).
-    """
-    shape, flat = broadcast_flat(
-        azimuth_uniform=_checked_uniform("azimuth_uniform", azimuth_uniform),
-        elevation_uniform=_checked_uniform("elevation_uniform", elevation_uniform),
-        range_uniform=_checked_uniform("range_uniform", range_uniform),
-    )
-    axes = (
-        (cells.azimuth, cells.azimuth_rad),
-        (cells.elevation, cells.elevation_rad),
-        (cells.range, cells.range_m),
-    )
-    azimuth, elevation, distance = (
-        unflatten(_centre(uniform, count, *field), shape)
-        for uniform, (count, field) in zip(flat, axes, strict=True)
-    )
-    return azimuth, elevation, distance
-
-
 def false_alarm_snr(uniform: ArrayLike, *, false_alarm_probability: float, pulses: int = 1) -> Any:
     """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
 
@@ -157,11 +112,6 @@ def false_alarm_snr(uniform: ArrayLike, *, false_alarm_probability: float, pulse
 
         output = gammainccinv(float(count), pfa * (1.0 - flat))
     return unflatten(np.maximum(output / float(count) - 1.0, 0.0), draws.shape)
-
-
-def _centre(uniform: FloatArray, count: int, start: float, width: float) -> FloatArray:
-    cell = np.minimum(np.floor(uniform * count), count - 1.0)
-    return start + width * ((cell + 0.5) / count)
 
 
 def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:

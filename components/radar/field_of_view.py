@@ -1,17 +1,16 @@
 """The width of a radar's field of view, and the resolution cells that fill it."""
 
-import math
 from typing import Any
 
+from components.geometry.field_of_view import sector_width_rad
+from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
 from components.radar.resolution_cells import ResolutionCells, resolution_cells
 
 
 def azimuth_width_rad(reach: Reach) -> float:
     """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
-    low, high = reach.azimuth_rad
-    width = high - low if high > low else high - low + 2.0 * math.pi
-    return min(width, 2.0 * math.pi)
+    return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
 
 
 def cells_of_radar(block: Any) -> ResolutionCells:

@@ -55,38 +55,6 @@ def height_above_terrain_m(own_alt_m: ArrayLike, terrain_alt_m: ArrayLike) -> An
     return unflatten(own - terrain, shape)
 
 
-def grazing_angle_rad(range_m: ArrayLike, height_m: ArrayLike) -> Any:
-    """Return the angle between the line of sight and flat ground at a slant range.
-
-    It is also the depression of that ground seen from the radar: asin(height / range).
-
-    Parameters
-    ----------
-    range_m : array_like, m
-        0 or more. Nearer than the height there is no ground; the angle is then π/2.
-    height_m : array_like, m
-        Height above terrain, above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, rad, in (0, π/2]
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    The horizon lies at sqrt(2 · 6371 km · height), 113 km from 1 km up; beyond it, and within a
-    few kilometres of it, flat ground is a bad approximation.
-    """
-    shape, (distance, height) = broadcast_flat(
-        range_m=not_negative("range_m", range_m), height_m=positive("height_m", height_m)
-    )
-    return unflatten(np.arcsin(np.minimum(height, distance) / _or_height(distance, height)), shape)
-
-
 def ground_clutter_rcs_m2(
     range_m: ArrayLike,
     elevation_rad: ArrayLike,
@@ -162,47 +130,6 @@ def ground_clutter_rcs_m2(
     gain = np.exp(-8.0 * _LN_2 * off_axis * off_axis)
     rcs = 10.0 ** (0.1 * float(reflectivity)) * sine * across * along * gain
     return unflatten(np.where(lit, rcs, 0.0), shape)
-
-
-def beam_meets_terrain(
-    height_m: float,
-    *,
-    lowest_elevation_rad: float,
-    elevation_beamwidth_rad: float,
-    farthest_range_m: float,
-) -> bool:
-    """Say whether any ground within range can lie in the beam: if not, clutter is exactly 0.
-
-    Parameters
-    ----------
-    height_m : float, m
-        Lowest height above terrain, above 0.
-    lowest_elevation_rad : float, rad
-        Lowest elevation of the beam's axis above the local horizontal.
-    elevation_beamwidth_rad : float, rad
-        One-way half-power beamwidth, above 0.
-    farthest_range_m : float, m
-        Farthest range processed, 0 or more (may be infinite).
-
-    Returns
-    -------
-    bool
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
-    height = float(positive("height_m", height_m))
-    width = float(positive("elevation_beamwidth_rad", elevation_beamwidth_rad))
-    lowest = float(finite("lowest_elevation_rad", lowest_elevation_rad))
-    if not farthest_range_m >= 0.0:
-        raise ValueError(f"farthest_range_m is {farthest_range_m:g}: it must be 0 or more")
-    if farthest_range_m < height:
-        return False
-    shallowest = math.asin(min(1.0, height / farthest_range_m))
-    # A rounding's breadth on the safe side: saying yes costs time, a wrong no costs clutter.
-    return lowest + shallowest <= BEAM_REACH_BEAMWIDTHS * width * (1.0 + 1e-12) + 1e-12
 
 
 def _or_height(distance: Any, height: Any) -> Any:

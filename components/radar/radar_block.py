@@ -1,4 +1,4 @@
-"""What every radar block has in common: it measures range, and effects act on its echoes."""
+"""The base class of radar blocks: it measures range, and effects act on its echoes."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +10,7 @@ from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
 from components.sensor.look import Cells
+from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -19,6 +20,7 @@ CellFactor = Callable[[Cells], FloatArray]
 class Radar(Sensor):
     """A sensor that measures range; subclasses decide what is detected."""
 
+    mark = RADAR
     measures_range = True
     hooks = {"SNR": "(cells) -> factor of each cell's SNR"}
 

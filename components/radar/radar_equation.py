@@ -37,12 +37,6 @@ def wavelength(frequency_hz: ArrayLike) -> Any:
     return SPEED_OF_LIGHT_M_S / positive("frequency_hz", frequency_hz)[()]
 
 
-def db_to_ratio(value_db: ArrayLike) -> Any:
-    """Return the power ratio of a value in decibels."""
-    shape, (flat,) = broadcast_flat(value=finite("value_db", value_db))
-    return unflatten(np.power(10.0, flat / 10.0), shape)
-
-
 def radar_constant(
     *,
     power_w: float,

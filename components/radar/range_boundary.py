@@ -28,6 +28,7 @@ class RangeBoundary(Radar):
     """
 
     Parameters = RangeBoundaryParameters
+    lockstep = True
     effects = (BlindRange(), BeamSweep())
     ladders = (DETECTION,)
 

@@ -12,22 +12,9 @@ from components.arguments.checks import (
     checked_model,
     finite,
     not_negative,
-    positive,
     refuse,
     unflatten,
 )
-
-
-def m2_to_dbsm(rcs_m2: ArrayLike) -> Any:
-    """Return the RCS in dBsm of one in m², which must be above 0.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite and above 0.
-    """
-    shape, (flat,) = broadcast_flat(rcs=positive("rcs_m2", rcs_m2))
-    return unflatten(10.0 * np.log10(flat), shape)
 
 
 def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> Any:

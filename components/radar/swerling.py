@@ -77,6 +77,7 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
+    lockstep = True
     hooks = {
         "RCS": "which Swerling model each cell has",
         "method of Pd": "name of the method that gives the probability of detection",

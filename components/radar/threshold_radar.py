@@ -149,6 +149,7 @@ class ThresholdRadar(LinkBudgetRadar):
     """
 
     Parameters = ThresholdParameters
+    lockstep = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

@@ -1,4 +1,4 @@
-"""What the air takes from a radar's echo: gas, rain and fog, on the way there and back."""
+"""The loss of a radar's echo in the air: gas, rain and fog, on the way there and back."""
 
 import math
 from typing import Any
@@ -18,7 +18,6 @@ from dsa_des.block.effect import Effect, Verdict
 class Attenuation(Effect):
     """Loss along the slant path, evaluated once per run into a table over altitude."""
 
-    lockstep = True
     acts_on = "SNR"
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
@@ -76,6 +75,7 @@ class Gas(Attenuation):
     """Oxygen and water vapour (ITU-R P.676-12, reference atmosphere P.835-6)."""
 
     name = "gas attenuation"
+    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] gas``."""
@@ -92,6 +92,7 @@ class Rain(Attenuation):
     """Rain below its upper edge (ITU-R P.838-3)."""
 
     name = "rain"
+    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] rain_rate_mm_h``."""
@@ -112,6 +113,7 @@ class Fog(Attenuation):
     """Fog and cloud between two altitudes (ITU-R P.840-8)."""
 
     name = "fog"
+    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] fog_water_g_m3``."""

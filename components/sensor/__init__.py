@@ -1,4 +1,4 @@
-"""What all sensors share: clock, reach, mounting, grid, look and declaration."""
+"""The common parts of all sensors: clock, reach, mounting, grid, look and declaration."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Cells", "Look", "Sensor", "SensorParameters"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Cells": "components.sensor.look",
     "Look": "components.sensor.look",

@@ -5,12 +5,8 @@ Looks before the first one count as misses.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from components.arguments.checks import as_numbers, broadcast_flat, refuse, unflatten
 
 BoolArray = NDArray[np.bool_]
 
@@ -117,34 +113,6 @@ def declare_looks(
     declared = count[place + 1] - count[place + 1 - n] >= m
     after = line[kept + looks[:, np.newaxis]].astype(bool)
     return declared, after
-
-
-def declaration_probability(detection_probability: ArrayLike, m: int, n: int) -> Any:
-    """Return the probability that m or more of n independent looks detect.
-
-    Parameters
-    ----------
-    detection_probability : array_like
-        Per look, in [0, 1].
-    m, n : int
-        1 <= m <= n.
-
-    Returns
-    -------
-    array of the shape of `detection_probability`
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
-    from scipy.special import betainc
-
-    _checked_rule(m, n)
-    pd = as_numbers("detection_probability", detection_probability)
-    refuse("detection_probability", pd, ~((pd >= 0.0) & (pd <= 1.0)), "lie in [0, 1]")
-    shape, (flat,) = broadcast_flat(detection_probability=pd)
-    return unflatten(np.asarray(betainc(float(m), float(n - m + 1), flat)), shape)
 
 
 def _checked_rule(m: int, n: int) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from components.sensor.look import Cells, Look
 
 
-class Declaration(Effect):
+class DeclarationRule(Effect):
     """Marks the detections of declared targets; without a rule every detection declares."""
 
     name = "declaration"

@@ -1,11 +1,12 @@
-"""How blocks' ladders read a quantity: values per target-scan, over all targets of the run."""
+"""Quantities of blocks' ladders: values per target-scan, over all targets of the run."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from components.geometry.angles import wrap_pi
+from components.geometry.directions import angle_between_vectors
+from components.geometry.wrapping import wrap_pi
 from components.messages.reach import RANGE
 from components.messages.targets import RelativeTargets
 from components.sensor.look import Cells
@@ -14,17 +15,9 @@ from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.wake import Wake
 
 
-def direction(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArray:
-    """Return unit vectors, components along the last axis."""
-    level = np.cos(elevation_rad)
-    parts = (level * np.cos(azimuth_rad), level * np.sin(azimuth_rad), np.sin(elevation_rad))
-    return np.stack(parts, axis=-1)
-
-
 def angle_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
     """Return the angle between unit vectors, mrad; accurate however small it is."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return 1e3 * np.arctan2(across, (one * other).sum(axis=-1))
+    return 1e3 * angle_between_vectors(one, other)
 
 
 def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
@@ -75,11 +68,11 @@ def over_cells(
         return {}
     targets, rows = sensor.seen(*held)
     cells, reason = sensor.cells(targets, rows, wake)
-    everybody = len(targets.roster)
+    on_roster = len(targets.roster)
     found: dict[str, Any] = {}
     for name, of_cell in values(cells).items():
         # Targets that were not even moved were too far away for every sensor.
-        wide = np.full((len(wake), everybody), out_of_range)
+        wide = np.full((len(wake), on_roster), out_of_range)
         part = np.full(reason.shape, np.nan)
         part[reason == RANGE] = out_of_range
         wide[:, targets.columns] = part

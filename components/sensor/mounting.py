@@ -1,4 +1,4 @@
-"""How a sensor sits on the ownship: its own axes, and how well they are known."""
+"""The mounting of a sensor on the ownship: its own axes, and how well they are known."""
 
 import math
 from collections.abc import Mapping
@@ -21,9 +21,9 @@ class BodyAxes:
         """Return the sensor's reach for lines of sight in the ownship's body axes."""
         return reach
 
-    def __call__(self, p_rad: FloatArray, q_rad: FloatArray) -> Angles:
+    def __call__(self, body_azimuth_rad: FloatArray, body_elevation_rad: FloatArray) -> Angles:
         """Return azimuth and elevation in the sensor's axes of directions in body axes."""
-        return p_rad, q_rad
+        return body_azimuth_rad, body_elevation_rad
 
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Return what the sensor reports in body axes of directions in its own axes."""
@@ -41,7 +41,7 @@ class MountedAxes(BodyAxes):
     ----------
     true_rad, believed_rad : (azimuth, elevation, roll)
         Rotation from body axes to the sensor's, about z, y and x in that order: as it is, and as
-        whoever converts its measurements believes it to be.
+        the conversion of its measurements believes it to be.
     """
 
     def __init__(
@@ -56,9 +56,9 @@ class MountedAxes(BodyAxes):
             reach.azimuth_rad, reach.elevation_rad, reach.range_max_m, reach.enabled, axes=self
         )
 
-    def __call__(self, p_rad: FloatArray, q_rad: FloatArray) -> Angles:
-        """Rotate by the true mounting: physics does not care what anyone believes."""
-        azimuth, elevation = sensor_angles(p_rad, q_rad, *self.true_rad)
+    def __call__(self, body_azimuth_rad: FloatArray, body_elevation_rad: FloatArray) -> Angles:
+        """Rotate by the true mounting: physics does not know beliefs."""
+        azimuth, elevation = sensor_angles(body_azimuth_rad, body_elevation_rad, *self.true_rad)
         return azimuth, elevation
 
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
@@ -92,20 +92,24 @@ class MountedReach(Reach):
         return min(0.5 * math.pi, super().steepest_rad + tilt)
 
     def decide(
-        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray, present: BoolArray
+        self,
+        body_azimuth_rad: FloatArray,
+        body_elevation_rad: FloatArray,
+        range_m: FloatArray,
+        present: BoolArray,
     ) -> ReasonArray:
         """Return the reason why each target is skipped, from its angles in body axes."""
-        return super().decide(*self.axes(p_rad, q_rad), range_m, present)
+        return super().decide(*self.axes(body_azimuth_rad, body_elevation_rad), range_m, present)
 
 
 class Mounting(Effect):
-    """Boresight and roll of the sensor, and an error of them that nobody knows of."""
+    """Boresight and roll of the sensor, and an error of them that is not known to the ownship."""
 
     lockstep = True
     name = "mounting"
     acts_on = "axes"
-    # Rotating by 0 and back rounds the last bits.
     neutral = False
+    outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``mount_*_deg`` and ``misalignment_deg``."""

@@ -1,4 +1,4 @@
-"""What every sensor has in common: a scan clock, a reach, a grid, and a look at the cells.
+"""The base class of sensors: a scan clock, a reach, a grid, and a look at the cells.
 
 A sensor subclass writes one pure function, `Sensor.look`, over *cells*: flat arrays with one
 element per (scan, target) that needs its physics. How many scans those come from is the
@@ -13,12 +13,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.geometry.angles import wrap_pi
+from components.geometry.field_of_view import rising_sector
+from components.geometry.wrapping import TWO_PI, past, wrap_pi
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
-from components.sensor.declaration_rule import Declaration
+from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes, Mounting
 from components.sensor.parameters import SensorParameters
@@ -35,7 +36,7 @@ _FEW_COLUMNS = 8
 
 
 #: Effects that every sensor has, after its own.
-SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), Declaration(), NavigationReport())
+SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), DeclarationRule(), NavigationReport())
 
 _BODY_AXES = BodyAxes()
 
@@ -57,7 +58,6 @@ class Sensor(Component):
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
     windowed = True
-    lockstep = True
     rewindable = True
     #: Whether detections carry a range.
     measures_range = False
@@ -85,7 +85,7 @@ class Sensor(Component):
         self._idle: Look | None = None
 
     def request(self, port: str) -> Any:
-        """Ask whoever feeds us for the targets in our reach."""
+        """Ask the block that feeds us for the targets in our reach."""
         slack, because = self.range_slack(), self.exact_because()
         return replace(self._reach_from_body, range_slack=slack, exact_because=because)
 
@@ -229,7 +229,7 @@ class Sensor(Component):
         return rows, reason
 
     def measure(
-        self, p_rad: FloatArray, q_rad: FloatArray, range_m: FloatArray
+        self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
 
@@ -238,8 +238,8 @@ class Sensor(Component):
         azimuth_rad, elevation_rad, range_m : arrays
             Range is NaN when the sensor measures none.
         """
-        azimuth = self._round_azimuth(p_rad)
-        elevation = self._elevation_grid.round(q_rad)
+        azimuth = self._round_azimuth(azimuth_rad)
+        elevation = self._elevation_grid.round(elevation_rad)
         if not self.measures_range:
             return azimuth, elevation, np.full(len(range_m), np.nan)
         return azimuth, elevation, self._range_grid.round(range_m)
@@ -256,24 +256,23 @@ class Sensor(Component):
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
         """The field of view with its upper edge at or above its lower one."""
-        low, high = self.reach.azimuth_rad
-        return low, high + 2.0 * math.pi if high < low else high
+        return rising_sector(*self.reach.azimuth_rad)
 
     @cached_property
     def _azimuth_grid(self) -> Grid:
         low, high = self._azimuth_sector
-        if high - low >= 2.0 * math.pi:
+        if high - low >= TWO_PI:
             return _grid(self.azimuth_step_rad)
         return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
 
-    def _round_azimuth(self, p_rad: FloatArray) -> FloatArray:
+    def _round_azimuth(self, azimuth_rad: FloatArray) -> FloatArray:
         low, high = self._azimuth_sector
-        if high - low >= 2.0 * math.pi:
-            return wrap_pi(self._azimuth_grid.round(p_rad))
+        if high - low >= TWO_PI:
+            return wrap_pi(self._azimuth_grid.round(azimuth_rad))
         if low >= -math.pi and high <= math.pi:
-            return self._azimuth_grid.round(p_rad)
+            return self._azimuth_grid.round(azimuth_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + np.mod(p_rad - low, 2.0 * math.pi), low, high)
+        unwrapped = np.clip(low + past(azimuth_rad - low, TWO_PI), low, high)
         return wrap_pi(self._azimuth_grid.round(unwrapped))
 
 
@@ -288,7 +287,7 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 
 def _counted(
-    reason: ReasonArray, everybody: int, culled: IntArray | None
+    reason: ReasonArray, on_roster: int, culled: IntArray | None
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return how many targets were evaluated at each scan, and skipped by reason.
 
@@ -301,7 +300,7 @@ def _counted(
     else:
         of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    left_out = everybody - reason.shape[1]
+    left_out = on_roster - reason.shape[1]
     if culled is None:
         culled = np.zeros(len(reason), dtype=np.int64) + left_out
     else:

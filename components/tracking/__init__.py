@@ -1,1 +1,1 @@
-"""What is remembered of a target between detections."""
+"""Tracks: the memory of a target between detections."""

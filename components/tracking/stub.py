@@ -7,6 +7,7 @@ from pydantic import Field
 
 from components.messages.detections import FusedDetections, Tracks
 from components.messages.true_entries import true_entries
+from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import offsets_of
@@ -32,6 +33,7 @@ class TrackerStub(Component):
     belongs to no target and is left out: a stub does not start tracks.
     """
 
+    mark = TRACKER
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
     outputs = {"tracks": Output(Tracks, "What is held of every target.")}
     Parameters = StubParameters

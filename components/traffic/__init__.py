@@ -1,1 +1,1 @@
-"""Where aircraft fly: scripted, random and recorded flights."""
+"""Traffic: scripted, random and recorded flights."""

@@ -27,18 +27,30 @@ def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[s
         ``"the start"``, ``"the end of the run"``, ``"the start of its flight"`` or
         ``"the end of its flight"``; empty where the aircraft are nearer than before and after.
     """
-    present_s = present_together_s(source.own, source.targets, end_s)
-    first_s, last_s = _looked_at_s(source, *present_s)
-    found = []
-    for number, time in enumerate(time_s.tolist()):
-        if time <= first_s[number]:
-            found.append("the start of its flight" if present_s[0][number] > 0.0 else "the start")
-        elif time >= last_s[number]:
-            whole = present_s[1][number] >= end_s
-            found.append("the end of the run" if whole else "the end of its flight")
-        else:
-            found.append("")
-    return found
+    present_s = np.array(present_together_s(source.own, source.targets, end_s))
+    looked_s = np.array(_looked_at_s(source, *present_s))
+    return [
+        end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
+        for number, time in enumerate(time_s.tolist())
+    ]
+
+
+def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
+    """Say of one closest approach whether it is at an end of what was looked at.
+
+    Parameters
+    ----------
+    time_s : float
+    looked_s, present_s : (2,)
+        First and last time that was looked at, and at which both aircraft may be there.
+    end_s : float
+        Of the run.
+    """
+    if time_s <= looked_s[0]:
+        return "the start of its flight" if present_s[0] > 0.0 else "the start"
+    if time_s >= looked_s[1]:
+        return "the end of the run" if present_s[1] >= end_s else "the end of its flight"
+    return ""
 
 
 def present_together_s(

@@ -1,4 +1,4 @@
-"""Which targets need moving: those that somebody may look at during a window."""
+"""The targets that need moving: those that a sensor may look at during a window."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Where the traffic's lines of sight can lie over a run, proven from samples and largest speeds.
+"""Bounds of the traffic's lines of sight over a run, from samples and largest speeds.
 
 Nothing moves farther than its largest speed times half the spacing of the samples from where a
 sample saw it. What holds at the samples, widened by that, holds all the time.
@@ -15,6 +15,7 @@ from components.geometry.ellipsoid import (
     SEMI_MAJOR_AXIS_M,
     line_of_sight,
 )
+from components.geometry.wrapping import wrap_by_sines
 from components.messages.reach import REACH_MARGIN
 from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.legs import ScriptedTrajectory
@@ -67,7 +68,7 @@ def traffic_envelope(
         All targets.
     duration_s : float
     reach_m : float
-        Infinite where somebody looks at everything.
+        Infinite where a sensor has no limit.
     """
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
     intervals = max(1, math.ceil(count))
@@ -117,7 +118,7 @@ def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
     if isinstance(trajectory, SampledTrajectory):
         # Between samples both change evenly, roll by the shorter way round.
         turned = np.diff(trajectory.roll_rad)
-        after = trajectory.roll_rad[:-1] + np.arctan2(np.sin(turned), np.cos(turned))
+        after = trajectory.roll_rad[:-1] + wrap_by_sines(turned)
         roll = np.concatenate((trajectory.roll_rad, after))
         return float(np.max(np.abs(trajectory.pitch_rad))), float(np.max(np.abs(roll)))
     if isinstance(trajectory, ScriptedTrajectory):

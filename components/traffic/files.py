@@ -56,7 +56,6 @@ class RecordedTraffic(TrafficSource):
     Time 0 is the file's earliest sample.
     """
 
-    lockstep = True
     Parameters = FileParameters
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -110,6 +109,7 @@ class DaaFile(RecordedTraffic):
     """Traffic from a DAIDALUS .daa or .xyz file; the first aircraft named is the ownship."""
 
     Parameters = DaaFileParameters
+    lockstep = True
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
@@ -134,6 +134,7 @@ class CsvFile(RecordedTraffic):
     """Traffic from a CSV file with time, id, latitude, longitude and altitude (ADS-B-like)."""
 
     Parameters = CsvParameters
+    lockstep = True
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""

@@ -41,11 +41,11 @@ class ScriptedFleet:
 
     def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
         straight = isinstance(trajectories, StraightFlights)
-        self._everyone = trajectories if straight else list(trajectories)
-        self._columns = np.arange(len(self._everyone))
+        self._whole = trajectories if straight else list(trajectories)
+        self._columns = np.arange(len(self._whole))
         self._others = np.empty(0, dtype=np.int64)
         self._legs: LegTable | None = None
-        self._place_in_legs = np.arange(len(self._everyone))
+        self._place_in_legs = np.arange(len(self._whole))
         if isinstance(trajectories, StraightFlights):
             self._groups = [_Group.of_straight(trajectories)] if len(trajectories) else []
             self._legs = LegTable.of_straight(trajectories)
@@ -63,7 +63,7 @@ class ScriptedFleet:
     @property
     def trajectories(self) -> list[ScriptedTrajectory]:
         """The aircraft, in order."""
-        return [self._everyone[i] for i in self._columns.tolist()]
+        return [self._whole[i] for i in self._columns.tolist()]
 
     @property
     def names(self) -> list[str]:
@@ -126,7 +126,7 @@ class _Group:
     def __init__(
         self,
         members: IntArray,
-        everyone: bool,
+        whole: bool,
         formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]],
         table: FloatArray,
         times_s: tuple[FloatArray, FloatArray, FloatArray],
@@ -135,7 +135,7 @@ class _Group:
     ) -> None:
         self._formula = formula
         self._members = members
-        self._columns: slice | IntArray = slice(None) if everyone else members
+        self._columns: slice | IntArray = slice(None) if whole else members
         self._table = table[:, np.newaxis]
         self._start, self._end, self._until = times_s
         self._attitude, self._yaw_is_fixed = attitude, yaw_is_fixed

@@ -1,4 +1,4 @@
-"""How fast flights can be and when they are there, for many at once."""
+"""The largest speeds of flights and the times they are there, for many at once."""
 
 import math
 from collections.abc import Sequence

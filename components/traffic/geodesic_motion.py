@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry.angles import direction_angle, slope_angle
-from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS_M
-from components.geometry.normals import (
-    DEG_PER_RAD,
-    FloatArray,
+from components.geometry.ellipsoid import (
+    ECCENTRICITY_SQUARED,
+    FLATTENING,
+    SEMI_MAJOR_AXIS_M,
     radii_of_curvature,
-    wrap_heading_rad,
-    wrap_longitude_deg,
 )
+from components.geometry.normals import DEG_PER_RAD, FloatArray
+from components.geometry.wrapping import wrap_heading_rad, wrap_longitude_deg
 
 # Rows of the parameter table of one straight leg.
 GEODESIC_ROWS = 20
@@ -245,7 +245,7 @@ def geodesic_state(
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
     climbed = table[_CLIMB] * elapsed
     # Ground speed is flown at altitude: over the ellipsoid it is slower by R / (R + h), with h
-    # the mean altitude so far. The bound only matters when someone dives to the Earth's core.
+    # the mean altitude so far. The bound only matters in a dive to the Earth's core.
     below = 0.5 * climbed
     below += table[_CENTRE_DISTANCE]
     np.maximum(below, 0.5 * table[_RADIUS], out=below)

@@ -12,6 +12,7 @@ from geographiclib.geodesic import Geodesic
 
 from components.geometry.enu import enu_to_geodetic
 from components.geometry.normals import FloatArray
+from components.geometry.wrapping import TWO_PI, heading_from_deg, past
 from components.traffic.attitude_from_path import STANDARD_GRAVITY_MPS2
 from components.traffic.geodesic_motion import (
     flight_time_s,
@@ -58,8 +59,7 @@ def hold_state(
     """Evaluate aircraft that stay over one place; see `Segment` for the table's rows."""
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
-    yaw = np.mod(table[4] + table[5] * elapsed, 2.0 * np.pi)
-    yaw = np.where(yaw >= 2.0 * np.pi, 0.0, yaw)
+    yaw = past(table[4] + table[5] * elapsed, TWO_PI)
     return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
 
 
@@ -150,7 +150,7 @@ class LegBuilder:
         if isinstance(leg, Climb):
             return self._straight(climb, self._time_to_climb(leg, climb))
         if leg.heading_deg is not None:
-            self.heading = math.radians(leg.heading_deg % 360.0)
+            self.heading = heading_from_deg(leg.heading_deg)
         return self._straight(climb, leg.duration_s)
 
     def _time_to_climb(self, leg: Climb, climb: float) -> float | None:
@@ -209,7 +209,7 @@ class LegBuilder:
                 f"waypoint {point} lies straight above or below the place before it: use a "
                 "stationary leg with climb_mps"
             )
-        self.heading = math.radians(line["azi1"] % 360.0)
+        self.heading = heading_from_deg(line["azi1"])
         level = geodesic_parameters(*self.position, self.heading, self.speed, 0.0)
         duration = flight_time_s(distance, self.speed, self.position[2], alt, leg_radius_m(level))
         self._straight(rise / duration, duration)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry.enu import enu_to_geodetic
-from components.geometry.normals import wrap_longitude_deg
+from components.geometry.wrapping import heading_from_deg, wrap_longitude_deg
 from components.traffic.leg_builder import LegBuilder, Segment, segment_state
 from components.traffic.leg_types import (
     AnyLeg,
@@ -130,7 +130,7 @@ class ScriptedTrajectory:
         self.segments: list[Segment] = LegBuilder(
             name=name,
             start=start,
-            heading_rad=math.radians(heading_deg % 360.0),
+            heading_rad=heading_from_deg(heading_deg),
             speed_mps=float(speed_mps),
             climb_mps=float(climb_mps),
             reference=start if reference is None else reference,

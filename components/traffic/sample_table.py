@@ -46,7 +46,7 @@ _LIMITS = {
     "sy": (-4e6, 4e6, "lie within ±4,000 km"),
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
-# A file in which nobody is seen for longer than this has a wrong time in it: a run over it would
+# A file in which no aircraft is seen for longer than this has a wrong time in it: a run would
 # simulate the years in between.
 _LONGEST_SILENCE_S = 86400.0
 

@@ -1,4 +1,4 @@
-"""What every traffic source has in common: states at the instants that sensors ask for."""
+"""The base class of traffic sources: states at the instants that sensors ask for."""
 
 import math
 from collections.abc import Sequence
@@ -110,7 +110,7 @@ class TrafficSource(Component):
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be.
 
-        It is the same word for all who ask: whether somebody went by where the targets can be
+        It is the same word for all who ask: whether a block went by where the targets can be
         must show when replicas compare what their traffic says.
         """
         if self._offered is None:
@@ -127,11 +127,11 @@ class TrafficSource(Component):
         return super().serves_replicas() and not self.context.producers
 
     def setup(self) -> None:
-        """Learn how far anybody looks; what stays beyond it is not moved."""
+        """Learn how far sensors look; what stays beyond it is not moved."""
         terrain = self.context.sections.get("terrain")
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
-        self._everybody = np.arange(len(self.roster))
+        self._all_columns = np.arange(len(self.roster))
         self._culling: Culling | None = None
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
@@ -145,7 +145,7 @@ class TrafficSource(Component):
         self._told: list[tuple[int, float, float]] = []
 
     def _cull(self, look: FarthestLook) -> None:
-        """Learn which targets matter, where somebody knows how far anybody looks."""
+        """Learn which targets matter, where it is known how far sensors look."""
         if not math.isfinite(look.range_m):
             return
         if not self.context.producers:
@@ -178,7 +178,7 @@ class TrafficSource(Component):
         """Return the state of all aircraft that may matter, at every instant."""
         flights = self._steer(wake)
         time_s = wake.time_s
-        columns, fleet, near = self._everybody, self.fleet, None
+        columns, fleet, near = self._all_columns, self.fleet, None
         if self._steered_culling is not None:
             own, columns, fleet, near = self._steered_culling.cut(self.own, time_s)
         else:
@@ -190,7 +190,7 @@ class TrafficSource(Component):
         culled = None
         if near is not None:
             present &= near
-            culled = len(self._everybody) - near.sum(axis=1)
+            culled = len(self._all_columns) - near.sum(axis=1)
         return TrafficStates(
             tick=wake.ticks,
             own_lat_deg=own.lat_deg,
@@ -233,10 +233,10 @@ class TrafficSource(Component):
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
             time_s = np.floor(time_s * rate) / rate
-        everyone, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
-        others = self.fleet.each(everyone, times)
+        columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        others = self.fleet.each(columns_each, times)
         if self._culling is not None:
-            near = self._culling.intervals.holds(everyone, times)
+            near = self._culling.intervals.holds(columns_each, times)
             others = replace(others, present=others.present & near)
         return own.at(time_s), others.reshaped(time_s.shape)
 
@@ -246,7 +246,7 @@ class TrafficSource(Component):
         Returns
         -------
         KnownFlights or None
-            The flights as they are known at each row, where somebody asks for them: a row knows
+            The flights as they are known at each row, where a block asks for them: a row knows
             the manoeuvres that have come by its own instant, whatever came later in this wake.
         """
         for new in wake.arrivals("manoeuvres"):

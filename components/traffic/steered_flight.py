@@ -15,7 +15,7 @@ from components.traffic.legs import AnyLeg, ScriptedTrajectory, Straight, Turn
 _BASE_S = 0.5
 
 
-class Flight(Protocol):
+class SteerableFlight(Protocol):
     """What can be steered."""
 
     name: str
@@ -42,7 +42,7 @@ class SteeredFlight:
     """
 
     def __init__(
-        self, flight: Flight, parts: tuple[tuple[float, ScriptedTrajectory], ...] = ()
+        self, flight: SteerableFlight, parts: tuple[tuple[float, ScriptedTrajectory], ...] = ()
     ) -> None:
         self.name, self.flight, self.parts = flight.name, flight, parts
 

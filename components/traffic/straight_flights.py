@@ -13,7 +13,8 @@ from typing import overload
 
 import numpy as np
 
-from components.geometry.normals import FloatArray, wrap_longitude_deg
+from components.geometry.normals import FloatArray
+from components.geometry.wrapping import heading_from_deg, wrap_longitude_deg
 from components.traffic.geodesic_motion import geodesic_parameter_table
 from components.traffic.leg_builder import Segment
 from components.traffic.legs import LONGEST_FLIGHT_S, MOST_ALT_M, ScriptedTrajectory
@@ -82,7 +83,7 @@ class Starts:
 
 
 class StraightFlights(Sequence[ScriptedTrajectory]):
-    """Flights without legs; an item is made when somebody asks for it.
+    """Flights without legs; an item is made when it is asked for.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class StraightFlights(Sequence[ScriptedTrajectory]):
             starts.lat_deg,
             lon,
             starts.alt_m,
-            [radians(heading % 360.0) for heading in starts.heading_deg.tolist()],
+            [heading_from_deg(heading) for heading in starts.heading_deg.tolist()],
             speeds,
             climbs,
         )
@@ -115,7 +116,7 @@ class StraightFlights(Sequence[ScriptedTrajectory]):
         self.fixed_rad = np.full((3, len(starts)), np.nan)
         if starts.fixed_deg is not None:
             yaw, pitch, roll = starts.fixed_deg.tolist()
-            self.fixed_rad[0] = [radians(angle % 360.0) for angle in yaw]
+            self.fixed_rad[0] = [heading_from_deg(angle) for angle in yaw]
             self.fixed_rad[1:] = [list(map(radians, pitch)), list(map(radians, roll))]
         #: Largest speed of each along its path, shape (flights,).
         self.max_speeds_mps = starts.speed_mps / np.array(list(map(cos, pitches)))

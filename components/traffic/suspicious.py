@@ -1,4 +1,4 @@
-"""What in an imported flight no aircraft does, and the error of units that it looks like."""
+"""Signs in an imported flight that no aircraft shows, and the error of units they look like."""
 
 from collections.abc import Sequence
 

@@ -10,19 +10,19 @@ from components.geometry.state import TrajectoryState
 _MOST_SAMPLES = 100_000
 
 
-class Flight(Protocol):
+class OwnshipFlight(Protocol):
     """The flight of the ownship."""
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return its state at some times."""
 
 
-def check_above_terrain(own: Flight, terrain_m: float, duration_s: float) -> None:
+def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float) -> None:
     """Refuse terrain that the ownship does not fly above.
 
     Parameters
     ----------
-    own : Flight
+    own : OwnshipFlight
     terrain_m : float, m
         Altitude of the ground.
     duration_s : float, s

@@ -1,4 +1,4 @@
-"""What a traffic file gives when it is read, and the one error it raises when it cannot be."""
+"""The content of a traffic file, and the one error it raises when it cannot be read."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Problems:
 def shown_columns(headers: Iterable[str], known: bool) -> str:
     """Return the names of columns for a message; `known` says whether any is one of ours.
 
-    A file without any of our columns is something else, whose content is nobody's business.
+    A file without any of our columns is something else, whose content is not quoted.
     """
     names = [shortened(header, MOST_OF_A_CELL) for header in headers]
     if not known:

@@ -1,22 +1,14 @@
-"""Where an aircraft is at any time, from samples of where it was."""
+"""The trajectory of an aircraft: its state at any time, from samples of where it was."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight
-from components.geometry.normals import (
-    FloatArray,
-    Vector,
-    local_axes,
-    normal_to_degrees,
-    radii_of_curvature,
-    wrap_difference_rad,
-    wrap_heading_rad,
-    wrap_longitude_deg,
-)
+from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight, radii_of_curvature
+from components.geometry.normals import FloatArray, Vector, local_axes, normal_to_degrees
 from components.geometry.state import TrajectoryState
+from components.geometry.wrapping import wrap_difference_rad, wrap_heading_rad, wrap_longitude_deg
 from components.traffic.attitude_from_path import attitude_from_path, fit_path
 from components.traffic.sample_checks import checked_samples
 

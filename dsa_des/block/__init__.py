@@ -1,1 +1,1 @@
-"""What a block is: its ports, parameters, messages, effects and ladders."""
+"""Blocks: their ports, parameters, messages, effects and ladders."""

@@ -1,4 +1,4 @@
-"""What a block is: declared ports, declared parameters, and what it does when it wakes.
+"""The base class of blocks: declared ports and parameters, and the work done at a wake.
 
 A block is written once and runs at three grains: scan by scan, in a look-ahead window of many
 scans, or as its own SimPy process. In the first two the engine calls `Component.run` with a
@@ -24,6 +24,7 @@ from pydantic import (
 from dsa_des.block.effect import Effect
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.limits import refuse_extremes
+from dsa_des.block.mark import Mark
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.errors import did_you_mean
@@ -201,7 +202,8 @@ class Component:
     #: be changed in place, anything within them must be replaced instead.
     rewindable: ClassVar[bool] = False
     #: Whether one instance may serve replicas in lock step: its `run` treats every row by itself,
-    #: draws by scan number only, or keeps replicas apart by `Wake.replica`.
+    #: draws by scan number only, or keeps replicas apart by `Wake.replica`. A class says so of its
+    #: own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -216,6 +218,12 @@ class Component:
     ladders: ClassVar[tuple[Ladder, ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
+    #: How figures mark it; a neutral one by default.
+    mark: ClassVar[Mark | None] = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.lockstep = vars(cls).get("lockstep", False)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -243,11 +251,11 @@ class Component:
         return cls.ladders
 
     def request(self, port: str) -> Any:
-        """Return what this block asks of whoever feeds `port`, or None."""
+        """Return what this block asks of the block that feeds `port`, or None."""
         return None
 
     def offer(self, port: str) -> Any:
-        """Return what this block says of the output `port` to whoever it feeds, or None."""
+        """Return what this block says of the output `port` to the blocks it feeds, or None."""
         return None
 
     def setup(self) -> None:

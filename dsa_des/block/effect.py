@@ -39,9 +39,15 @@ class Effect:
     acts_on: ClassVar[str]
     #: Whether it can be built when the scene does not call for it, without changing a bit.
     neutral: ClassVar[bool] = True
+    #: Of an effect that is not neutral: why nothing can be built that changes no bit.
+    outside_the_proof: ClassVar[str] = ""
     #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
-    #: of different replicas may come in one call.
+    #: of different replicas may come in one call. A subclass says it again for itself.
     lockstep: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.lockstep = vars(cls).get("lockstep", False)
 
     def verdict(self, block: Any) -> Verdict:
         """Say whether the scene calls for this effect in this block (a `Component`)."""

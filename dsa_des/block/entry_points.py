@@ -1,4 +1,4 @@
-"""What this and other packages have registered: entry points by group and name."""
+"""Entry points of this and other packages, by group and name."""
 
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points

@@ -1,7 +1,7 @@
 """Importing what a file names: ``module:Class``, and entry points that other packages registered.
 
 The working directory and the folder of the scene are where a user's own modules lie, and where
-anybody's files may lie. No file there can stand in for one of ours or of an installed package:
+foreign files may lie. No file there can stand in for one of ours or of an installed package:
 see `dsa_des.block.module_search`.
 """
 
@@ -151,7 +151,7 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
     ----------
     point : EntryPoint
     key : str
-        Who names it; those of other packages are announced if somebody does.
+        Who names it; those of other packages are announced if any does.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How large a number of a scene may be: far beyond anything that flies, far within a double.
+"""The largest numbers of a scene: far beyond anything that flies, far within a double.
 
 Physics takes fourth powers, products and exponentials of what a scene says. Within these limits
 they stay finite; a number outside them is a slip of the pen and is refused before anything runs.

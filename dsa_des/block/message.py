@@ -1,4 +1,4 @@
-"""What flows on a wire: one row per scan, arrays over whatever the scan saw.
+"""Messages, which flow on wires: one row per scan, arrays over whatever the scan saw.
 
 A `Message` holds a *batch* of rows in time order: a single row when blocks run scan by scan, many
 when they run in a look-ahead window. Physics written over rows serves both.

@@ -1,6 +1,6 @@
-"""Where modules that a file names are looked for: installed ones first, then some folders.
+"""The search for modules that a file names: installed ones first, then some folders.
 
-The folders, such as the working directory and that of the scene, are where anybody's files may
+The folders, such as the working directory and that of the scene, are where foreign files may
 lie. They are put last on the module path, only while a module that is not installed is imported.
 """
 

@@ -34,6 +34,11 @@ class Input:
     required: bool = True
     many: bool = False
 
+    @property
+    def held(self) -> bool:
+        """Whether the block sees the last message, rather than all that came since its last run."""
+        return self.mode != "queued" and not self.many
+
 
 @dataclass(frozen=True)
 class Output:

@@ -1,6 +1,6 @@
 """Code that a scene or study names and this package did not write: what it raises is an error.
 
-A module or class of somebody else may do anything, also call ``sys.exit``. Nothing of that may end
+A module or class of another author may do anything, also call ``sys.exit``. Nothing of that may end
 a command without a word. ``os._exit`` and crashes of the interpreter cannot be caught.
 """
 

@@ -1,4 +1,4 @@
-"""What a block sees when it runs: its instants and its inputs."""
+"""One wake of a block: the instants it runs at and its inputs there."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

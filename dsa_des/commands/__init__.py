@@ -1,1 +1,1 @@
-"""What the commands of ``dsa-des`` do; each is imported only when it is called."""
+"""The commands of ``dsa-des``; each is imported only when it is called."""

@@ -3,7 +3,7 @@
 import hashlib
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,9 @@ from dsa_des.commands.study import (
     show_study,
     tell_crashed,
 )
+from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
 from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import load_scene
@@ -29,13 +31,15 @@ from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import short, times
+from dsa_des.studies.printing import interval_text, short, times
 from dsa_des.studies.record import StudyRecord, results_of
-from dsa_des.studies.safe_files import write_whole
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
+from dsa_des.studies.summary import paired_units
+from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
+from dsa_des.text.safe_text import shortened
 
 _HOME = Path("studies")
 #: A comparison is not continued.
@@ -62,7 +66,7 @@ def compare_command(
         tell_crashed(found, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
-        show_study(Path(paths[0]), results)
+        show_study(Path(paths[0]), results, _first(results))
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
@@ -111,7 +115,7 @@ def _compare_swap(
     known_results(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
-    tables = finish(study, folder, only=results)
+    tables = finish(study, folder, only=results, first=_first(results))
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
     by_place = dict(tables.rows.each_place())
@@ -122,9 +126,13 @@ def _compare_swap(
             continue
         names = (chosen[0][1][0], str(at[place]))
         for metric in metrics:
-            units = _Units(tables, by_place[base]), _Units(tables, rows)
+            units = Units(tables, by_place[base]), Units(tables, rows)
             _farthest_apart(metric, units, names)
     return [tables]
+
+
+def _first(results: Sequence[str]) -> Callable[[Tables], None]:
+    return lambda tables: say_changes_along(tables, results)
 
 
 def _base_scene(path: Path) -> Any:
@@ -188,25 +196,9 @@ def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
-class _Units:
-    """Some rows of a study: one value of a result per (encounter, replica)."""
-
-    def __init__(self, tables: Tables, rows: Any) -> None:
-        self.rows = rows
-        self.tables = tables
-        replicas = tables.rows.column("replica")[rows]
-        over = tables.rows.over
-        labels = [tuple(str(tables.rows.column(n)[r]) for n in over) for r in rows]
-        self.keys = [(*at, int(k)) for at, k in zip(labels, replicas, strict=True)]
-
-    def values(self, metric: str) -> dict[tuple[Any, ...], float]:
-        column = self.tables.rows.column(metric)[self.rows].astype(float)
-        return dict(zip(self.keys, column.tolist(), strict=True))
-
-
 def _farthest_apart(
     metric: str,
-    units: tuple[_Units, _Units],
+    units: tuple[Units, Units],
     names: tuple[str, str],
 ) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
@@ -242,35 +234,49 @@ def _compare(
             f"{names[0]} has the seed {one.record.seed} and {names[1]} {other.record.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    from rich.table import Table
-    from rich.text import Text
-
-    known = {result.name for result in other.results}
+    kinds = {result.name: result.kind for result in other.results}
+    own, known = ({result.name for result in side.results} for side in (one, other))
     metrics = [name for name in _shown(one, only) if name in known]
-    table = Table(title=Text(f"{names[1]} less {names[0]}, pair by pair"), box=None, pad_edge=False,
-                  title_justify="left")  # fmt: skip
-    for heading in (*one.rows.axes, "result", "difference", "paired interval", "pairs",
-                    "unpaired interval", "narrower"):  # fmt: skip
-        table.add_column(heading)
+    heads = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
+             "unpaired interval", "narrower"]  # fmt: skip
+    lines: list[list[str]] = []
     theirs = dict(other.rows.each_place())
+    places: list[tuple[str, Pair]] = []
     together: dict[str, list[tuple[Any, Any]]] = {}
     for at, rows in one.rows.each_place():
         if at not in theirs:
             continue
-        sides = _Units(one, rows), _Units(other, theirs[at])
+        sides = Units(one, rows), Units(other, theirs[at])
+        where = ", ".join(f"{n} = {short(v)}" for n, v in zip(one.rows.axes, at, strict=True))
+        places.append((where, sides))
         for metric in metrics:
             first, second = sides[0].values(metric), sides[1].values(metric)
             keys = [key for key in first if key in second]
-            pair = np.array([first[k] for k in keys]), np.array([second[k] for k in keys])
-            d = difference(*pair, one.record.confidence, one.record.interval)
-            table.add_row(
-                *map(short, at), metric, short(d.paired.value),
-                f"{short(d.paired.low)} to {short(d.paired.high)}", str(d.paired.count),
-                f"{short(d.unpaired.low)} to {short(d.unpaired.high)}", times(d.narrower),
+            names_of = [key[:-1] if one.rows.over else key for key in keys]
+            codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
+            pair = paired_units(
+                np.array([codes[name] for name in names_of], dtype=np.int64),
+                np.array([first[k] for k in keys]),
+                np.array([second[k] for k in keys]),
+            )[1:]
+            d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
+            lines.append(
+                [*map(short, at), metric, short(d.paired.value), interval_text(d.paired),
+                 str(d.paired.count), interval_text(d.unpaired).rstrip(" *"),
+                 times(d.narrower)]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
+    told = [r for r in one.results if r.name in known and (not only or r.name in only)]
+    say_what_changed(names, places, told)
+    for who, there, others in ((names[0], one, known), (names[1], other, own)):
+        alone = [r.name for r in there.results if r.name not in others]
+        if alone:
+            say(f"only {shortened(who)} has {shortened(', '.join(alone), 300)}")
+    title = f"{names[1]} less {names[0]}, pair by pair"
+    print_table(console(160), title, heads, lines, group=len(one.rows.axes))
+    for _, sides in places:
+        for metric in metrics:
             _farthest_apart(metric, sides, names)
-    console(160).print(table)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():
@@ -278,7 +284,7 @@ def _compare(
             x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
             drawn = io.BytesIO()
             draw_scatter(drawn, x, y, names, metric, "compared")
-            write_whole(path, drawn.getvalue())
+            write_file(path, drawn.getvalue())
             say(f"wrote {path}")
     except OSError as error:
         raise UsageError(f"--out {stem.parent}: cannot be written: {error.strerror}") from error

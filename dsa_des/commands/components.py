@@ -43,7 +43,7 @@ def _list(console: Any) -> None:
     for name in registered():
         try:
             cls = find(name)
-        except UnknownType as error:  # somebody's broken plug-in must not hide the others
+        except UnknownType as error:  # a broken plug-in must not hide the others
             table.add_row(name, "", "", f"cannot be loaded: {error}")
             continue
         table.add_row(name, _ports(cls.inputs), _ports(cls.outputs), _summary(cls))

@@ -165,7 +165,7 @@ def _map_functions() -> dict[str, str]:
     for type_name in registered():
         try:
             ladders = find(type_name).ladders
-        except UnknownType:  # somebody's broken plug-in
+        except UnknownType:  # a broken plug-in
             continue
         for ladder in ladders:
             if ladder.map_function:

@@ -36,7 +36,8 @@ def explain_scene(
         table.add_column(heading, no_wrap=heading == "block")
     if shares is not None:
         table.add_column("share of run time", justify="right")
-    for item in simulation.plan:
+    planned = [*simulation.plan, *simulation.timing_plan]
+    for item in planned:
         row = [shortened(item.block), item.sentence(), _bound(item)]
         if shares is not None:
             share = shares.get((item.block, item.effect.name))
@@ -49,6 +50,30 @@ def explain_scene(
         console.print("No block of this scene declares effects.")
         return
     console.print(table)
+    if outside := [item for item in planned if not item.effect.neutral and not item.built]:
+        console.print()
+        console.print(_outside_the_proof(outside))
+
+
+def _outside_the_proof(items: list[Planned]) -> Any:
+    """Return a table of the effects that --simulate-everything leaves out, and why."""
+    from rich.table import Table
+
+    table = Table(
+        box=None,
+        padding=(0, 2, 0, 0),
+        title="not built by --simulate-everything, so not covered by its proof",
+        title_justify="left",
+        title_style="",
+        show_header=False,
+    )
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for item in items:
+        why = item.effect.outside_the_proof or "it has no neutral form"
+        reasons.setdefault((item.effect.name, why), []).append(item.block)
+    for (name, why), blocks in reasons.items():
+        table.add_row(f"{', '.join(shortened(block) for block in blocks)}", f"{name}: {why}")
+    return table
 
 
 def _bound(item: Planned) -> str:

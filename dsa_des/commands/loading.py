@@ -1,4 +1,4 @@
-"""What every command that takes a scene does first."""
+"""The first steps of every command that takes a scene."""
 
 from collections.abc import Iterable
 

@@ -11,7 +11,7 @@ from dsa_des.block.strangers import raised_in, told
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.terminal import say, say_lines
 
-# Who may end a command; whoever else does is a stranger's code in a place not foreseen.
+# What may end a command; all else is a stranger's code in a place not foreseen.
 _OURS = ("dsa_des", "components", "click", "rich")
 
 

@@ -23,6 +23,7 @@ def run_scene(
     simulate_everything: bool,
     realtime: str | None,
     check_rewinding: bool,
+    no_figures: bool,
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
@@ -36,6 +37,7 @@ def run_scene(
         silent=quiet or as_json,
         warn=not quiet,
         pacer=pacer,
+        draw=not no_figures,
     )
     if as_json:
         say_json(summary)

@@ -1,4 +1,4 @@
-"""What a scene file may hold beside its blocks' own parameters: keys, units, defaults, meaning."""
+"""The keys of a scene file beside its blocks' own parameters: units, defaults, meaning."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -24,7 +24,8 @@ SCENE: tuple[Row, ...] = (
 )
 ANYWHERE: tuple[Row, ...] = (
     ("extends", "text or list of texts", "", "-",
-     "TOML files whose keys come first, from the folder of the file that says it. Where a block "
+     "TOML files whose keys come first, from the folder of the file that says it; where there is "
+     "no such file, shipped ones by their names. Where a block "
      "has another type than the one it extends, parameters that this type lacks are dropped."),
     ("remove", "list of texts", "", "-",
      "Inherited keys that are taken away, dotted from this table: [\"calibrate\"]. Items of a list "

@@ -38,13 +38,14 @@ def study_command(
     scheduler: str | None,
     out: str | None,
     metrics: bool,
+    no_figures: bool,
     quiet: bool,
 ) -> None:
     """Do what the command line asks for; exit code 1 if runs crashed, 130 on ctrl-C."""
     if metrics:
         _list_metrics()
     elif len(words) == 2 and words[0] == "show":
-        show_study(Path(words[1]))
+        show_study(Path(words[1]), draw=not no_figures)
     elif len(words) == 1 and words[0] != "show":
         study = read_study(chosen_file(words[0], "study"), sets=sets)
 
@@ -54,7 +55,7 @@ def study_command(
         target = _target(study, out, resume)
         folder = run_into(study, target, workers, resume, executor, scheduler, again)
         try:
-            tables = finish(study, folder, quiet=quiet)
+            tables = finish(study, folder, quiet=quiet, draw=not no_figures)
         except KeyboardInterrupt:
             _stopped("interrupted", again(folder.path), 130)
         tell_crashed([tables], again(folder.path))
@@ -180,19 +181,22 @@ def run_into(
 
 def finish(
     study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
-    only: Sequence[str] = (),
+    only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
+    draw: bool = True,
 ) -> Tables:  # fmt: skip
     """Write the tables of a finished study, draw its figures and print them.
 
-    `only` names the results to print; by default those that the study draws.
+    `only` names the results to print; by default those that the study draws. `first` prints what
+    stands before the tables; without `draw` there are no figures.
     """
     tables = Tables(study, folder)
     try:
         tables.write()
-        figures = tables.draw(only)
+        figures = tables.draw(only) if draw else []
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
     if not quiet:
+        first(tables)
         show(terminal.console(160), tables, only)
         for path in figures:
             say(f"wrote {path}")
@@ -207,14 +211,17 @@ def _count(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
-def show_study(path: Path, only: Sequence[str] = ()) -> None:
+def show_study(
+    path: Path, only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
+    draw: bool = True,
+) -> None:  # fmt: skip
     """Print all tables of a study's folder, or those of some results; draw its figures again.
 
     The folder's tables are read and nothing else: no scene, and no code that it names.
     """
     folder = StudyFolder(path)
     every = known_results(folder.record.results_list(), only)
-    finish(folder.record, folder, only=only or every)
+    finish(folder.record, folder, only=only or every, first=first, draw=draw)
 
 
 def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:
@@ -274,7 +281,7 @@ def _list_metrics() -> None:
     for name in registered(METRICS):
         try:
             cls = find_metric(name)
-        except ValueError as error:  # somebody's broken plug-in must not hide the others
+        except ValueError as error:  # a broken plug-in must not hide the others
             table.add_row(name, "", "", str(error))
             continue
         keys = ", ".join(row[0].strip() for row in parameter_rows(cls.Parameters))

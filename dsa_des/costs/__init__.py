@@ -1,1 +1,1 @@
-"""What accuracy costs: a scene run with each model of a block in turn, all else fixed."""
+"""The cost of accuracy: a scene run with each model of a block in turn, all else fixed."""

@@ -18,7 +18,7 @@ from dsa_des.costs.front import on_front
 from dsa_des.costs.study import RungCost
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -163,7 +163,8 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: st
     with drawing(7.5, height_in, path) as figure:
         axes = figure.add_subplot()
         errors = [row["error_p95"] for row in rows]
-        floor = 0.5 * min([e for e in errors if e > 0.0], default=1e-3)
+        # A log axis has no zero: runs that are alike stand on a floor of their own.
+        floor = 0.2 * min([e for e in errors if e > 0.0], default=1e-3)
         for front, colour, size in ((False, "#999999", 12), (True, "#D55E00", 36)):
             chosen = [row for row in rows if row["pareto"] is front]
             axes.scatter(
@@ -179,8 +180,19 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: st
         figure.text(0.02, 0.1 / height_in, key, fontsize=6.5, va="bottom")
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_title(f"{figure_text(title, 80)}: the whole chain")
-        axes.set_xlabel("CPU time of the run, µs per target-scan")
+        plain_log_ticks(axes.xaxis)
+        plain_log_ticks(axes.yaxis)
+        if min(errors, default=1.0) <= 0.0:
+            low, high = axes.get_ylim()
+            ticks = [t for t in axes.get_yticks() if 1.5 * floor < t <= high]
+            axes.set_yticks([floor, *ticks], ["none", *(f"{t:.4g}" for t in ticks)])
+            axes.set_ylim(low, high)
+        axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.set_title(f"{figure_text(title, 60)}: the whole chain", loc="left")
+        axes.set_xlabel("CPU time of the run (µs per target-scan)")
         axes.set_ylabel(label)
-        axes.legend(fontsize=8)
+        axes.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8
+        )
         figure.subplots_adjust(bottom=(key_in + 0.6) / height_in, left=0.11, right=0.97, top=0.93)

@@ -1,4 +1,4 @@
-"""How two runs differ, in the words of the registered reports: the engine names no quantity."""
+"""Differences of two runs in the words of the registered reports: no quantity is named here."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""How far a rung is from its reference, target-scan by target-scan."""
+"""Differences of a rung from its reference, target-scan by target-scan."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

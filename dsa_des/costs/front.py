@@ -1,4 +1,4 @@
-"""Which rungs nobody beats on both axes, and which is the cheapest that is good enough."""
+"""The rungs that none beats on both axes, and the cheapest that is good enough."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence

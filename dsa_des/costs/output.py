@@ -10,9 +10,10 @@ from typing import Any
 from dsa_des.costs.comparison import Comparison, shown
 from dsa_des.costs.study import RungCost
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 from dsa_des.terminal import terminal
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.terminal.tables import print_table
+from dsa_des.text.safe_text import shortened
 
 _NO_ERROR = "-"
 
@@ -47,25 +48,18 @@ def print_costs(
     comparison: Comparison,
 ) -> None:
     """Print one table per ladder."""
-    from rich.table import Table
-    from rich.text import Text
-
     console = terminal.console(150)
+    effects = [change.heading for change in comparison.changes]
+    headings = ["rung", "us/target-scan", "mean", "p95", "max", *effects, "remark"]
     for (block, ladder_name), group in groupby(costs, key=lambda c: (c.block, c.ladder.name)):
         rungs = list(group)
         unit = rungs[0].ladder.quantities[0]
         what = f"{ladder_name}: errors in {unit.name}, {unit.unit}, against {rungs[0].reference}"
         console.print()
-        console.print(Text.assemble((shortened(block), "bold"), f", {printable(what)}"))
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-        table.add_column("rung", no_wrap=True)
-        for heading in ("us/target-scan", "mean", "p95", "max",
-                        *(change.heading for change in comparison.changes)):  # fmt: skip
-            table.add_column(heading, justify="right", no_wrap=True)
-        table.add_column("")
-        for cost in rungs:
-            table.add_row(*_cells(cost, comparison))
-        console.print(table, highlight=False)
+        rows = [_cells(cost, comparison) for cost in rungs]
+        last = len(headings) - 1
+        title = f"{shortened(block)}, {what}"
+        print_table(console, title, headings, rows, below=last, right=range(1, last))
     if chain:
         _print_chain(console, chain, comparison)
     for note in notes:
@@ -100,25 +94,22 @@ def _remarks(cost: RungCost) -> list[str]:
 
 
 def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: Comparison) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
     console.print()
-    console.print(Text.assemble(("whole chain", "bold"), ", the front"))
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     telling = comparison.changes[:1]
-    headings = [change.heading for change in telling]
-    for heading in ("us/target-scan", comparison.difference.name, *headings, "rungs"):
-        table.add_column(heading, justify="left" if heading == "rungs" else "right")
-    for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"])):
-        if row["pareto"]:
-            table.add_row(
-                f"{row['cpu_us_per_target_scan']:.3g}",
-                f"{row['error_p95']:.2%}",
-                *(shown(change, row["effect"], _NO_ERROR) for change in telling),
-                row["rung"],
-            )
-    console.print(table, highlight=False)
+    headings = ["us/target-scan", comparison.difference.name, *(c.heading for c in telling)]
+    rows = [
+        [
+            f"{row['cpu_us_per_target_scan']:.3g}",
+            f"{row['error_p95']:.2%}",
+            *(shown(change, row["effect"], _NO_ERROR) for change in telling),
+            row["rung"],
+        ]
+        for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"]))
+        if row["pareto"]
+    ]
+    last = len(headings)
+    title = "whole chain, the front"
+    print_table(console, title, [*headings, "rungs"], rows, below=last, right=range(last))
 
 
 def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
@@ -160,7 +151,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
         if on_floor:
-            label += ": error unknown" if math.isnan(error) else f": {error:.0e} {quantity.unit}"
+            label += ": error unknown" if math.isnan(error) else f": {_tiny(error)} {quantity.unit}"
         at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
         colour = "#D55E00" if cost.pareto else "#777777"
         axes.errorbar(
@@ -179,23 +170,29 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
     axes.set_title(
         f"{figure_text(first.block)}: {first.ladder.name}, against {first.reference}", fontsize=9
     )
-    axes.set_xlabel("CPU time of the block, µs per target-scan", fontsize=8)
-    axes.set_ylabel(f"{quantity.name}: 95 % of errors below, {quantity.unit}", fontsize=8)
+    axes.set_xlabel("CPU time of the block (µs per target-scan)", fontsize=8)
+    what = quantity.name.replace("_", " ")
+    axes.set_ylabel(f"{what}: 95 % of errors\nbelow ({quantity.unit})", fontsize=8)
+    plain_log_ticks(axes.xaxis)
+    plain_log_ticks(axes.yaxis)
     axes.tick_params(which="both", labelsize=7)
-    axes.minorticks_off()
     return labels
+
+
+def _tiny(error: float) -> str:
+    return f"{error:.0e}" if error else "0"
 
 
 def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
     """Write each label beside its point, moved until it covers no point and no other label."""
-    high, wide, gap, mark = 11.0, 6.0, 5.0, 5.0  # a line, a letter, a gap, half a point; pixels
+    high, wide, gap, mark = 12.0, 6.4, 5.0, 5.0  # a line, a letter, a gap, half a point; pixels
     places = []
     for label, (cost, error), spread, colour in labels:
         x, y = axes.transData.transform((cost, error))
         bar = max(mark, axes.transData.transform((cost + spread, error))[0] - x)
         places.append((y, x, bar, label, (cost, error), colour))
     put = [(x - bar, x + bar, y) for y, x, bar, *_ in places]
-    edge, end = axes.bbox.x0, axes.bbox.x1
+    edge, end, top = axes.bbox.x0, axes.bbox.x1, axes.bbox.y1
     for y, x, bar, label, at, colour in sorted(places, reverse=True):
         width = wide * len(label)
 
@@ -204,6 +201,7 @@ def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
             return (
                 edge < left
                 and left + width < end
+                and middle + high / 2 < top
                 and all(
                     abs(middle - other_y) >= high or left + width < other_x or other_end < left
                     for other_x, other_end, other_y in put
@@ -212,7 +210,7 @@ def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
 
         tries = [
             (x + left, y + up)
-            for up in (0.0, -12.0, 12.0, -24.0, 24.0, -36.0, 36.0)
+            for up in (0.0, -13.0, 13.0, -26.0, 26.0, -39.0, 39.0, -52.0, 52.0)
             for left in (bar + gap, -bar - gap - width, -width / 2)
         ]
         left, middle = next(filter(free, tries), tries[0])

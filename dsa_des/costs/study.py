@@ -242,7 +242,7 @@ def _mark(
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]
     _tie(known)
-    # A reference whose own error nobody knows is on the front: nothing is known to beat it.
+    # A reference whose own error is unknown is on the front: nothing is known to beat it.
     points = [
         (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)
         for c in known

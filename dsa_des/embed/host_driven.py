@@ -17,16 +17,18 @@ import numpy as np
 from networkx import ancestors
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.block.message import Message
+from dsa_des.block.ports import Input
 from dsa_des.block.strangers import is_ours_to_obey, told
-from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.errors import BlockFailure, Problem, SceneError
+from dsa_des.running.inputs import Inputs
+from dsa_des.running.node import Node
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire as WireOfScene
 from dsa_des.time.clock import MAX_TICK, parse_rational
 from dsa_des.time.scan_cursor import ScanCursor
 
@@ -73,28 +75,50 @@ class Step:
         return None
 
 
-@dataclass
-class _Port:
+class _Wire:
     """One wire into a block: what it holds, or what waits on it."""
 
-    name: str
-    sender: tuple[str, str]
-    kept: bool
-    trigger: bool
-    required: bool
-    held: Message | None = None
-    waiting: list[tuple[int, Message]] = field(default_factory=list)
+    def __init__(self, sender: tuple[str, str], declared: Input) -> None:
+        self.sender, self.source = sender, sender[0]
+        self.held, self.trigger = declared.held, declared.mode == "trigger"
+        self._last: Message | None = None
+        self._waiting: list[tuple[int, Message]] = []
+
+    def push(self, tick: int, message: Message) -> None:
+        """Take a message that arrives."""
+        if self.held:
+            self._last = message
+        else:
+            self._waiting.append((tick, message))
+
+    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return the last message, and its last row."""
+        return None if self._last is None else (self._last, _last_row(self._last))
+
+    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+        """Take what waits."""
+        if not self._waiting:
+            return None
+        messages = [message for _, message in self._waiting]
+        ticks = [np.array([tick] * len(message)) for tick, message in self._waiting]
+        self._waiting.clear()
+        return np.concatenate(ticks), type(messages[0]).concatenate(messages)
 
 
 class _Runner:
     """One block with its wires."""
 
-    def __init__(self, component: Component, cursor: ScanCursor | None, demands: list[str]) -> None:
-        self.name = component.name
-        self.component = component
-        self.cursor = cursor
-        self.demands = demands
-        self.ports: list[_Port] = []
+    def __init__(self, node: Node, cursor: ScanCursor | None, wires: Iterable[WireOfScene]) -> None:
+        component = self.component = node.component
+        self.name, self.cursor = component.name, cursor
+        self.demands = [] if cursor else [demand.block for demand in node.demands]
+        into: dict[str, list[_Wire]] = {}
+        for wire in wires:
+            if wire.target == self.name:
+                end = _Wire((wire.source, wire.output), component.inputs[wire.input])
+                into.setdefault(wire.input, []).append(end)
+        self.wires = [wire for ends in into.values() for wire in ends]
+        self.inputs = Inputs(component.inputs, into, node.simulation.ticks_per_s)
         self.only_output = next(iter(component.outputs)) if len(component.outputs) == 1 else None
 
 
@@ -142,22 +166,7 @@ class HostDriven:
             if name == self.source or name not in needed:
                 continue
             cursor = None if node.clock is None else ScanCursor(node.clock)
-            demands = [] if cursor else [demand.block for demand in node.demands]
-            runner = _Runner(node.component, cursor, demands)
-            for wire in self.scene.wires:
-                if wire.target == name:
-                    declared = node.component.inputs[wire.input]
-                    kept = declared.mode != "queued" and not declared.many
-                    runner.ports.append(
-                        _Port(
-                            wire.input,
-                            (wire.source, wire.output),
-                            kept,
-                            declared.mode == "trigger",
-                            kept and declared.required,
-                        )
-                    )
-            runners.append(runner)
+            runners.append(_Runner(node, cursor, self.scene.wires))
         return runners
 
     # -- time ----------------------------------------------------------------------------------
@@ -263,33 +272,19 @@ class HostDriven:
         ticks = np.array([tick], dtype=np.int64)
         for runner in self._runners:
             triggered = False
-            complete = True
-            waiting = False
-            held: dict[str, tuple[Any, IntArray]] = {}
-            for port in runner.ports:
-                new = sent.get(port.sender)
+            for wire in runner.wires:
+                new = sent.get(wire.sender)
                 if new is not None:
-                    triggered = triggered or port.trigger
-                    if port.kept:
-                        port.held = new
-                    else:
-                        port.waiting.append((tick, new))
-                waiting = waiting or bool(port.waiting)
-                if port.held is not None:
-                    held[port.name] = (port.held, _last_row(port.held))
-                elif port.required:
-                    complete = False
+                    triggered = triggered or wire.trigger
+                    wire.push(tick, new)
             scan = scans.get(runner.name)
-            if not complete or not (triggered or scan is not None):
+            if scan is None and not triggered:
                 continue
-            wake = Wake(
-                ticks,
-                _NO_SCAN if scan is None else np.array([scan], dtype=np.int64),
-                self.ticks_per_s,
-                held,
-                _collected(runner.ports) if waiting else {},
-                partial(_rows_of, runner.demands, scans) if runner.demands else None,
-            )
+            own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
+            demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
+            wake = runner.inputs.seen(ticks, own, tick + 1, demand)
+            if wake is None:
+                continue
             try:
                 result = runner.component.run(wake)
             except BaseException as error:
@@ -317,27 +312,11 @@ def _last_row(message: Message) -> IntArray:
     return _FIRST_ROW if count == 1 else np.array([count - 1])
 
 
-def _rows_of(blocks: Iterable[str], scanning: Container[str]) -> dict[str, IntArray]:
+def _rows_of(
+    blocks: Iterable[str], scanning: Container[str], ticks: IntArray
+) -> dict[str, IntArray]:
     """Return for each block the one row of a step where it scans, and none where it does not."""
     return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}
-
-
-def _collected(ports: list[_Port]) -> dict[str, list[Arrivals]]:
-    """Take what waits on queued wires, sender by sender."""
-    arrived: dict[str, list[Arrivals]] = {}
-    for port in ports:
-        if not port.waiting:
-            continue
-        messages = [message for _, message in port.waiting]
-        ticks = [np.array([tick] * len(message)) for tick, message in port.waiting]
-        if len(messages) == 1:
-            arrivals = Arrivals(port.sender[0], ticks[0], messages[0])
-        else:
-            joined = type(messages[0]).concatenate(messages)
-            arrivals = Arrivals(port.sender[0], np.concatenate(ticks), joined)
-        arrived.setdefault(port.name, []).append(arrivals)
-        port.waiting.clear()
-    return arrived
 
 
 def _refusals(scene: Scene, source: str) -> list[Problem]:

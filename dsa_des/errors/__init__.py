@@ -1,4 +1,4 @@
-"""What can go wrong, and how it is said."""
+"""Errors, and how they are said."""
 
 from dsa_des.errors.problems import (
     MOST_PROBLEMS,
@@ -6,6 +6,7 @@ from dsa_des.errors.problems import (
     Lines,
     OutputError,
     Problem,
+    RunRefused,
     SceneError,
     SetupFailure,
     UsageError,
@@ -20,6 +21,7 @@ __all__ = [
     "Lines",
     "OutputError",
     "Problem",
+    "RunRefused",
     "SceneError",
     "SetupFailure",
     "UsageError",

@@ -1,4 +1,4 @@
-"""What can go wrong, said once and completely.
+"""Problems and errors, each said once and completely.
 
 Every error of a scene is a `Problem`; a scene with any raises one `SceneError` that lists them
 all. An exception inside a block becomes a `BlockFailure` that says which block, when.
@@ -109,7 +109,7 @@ class Problem:
         where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
             where += f" = {shown_value(self.value)}"
-        # On one line whatever stands in a name: nobody can write a message of ours.
+        # On one line whatever stands in a name: a name cannot imitate a message of ours.
         lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
         return f"{where}: " + "\n".join(
             shortened(line, _LINE_LENGTH) for line in lines[:_MOST_LINES]
@@ -176,6 +176,10 @@ class SetupFailure(BlockFailure):
     """A block raised an exception before anything ran: the scene cannot be used."""
 
     exit_code = 2
+
+
+class RunRefused(Exception):
+    """The engine itself cannot go on with a run as it was put together; no block has failed."""
 
 
 class OutputError(Exception):

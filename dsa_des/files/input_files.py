@@ -1,4 +1,4 @@
-"""Opening what somebody named as a file: regular files of a bearable size, and nothing else.
+"""Opening what a user named as a file: regular files of a bearable size, and nothing else.
 
 A pipe would wait for ever, a device never ends, and a name may be no name at all; all of it is
 found out before a byte is read.

@@ -1,4 +1,4 @@
-"""Which files of a folder are ours: only they may be replaced or deleted.
+"""The list of files in a folder that are ours: only they may be replaced or deleted.
 
 ``run.json`` lists every file that was written with it, each with a digest. Whatever is not in
 that list, or is no longer as it was written, belongs to the user.
@@ -69,7 +69,7 @@ def _names(folder: Path) -> Iterator[str]:
 def _digest(path: Path) -> str:
     """Return a digest of a file's length and its first MiB, or what it is instead of a file.
 
-    Tables may be larger than memory; somebody who edits one changes its length or its beginning.
+    Tables may be larger than memory; an edit of one changes its length or its beginning.
     """
     about = path.lstat()
     if not stat.S_ISREG(about.st_mode):

@@ -15,10 +15,18 @@ _SYSTEM = ("/dev", "/proc", "/sys")
 _ORDINARY = ("/dev/shm",)
 
 
-def write_file(path: Path, content: bytes) -> None:
+def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
     """Write a file under a temporary name and rename it.
 
     A link that stands there is replaced; what it points to stays as it is.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+    to_disk : bool
+        Whether the content must be on the disk before it takes its name, so that it is whole even
+        after a loss of power.
 
     Raises
     ------
@@ -29,6 +37,9 @@ def write_file(path: Path, content: bytes) -> None:
     try:
         with open(temporary, "xb") as stream:
             stream.write(content)
+            if to_disk:
+                stream.flush()
+                os.fsync(stream.fileno())
         os.replace(temporary, path)
     except BaseException as error:
         with suppress(OSError):

@@ -102,7 +102,7 @@ class OutputFolder:
             try:
                 results.rename(place)
             except OSError:
-                if os.path.lexists(place):  # somebody was faster
+                if os.path.lexists(place):  # another process was faster
                     continue
                 raise
             return

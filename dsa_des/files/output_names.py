@@ -81,7 +81,7 @@ def claim_folder(parent: Path, stem: str) -> Path:
             parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir()
         except FileExistsError:
-            if os.path.lexists(folder):  # somebody was faster
+            if os.path.lexists(folder):  # another process was faster
                 continue
             raise UsageError(f"{parent}: is no folder") from None
         except OSError as error:

@@ -1,4 +1,4 @@
-"""Reading TOML that anybody may have written: what the parser chokes on becomes one error."""
+"""Reading TOML from untrusted files: what the parser chokes on becomes one error."""
 
 import tomllib
 from typing import Any

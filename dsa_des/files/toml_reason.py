@@ -1,4 +1,4 @@
-"""What is wrong with a text that is no TOML, without repeating any of it."""
+"""The reason why a text is no TOML, without repeating any of it."""
 
 import re
 
@@ -22,7 +22,7 @@ _WITHOUT = re.compile(
 def toml_reason(error: Exception) -> str:
     """Return what a ``TOMLDecodeError`` says and where, without what stands there.
 
-    A file that is no scene may be one that is nobody's business.
+    A file that is no scene may hold secrets, so it is not quoted.
     """
     found = _PLACE.fullmatch(str(error))
     what, place = (found[1], f" ({found[2]})") if found else (str(error), "")

@@ -74,7 +74,7 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
             folder = temporary_beside(target)
             folder.mkdir(0o700)
             lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-        except FileNotFoundError:  # somebody who cleared up took the folder or its parent away
+        except FileNotFoundError:  # a clean-up took the folder or its parent away
             continue
         try:
             os.write(lock, json.dumps(_about(target)).encode())

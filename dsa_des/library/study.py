@@ -1,7 +1,7 @@
 """Running a study from Python."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from shutil import rmtree
@@ -12,18 +12,19 @@ from weakref import finalize
 from dsa_des.block.class_text import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.picture import Picture, pictures_in
+from dsa_des.record.picture import PictureFile, pictures_in
 from dsa_des.scene.changeable import Origin
+from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.python_values import scene_value
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.scene_file import SceneFile
+from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.output import DIFFERENCES, SUMMARY, Tables
 from dsa_des.studies.runner import Progress, Stopped, run_study
 from dsa_des.studies.study import Study, changed_scene
-from dsa_des.studies.study_file import study_of_tables
+from dsa_des.studies.study_file import read_study, study_of_tables
 from dsa_des.text.safe_text import shortened
 
 if TYPE_CHECKING:
@@ -74,12 +75,14 @@ class StudyResult:
         return self._folder.results()
 
     @cached_property
-    def figures(self) -> dict[str, Picture]:
+    def figures(self) -> dict[str, PictureFile]:
         """All figures by name."""
         self._tables.draw()
-        return {name: Picture(name, png) for name, png in pictures_in(self._folder.path).items()}
+        return {
+            name: PictureFile(name, png) for name, png in pictures_in(self._folder.path).items()
+        }
 
-    def figure(self, name: str) -> Picture:
+    def figure(self, name: str) -> PictureFile:
         """Return one of the study's figures.
 
         Raises
@@ -115,27 +118,33 @@ class StudyResult:
 def study(
     scene: Scene | str | os.PathLike[str] | Mapping[str, Any],
     *,
-    metrics: Sequence[str | type[Metric] | Mapping[str, Any]],
+    metrics: Sequence[str | type[Metric] | Mapping[str, Any]] | None = None,
     axes: Mapping[str, Any] | None = None,
     draws: Mapping[str, Any] | None = None,
-    replicas: int = 1,
-    seed: int = 0,
+    replicas: int | None = None,
+    seed: int | None = None,
+    sets: Iterable[str] = (),
     workers: int | None = None,
     out: str | os.PathLike[str] | None = None,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
     **more: Any,
 ) -> StudyResult:
-    """Run a scene over axes, random draws and replicas.
+    """Run a scene over axes, random draws and replicas; or a study file as it is.
 
     Parameters
     ----------
     scene : Scene, or what `dsa_des.load_scene` takes
-    metrics : sequence
-        Registered names, ``module:Class``, classes, or tables ``{"metric": NAME, ...}``.
+        Without `metrics`: the path of a study file, or the name of a shipped study.
+    metrics : sequence, optional
+        Registered names, ``module:Class``, classes, or tables ``{"metric": NAME, ...}``. Left out
+        for a study file, which says itself what it measures, over which axes and how often.
     axes, draws : mapping, optional
         Dotted key → values or distribution, as in a study file; ``swap.BLOCK`` → types.
-    replicas, seed : int
+    replicas, seed : int, optional
+        1 and 0 for a scene; those of the file for a study file.
+    sets : iterable of str
+        Changes of a study file as the command line takes them: ``key=value``.
     workers : int, optional
         Processes. By default one for each processor, and this process alone where a class of the
         study cannot be imported by others.
@@ -162,11 +171,18 @@ def study(
     OutputError
         If results cannot be written; what is finished is kept in `out`.
     """
+    if metrics is None:
+        keys = {"axes": axes, "draws": draws, "replicas": replicas, "seed": seed, **more}
+        described = _study_of_file(scene, [k for k, v in keys.items() if v is not None], sets)
+        return _run(described, _workers(described, workers), out, resume, progress)
+    if sets := list(sets):
+        message = "changes a study file; a scene is changed with load_scene(..., sets=...)"
+        raise SceneError([Problem("study", "sets", message, sets)])
     loaded = scene_of_any(scene)
     given = {
         "title": loaded.title,
-        "seed": seed,
-        "replicas": replicas,
+        "seed": 0 if seed is None else seed,
+        "replicas": 1 if replicas is None else replicas,
         "axes": axes or {},
         "draws": draws or {},
         "metrics": list(metrics),
@@ -183,6 +199,23 @@ def study(
         raise SceneError([Problem("study", key, message)])
     described = study_of_tables(tables, *_base_of(loaded.origin))
     return _run(described, _workers(described, workers), out, resume, progress)
+
+
+def _study_of_file(source: Any, given: list[str], sets: Iterable[str]) -> Study:
+    """Read a study file, given by its path or as a shipped one by its name."""
+    if not isinstance(source, str | os.PathLike):
+        message = "is missing: a scene is measured by metrics; only a study file names its own"
+        raise SceneError([Problem("study", "metrics", message)])
+    name = os.fspath(source)
+    if given:
+        message = f'stands in the study file {name}: change it with sets=["{given[0]}=..."]'
+        raise SceneError([Problem("study", given[0], message)])
+    path = chosen_file(name, "study")
+    file = read_scene_file(path)
+    if "scene" not in file.data and "blocks" in file.data:
+        message = "is missing: this file is a scene, which is measured by metrics"
+        raise SceneError([Problem(str(path), "metrics", message)])
+    return read_study(path, sets=sets)
 
 
 def _base_of(

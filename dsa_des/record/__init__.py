@@ -1,1 +1,1 @@
-"""What a run leaves behind: recorded columns, Parquet files, a folder."""
+"""The results of a run: recorded columns, Parquet files, a folder."""

@@ -1,4 +1,4 @@
-"""What may fail without spoiling what is done already: a summary, a figure of a finished run."""
+"""Attempts that may fail without spoiling what is done: a summary, a figure of a run."""
 
 from collections.abc import Callable
 from typing import Any

@@ -5,6 +5,7 @@ would push the figure aside are cut, and letters that the font lacks are boxes w
 """
 
 import io
+import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -75,6 +76,30 @@ def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
     return f" {text}" if text.startswith("_") else text
 
 
+def plain_log_ticks(axis: Any) -> None:
+    """Put plain numbers on a log axis: 1, 2 and 5 of each decade where it spans few of them.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+        Its limits are known.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    steps: tuple[float, ...] = (1.0, 2.0, 5.0) if decades < 2.5 else (1.0,)
+    if decades < 0.7:
+        steps = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    axis.set_major_locator(LogLocator(subs=steps, numticks=9))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _plain_number(value)))
+    axis.set_minor_locator(NullLocator())
+
+
+def _plain_number(value: float) -> str:
+    return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.4g}"
+
+
 def tight(figure: "Figure") -> None:
     """Fit the axes of a figure to its texts, after these were made plain."""
     _make_plain(figure)
@@ -82,7 +107,7 @@ def tight(figure: "Figure") -> None:
 
 
 def _make_plain(figure: "Figure") -> None:
-    """Cut and escape every text that was put into a figure, whoever put it there."""
+    """Cut and escape every text that was put into a figure, wherever it came from."""
     from matplotlib.text import Text
     from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 

@@ -8,7 +8,7 @@ from dsa_des.files.output_file import write_file
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureFile:
     """A drawn figure.
 
     Parameters

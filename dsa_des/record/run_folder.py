@@ -17,7 +17,7 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.manifest import RUN_JSON, with_files
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_names import new_folder_name
-from dsa_des.record.picture import Picture, pictures_in
+from dsa_des.record.picture import PictureFile, pictures_in
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shortened
 
@@ -103,11 +103,11 @@ class Run:
         return found
 
     @cached_property
-    def figures(self) -> dict[str, Picture]:
+    def figures(self) -> dict[str, PictureFile]:
         """All figures by name; those of a run in memory are drawn when they are first asked for."""
-        return {name: Picture(name, png) for name, png in self.draw().items()}
+        return {name: PictureFile(name, png) for name, png in self.draw().items()}
 
-    def figure(self, name: str) -> Picture:
+    def figure(self, name: str) -> PictureFile:
         """Return one of the figures that the reports draw, for example ``plan``.
 
         Raises

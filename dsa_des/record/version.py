@@ -1,3 +1,3 @@
-"""Which version of dsa_des runs, and has written what a folder holds."""
+"""The version of dsa_des that runs, and that has written what a folder holds."""
 
 __version__ = "0.2.0"

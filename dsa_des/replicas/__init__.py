@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Failed", "Recorded", "Replica", "run_replicas"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Failed": "dsa_des.replicas.replicas",
     "Recorded": "dsa_des.replicas.replicas",

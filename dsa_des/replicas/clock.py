@@ -37,7 +37,7 @@ class ReplicaClock(ScanClock):
 
     def _between(self, start: int, end: int) -> Scans:
         """Return the scan numbers and ticks on the common timeline, in order."""
-        span, length = self._time.span_ticks, self._time.end_tick
+        span, length = self._time.span_ticks, self._time.run_ticks
         first = max(0, start // span)
         last = min(-(-end // span), self._time.replicas)
         if self._alike and last - first > 1:
@@ -57,11 +57,11 @@ class ReplicaClock(ScanClock):
     def _alike_between(self, start: int, end: int, first: int, last: int) -> Scans:
         clock = self._clocks[first]
         earliest = int(self._offsets[first:last].min())
-        scans, ticks = clock.between(0, self._time.end_tick + clock.offset - earliest)
+        scans, ticks = clock.between(0, self._time.run_ticks + clock.offset - earliest)
         replicas = np.arange(first, last, dtype=np.int64)
         begin = (replicas * self._time.span_ticks)[:, np.newaxis]
         within = ticks + (self._offsets[first:last] - clock.offset)[:, np.newaxis]
         on_line = within + begin
         numbers = scans + first_scan(1) * replicas[:, np.newaxis]
-        wanted = (within < self._time.end_tick) & (on_line >= start) & (on_line < end)
+        wanted = (within < self._time.run_ticks) & (on_line >= start) & (on_line < end)
         return numbers[wanted], on_line[wanted]

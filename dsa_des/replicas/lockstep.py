@@ -6,32 +6,42 @@ parameters differ between replicas, is split into one instance each
 replica as an additional column.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import ClockedParameters, Component, Context
-from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.clock import ReplicaClock
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.replicas.watched_parameters import WatchedParameters
+from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.effect_plan import plan, unspent
-from dsa_des.running.node import Node
+from dsa_des.running.rewind import Rewinder
 from dsa_des.running.simulation import Simulation
+from dsa_des.running.timeline import Timeline
+from dsa_des.running.windows import Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import ReplicaTime
 
-__all__ = ["LockStep", "NotInLockStep"]
+__all__ = ["NotInLockStep", "Replicas", "lock_step"]
 
 _OF_THE_CLOCK = frozenset(ClockedParameters.model_fields)
+#: Takes a replica's number and what its blocks report (`Component.report`).
+TakeReport = Callable[[int, dict[str, Any]], None]
 
 
-class LockStep(Simulation):
-    """Replicas of a scene made ready to run together, once.
+def lock_step(
+    scenes: Sequence[Scene],
+    *,
+    recorder: Recorder | None = None,
+    report: TakeReport | None = None,
+    window: int | None = None,
+) -> Simulation:
+    """Return replicas of a scene made ready to run together, once.
 
     Parameters
     ----------
@@ -40,8 +50,8 @@ class LockStep(Simulation):
     recorder : Recorder, optional
         Every table it writes begins with the column ``replica``.
     report : callable, optional
-        Called with a replica's number and what its blocks report (`Component.report`), for blocks
-        that are split; shared blocks report for nobody.
+        Called with a replica's number and what its blocks report, for blocks that are split;
+        shared blocks report for none.
     window : int, optional
         Most scans in a look-ahead window, as for `Simulation`.
 
@@ -52,44 +62,50 @@ class LockStep(Simulation):
     SceneError
         If a block cannot be set up.
     """
+    timeline = Replicas(scenes, report)
+    return Simulation(scenes[0], timeline=timeline, recorder=recorder, window=window)
 
-    pinpoints = False
 
-    def __init__(
-        self,
-        scenes: Sequence[Scene],
-        *,
-        recorder: Recorder | None = None,
-        report: Callable[[int, dict[str, Any]], None] | None = None,
-        window: int | None = None,
-    ) -> None:
+class Replicas(Timeline):
+    """Runs of a scene that share blocks, end to end on one timeline.
+
+    Parameters
+    ----------
+    scenes, report
+        As for `lock_step`.
+    """
+
+    def __init__(self, scenes: Sequence[Scene], report: TakeReport | None = None) -> None:
+        super().__init__(scenes[0])
         self._scenes = list(scenes)
         self._report = report
-        #: Blocks that are split, by name; the engine still asks `components` for all but `run`.
+        #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
         #: By block, which of its parameters are not the same in all replicas.
         self._differing: dict[str, set[str]] = {}
         self._watched: dict[str, WatchedParameters] = {}
         _check_alike(self._scenes)
-        try:
-            super().__init__(self._scenes[0], recorder=recorder, window=window)
-        except BlockFailure as failure:
-            raise _unwrapped(failure) from None
+        self.streams = ReplicaStreams([scene.seed for scene in self._scenes])
 
-    # -- building ------------------------------------------------------------------------------
+    def parameters(self, name: str) -> Any:
+        """Return those of the first replica, watched where clocks differ."""
+        parameters = super().parameters(name)
+        differing = self._differing[name] = self._find_differing(name)
+        of_the_clock = isinstance(parameters, ClockedParameters) and differing <= _OF_THE_CLOCK
+        if not differing or not of_the_clock:
+            return parameters
+        self._watched[name] = WatchedParameters(parameters, differing)
+        return self._watched[name].parameters
 
-    def _make_streams(self) -> Streams:
-        return ReplicaStreams([scene.seed for scene in self._scenes])
-
-    def _set_up_components(self) -> None:
-        super()._set_up_components()
-        self.replicas = ReplicaTime(len(self._scenes), self._run_ticks())
-        if not self.replicas.fits:
+    def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
+        """Lay runs end to end, and split the blocks that cannot serve all of them."""
+        self.time = ReplicaTime.end_to_end(len(self._scenes), self._run_ticks(duration_s))
+        if not self.time.fits:
             raise NotInLockStep(
-                f"{len(self._scenes)} runs of {float(self.duration_s):g} s do not fit on one line "
-                f"of 64-bit ticks at {self.ticks_per_s} per second"
+                f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
+                f"of 64-bit ticks at {self.scene.ticks_per_s} per second"
             )
-        for name, component in self.components.items():
+        for name, component in components.items():
             if not self._shared(name, component):
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
@@ -117,29 +133,13 @@ class LockStep(Simulation):
                 found.update(n for n in fields if getattr(other, n) != getattr(first, n))
         return found
 
-    def _parameters(self, name: str) -> Any:
-        """Return what a block is made with: the first replica's, watched where clocks differ."""
-        parameters = self.scene.blocks[name].parameters
-        differing = self._differing[name] = self._find_differing(name)
-        of_the_clock = isinstance(parameters, ClockedParameters) and differing <= _OF_THE_CLOCK
-        if not differing or not of_the_clock:
-            return parameters
-        self._watched[name] = WatchedParameters(parameters, differing)
-        return self._watched[name].parameters
-
-    def _build_nodes(self, window: int | None, shuffle_ties: int | None) -> dict[str, Node]:
-        nodes = super()._build_nodes(window, shuffle_ties)
-        for name, instances in self.split.items():
-            nodes[name].runner = instances
-        return nodes
-
     def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
         block = self.scene.blocks[name]
 
         def make(number: int) -> Component:
             scene = self._scenes[number]
             context = Context(
-                Streams(scene.seed), self.ticks_per_s, duration_s=self.duration_s,
+                Streams(scene.seed), self.scene.ticks_per_s, duration_s=face.context.duration_s,
                 consumers=face.context.consumers, producers=face.context.producers,
                 sections=scene.sections,
             )  # fmt: skip
@@ -189,7 +189,8 @@ class LockStep(Simulation):
         if self._report is not None:
             self._report(number, component.report())
 
-    def _clock(self, name: str, component: Component) -> ScanClock | None:
+    def clock(self, name: str, component: Component) -> ScanClock | None:
+        """Return the clocks of all replicas as one."""
         found = [component.clock_of(scene.blocks[name].parameters) for scene in self._scenes]
         specs = [spec for spec in found if spec is not None]
         if not specs:
@@ -203,51 +204,24 @@ class LockStep(Simulation):
         clocks = []
         for scene, spec in zip(self._scenes, specs, strict=True):
             draw = Streams(scene.seed).scan_normals(name, "clock jitter")
-            clocks.append(ScanClock(spec, self.ticks_per_s, draw))
-        assert self.replicas is not None
-        return ReplicaClock(clocks, self.replicas)
+            clocks.append(ScanClock(spec, scene.ticks_per_s, draw))
+        return ReplicaClock(clocks, self.time)
 
-    # -- running -------------------------------------------------------------------------------
+    def runner(self, component: Component) -> Any:
+        """Return the block, or its instances."""
+        return self.split.get(component.name, component)
 
-    def _run_ticks(self) -> int:
-        return super().end_tick
+    def windows(
+        self, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder | None
+    ) -> Windows:
+        """Return windows that hold many whole replicas, or parts of one."""
+        return ReplicaWindows(self.time, longest_ticks, cuts)
 
-    @property
-    def end_tick(self) -> int:
-        """First tick that is no longer simulated."""
-        if self.replicas is None:
-            return self._run_ticks()
-        return (self.replicas.replicas - 1) * self.span_ticks + self.replicas.end_tick
-
-    def _windows(self, end: int) -> Iterator[tuple[int, int]]:
-        """Give windows that hold many whole replicas, or parts of one."""
-        assert self.replicas is not None
-        span, length = self.span_ticks, self.replicas.end_tick
-        together = self.window_ticks // length
-        if together > 1:
-            for first in range(0, self.replicas.replicas, together):
-                last = min(first + together, self.replicas.replicas) - 1
-                yield first * span, last * span + length
-            return
-        for number in range(self.replicas.replicas):
-            for start, stop in super()._windows(length):
-                yield number * span + start, number * span + stop
-
-    def run(self, progress: Callable[[float], None] | None = None) -> Any:
-        """Run all replicas; see `Simulation.run`."""
-        try:
-            outcome = super().run(progress)
-        except BlockFailure as failure:
-            raise _unwrapped(failure) from None
+    def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
+        """Let instances report; a shared block has seen the rows of all and speaks for none."""
         for block in self.split.values():
             block.close(len(self._scenes))
-        # Nobody speaks for all replicas: a shared block has seen the rows of every one.
-        return replace(outcome, components={})
-
-
-def _unwrapped(failure: BlockFailure) -> Exception:
-    cause = failure.__cause__
-    return cause if isinstance(cause, NotInLockStep) else failure
+        return {}
 
 
 def _check_alike(scenes: Sequence[Scene]) -> None:

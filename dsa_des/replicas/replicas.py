@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.record.recording import ColumnSink, Recorder
-from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.block import Block
 from dsa_des.scene.checks import check_times
@@ -106,7 +106,9 @@ def run_replicas(
 def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     """Return why replicas cannot run in lock step, as far as it shows before they run."""
     try:
-        LockStep([scene_of(scene, replica) for replica in replicas]).rehearse()
+        together = Replicas([scene_of(scene, replica) for replica in replicas])
+        Simulation(together.scene, timeline=together)
+        together.rehearse()
     except NotInLockStep as reason:
         return str(reason)
     except (SceneError, BlockFailure):  # a failing replica says so itself
@@ -120,7 +122,7 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
         return None
     sink = ColumnSink()
     try:
-        simulation = LockStep(scenes, recorder=Recorder([sink], wanted=wanted))
+        simulation = lock_step(scenes, recorder=Recorder([sink], wanted=wanted))
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None

@@ -15,10 +15,11 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message, by_output
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.errors import RunRefused
 from dsa_des.time.timeline import first_scan
 
 
-class NotInLockStep(Exception):
+class NotInLockStep(RunRefused):
     """These replicas cannot run in lock step; the message says why. They can run one by one."""
 
 

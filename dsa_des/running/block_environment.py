@@ -1,4 +1,4 @@
-"""What a block with its own ``process(self, env)`` generator sees of the simulation."""
+"""The simulation as a block with its own ``process(self, env)`` generator sees it."""
 
 from collections.abc import Callable
 from typing import Any, Protocol

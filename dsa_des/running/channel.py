@@ -27,8 +27,8 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
-    replicas : ReplicaTime, optional
-        For replicas in lock step: no row arrives in another replica than its own.
+    time : ReplicaTime, optional
+        With many replicas on it, no row arrives in another one than its own.
     """
 
     def __init__(
@@ -36,12 +36,12 @@ class Channel:
         source: str,
         delay_ticks: int = 0,
         faults: WireFaults | None = None,
-        replicas: ReplicaTime | None = None,
+        time: ReplicaTime | None = None,
     ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
-        self._replicas = replicas
+        self._span_ticks, self._run_ticks = (time.span_ticks, time.run_ticks) if time else (0, 0)
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
         #: First arrival of every message pushed since `state` or `set_state`.
@@ -65,16 +65,18 @@ class Channel:
         """Return the first arrival of what was pushed since `state` or `set_state`, or None."""
         return min(self._pushed) if self._pushed else None
 
-    def push(self, message: Message, sent: int | None = None) -> IntArray:
+    def push(self, message: Message, sent: int | IntArray | None = None) -> IntArray:
         """Deposit a message and return the ticks at which its rows arrive, in order.
 
         Parameters
         ----------
         message : Message
-        sent : int, optional
-            The tick at which it was sent, when that is later than the rows' own.
+        sent : int or array of int, optional
+            The tick at which it was sent, or each of its rows, when that is later than their own.
         """
-        ticks = message.tick if sent is None else np.full(len(message), sent, dtype=np.int64)
+        ticks = message.tick
+        if sent is not None:
+            ticks = np.full(len(message), sent, dtype=np.int64)
         arrivals = ticks + self.delay_ticks if self.delay_ticks else ticks
         if self._faults is not None:
             kept = np.flatnonzero(self._faults.kept(message.tick))
@@ -83,10 +85,10 @@ class Channel:
             arrivals, message = arrivals[order], message.take(kept[order])
             if len(kept) == 0:
                 return arrivals
-        if self._replicas is not None and self.delay_ticks:
+        if self._span_ticks and self.delay_ticks:
             # Seen from the start of the replica that sent it: a long delay leads past the next one.
-            start = ticks - ticks % self._replicas.span_ticks
-            in_time = arrivals - start < self._replicas.end_tick
+            start = ticks - ticks % self._span_ticks
+            in_time = arrivals - start < self._run_ticks
             arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
             if len(arrivals) == 0:
                 return arrivals
@@ -154,9 +156,8 @@ class Channel:
             return None
         arrivals, message = held
         rows = last_at_or_before(arrivals, ticks)
-        if self._replicas is not None:
-            span = self._replicas.span_ticks
-            rows[arrivals[rows] // span != ticks // span] = -1
+        if self._span_ticks:
+            rows[arrivals[rows] // self._span_ticks != ticks // self._span_ticks] = -1
         return message, rows
 
 

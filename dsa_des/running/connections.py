@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 
-from dsa_des.errors import Problem, SceneError
+from dsa_des.errors import SceneError
 from dsa_des.running.channel import Channel
-from dsa_des.running.node import Demand, Node
+from dsa_des.running.demand import Demand
+from dsa_des.running.node import Node
+from dsa_des.running.timing_effects import may_be_late
 from dsa_des.running.wire_faults import WireFaults
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
@@ -13,7 +15,9 @@ from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import ReplicaTime
 
 
-def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | None = None) -> None:
+def connect(
+    scene: Scene, nodes: Mapping[str, Node], time: ReplicaTime, *, everything: bool = False
+) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
 
     Parameters
@@ -21,39 +25,39 @@ def connect(scene: Scene, nodes: Mapping[str, Node], replicas: ReplicaTime | Non
     scene : Scene
     nodes : mapping
         Running blocks by name.
-    replicas : ReplicaTime, optional
-        For replicas in lock step.
+    time : ReplicaTime
+        How the runs lie in time.
+    everything : bool
+        Draw loss and jitter also for wires that have none.
 
     Raises
     ------
     SceneError
         If a wire's delay or initial message makes no sense, or a block that runs on demand has
-        nobody to demand anything.
+        no block to demand anything.
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
-        channel = Channel(wire.source, delay, _faults(scene, wire), replicas)
+        channel = Channel(wire.source, delay, _faults(scene, wire, everything), time)
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             try:
                 channel.hold(declared.initial(wire.holds), 0)
             except (TypeError, ValueError) as error:
-                raise SceneError([_problem(scene, "wires", f"{wire}: holds: {error}")]) from error
+                raise SceneError([scene.problem("wires", f"{wire}: holds: {error}")]) from error
         target = nodes[wire.target]
         target.channels.setdefault(wire.input, []).append(channel)
         nodes[wire.source].subscribers.setdefault(wire.output, []).append(
             (channel, target, wire.input)
         )
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name, replicas)
+        node.demands = find_demands(nodes, name, time)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
-            raise SceneError([_problem(scene, f"blocks.{name}", message)])
+            raise SceneError([scene.problem(f"blocks.{name}", message)])
 
 
-def find_demands(
-    nodes: Mapping[str, Node], name: str, replicas: ReplicaTime | None = None
-) -> list[Demand]:
+def find_demands(nodes: Mapping[str, Node], name: str, time: ReplicaTime) -> list[Demand]:
     """Return the first clocked blocks on every way downstream, and the delay on the way."""
     found: dict[tuple[str, int], Demand] = {}
     seen = {(name, 0)}
@@ -65,15 +69,14 @@ def find_demands(
         ):
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
-                end_tick = node.simulation.end_tick
-                found[reached] = Demand(node.name, node.clock, reached[1], replicas, end_tick)
+                found[reached] = Demand(node.name, node.clock, reached[1], time)
             elif reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)
     return [found[key] for key in sorted(found)]
 
 
-def check_reach(scene: Scene, nodes: Mapping[str, Node], end_tick: int) -> None:
+def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
     """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
     delays = sum(
         channel.delay_ticks
@@ -82,22 +85,18 @@ def check_reach(scene: Scene, nodes: Mapping[str, Node], end_tick: int) -> None:
         for channel in channels
     )
     jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
-    if end_tick + delays + jitter >= MAX_TICK:
+    if run_ticks + delays + jitter >= MAX_TICK:
         longest_s = MAX_TICK / scene.ticks_per_s
         message = (
-            f"the run lasts {end_tick / scene.ticks_per_s:.4g} s and the wires take up to "
+            f"the run lasts {run_ticks / scene.ticks_per_s:.4g} s and the wires take up to "
             f"{(delays + jitter) / scene.ticks_per_s:.4g} s: this scene's ticks reach "
             f"{longest_s:.4g} s"
         )
-        raise SceneError([_problem(scene, "duration_s", message)])
+        raise SceneError([scene.problem("duration_s", message)])
 
 
-def _problem(scene: Scene, key: str, message: str) -> Problem:
-    return Problem(str(scene.path), key, message)
-
-
-def _faults(scene: Scene, wire: Wire) -> WireFaults | None:
-    if not wire.jitter_s and not wire.drop_probability:
+def _faults(scene: Scene, wire: Wire, everything: bool) -> WireFaults | None:
+    if not may_be_late(wire, everything):
         return None
     streams = Streams(scene.seed)
     return WireFaults(
@@ -114,7 +113,7 @@ def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
     clock = nodes[wire.target].clock or nodes[wire.source].clock
     if clock is None:
         message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
-        raise SceneError([_problem(scene, "wires", message)])
+        raise SceneError([scene.problem("wires", message)])
     # Rounded down: a message must not arrive a tick after the scan it was sent for.
     delay = wire.delay_scans * int(clock.period)
     if delay >= MAX_TICK:
@@ -122,5 +121,5 @@ def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
             f"{wire}: {wire.delay_scans} scans take longer than this scene's ticks reach, "
             f"{MAX_TICK / scene.ticks_per_s:.4g} s"
         )
-        raise SceneError([_problem(scene, "wires", message)])
+        raise SceneError([scene.problem("wires", message)])
     return delay

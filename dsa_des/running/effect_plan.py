@@ -1,4 +1,4 @@
-"""Which effects of a block exist in a run: what the scene calls for, less what it tolerates."""
+"""The effects that exist in a run: those the scene calls for, less those it tolerates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

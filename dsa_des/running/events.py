@@ -19,7 +19,7 @@ class Bell(simpy.Event):
     """What a block's process waits for; rung from inside a `WakeUp`, so it keeps its priority."""
 
     def ring(self) -> None:
-        """Resume whoever waits, now, within the current event."""
+        """Resume the waiting processes, now, within the current event."""
         callbacks, self.callbacks = self.callbacks, None  # type: ignore[assignment]
         self._ok = True
         self._value = None

@@ -8,7 +8,7 @@ _MANY_SCANS = 1e7
 
 
 def say_if_long(simulation: Simulation) -> None:
-    """Say on standard error that a run will take long: nobody should wait for it unawares."""
+    """Say on standard error that a run will take long, before it does."""
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
         say(f"{message}{simulation.scans:.2g} scans", err=True)

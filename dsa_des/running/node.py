@@ -6,7 +6,7 @@ the others by depth; ties within a depth go by name, or at random under ``shuffl
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,14 +17,18 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message, by_output
 from dsa_des.block.strangers import is_ours_to_obey
-from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.block.wake import Wake
+from dsa_des.errors import RunRefused
 from dsa_des.running.block_environment import BlockEnvironment
 from dsa_des.running.channel import Channel
+from dsa_des.running.demand import Demand
 from dsa_des.running.events import Bell, WakeUp
+from dsa_des.running.inputs import Inputs
 from dsa_des.running.processors import Processor
 from dsa_des.running.run_state import RunState
-from dsa_des.time.clock import MAX_TICK, ScanClock
-from dsa_des.time.timeline import ReplicaTime
+from dsa_des.running.windowed_queue import WindowedQueue
+from dsa_des.running.windows import Window
+from dsa_des.time.clock import ScanClock
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0
@@ -40,33 +44,11 @@ class Abort(Exception):
 
 
 @dataclass
-class Demand:
-    """A clocked block downstream, and how long before its scan it needs our row."""
-
-    block: str
-    clock: ScanClock
-    lead_ticks: int = 0
-    replicas: ReplicaTime | None = None
-    end_tick: int = MAX_TICK
-
-    def between(self, start: int, end: int) -> IntArray:
-        """Return the ticks in [start, end) at which this block needs a row."""
-        if not self.lead_ticks:
-            return self.clock.between(start, end)[1]
-        # A row that would arrive after the end of the run is not needed.
-        last = min(end + self.lead_ticks, self.end_tick)
-        _, ticks = self.clock.between(start + self.lead_ticks, last)
-        if self.replicas is not None:  # rows from before a replica's start do not exist
-            ticks = ticks[ticks % self.replicas.span_ticks >= self.lead_ticks]
-        return ticks - self.lead_ticks
-
-
-@dataclass
 class Node:
     """The runtime of one block.
 
     Invariants: `run_at` is called with increasing ticks; at each of them every undelayed sender
-    has run; a channel's rows are collected by nobody else.
+    has run; only here are a channel's rows collected.
     """
 
     simulation: RunState
@@ -76,7 +58,7 @@ class Node:
     clock: ScanClock | None = None
     demands: list[Demand] = field(default_factory=list)
     on_demand: bool = False
-    processor: Processor | None = None
+    processor: Processor | WindowedQueue | None = None
     channels: dict[str, list[Channel]] = field(default_factory=dict)
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     cpu_s: float = 0.0
@@ -92,10 +74,6 @@ class Node:
         self._bell = Bell(self.simulation.env)
         inputs = self.component.inputs
         self._trigger_ports = [port for port in inputs if inputs[port].mode == "trigger"]
-        self._held_ports = [
-            port for port in inputs if inputs[port].mode != "queued" and not inputs[port].many
-        ]
-        self._queue_ports = [port for port in inputs if port not in self._held_ports]
 
     # -- the life of the process ---------------------------------------------------------------
 
@@ -110,7 +88,7 @@ class Node:
             yield self._bell
             self._bell = Bell(self.simulation.env)
             if self.windowed:
-                self._run_window(*self.simulation.window)
+                self._run_window(self.simulation.window.start, self.simulation.window.end)
             else:
                 self._run_at(int(self.simulation.env.now))
 
@@ -157,8 +135,11 @@ class Node:
 
     # -- when ----------------------------------------------------------------------------------
 
-    def open_window(self, start: int, end: int) -> None:
-        """Schedule everything this block's clock asks for in [start, end)."""
+    def open_window(self, window: Window) -> None:
+        """Schedule everything this block's clock asks for in a window."""
+        start, end = window.start, window.end
+        if self.processor is not None:
+            self.processor.open_window(start, end)
         if self.windowed:
             self.wake_at(start)
             return
@@ -184,7 +165,7 @@ class Node:
             return
         scan = self._scan_at.get(tick, -1)
         ticks = np.array([tick], dtype=np.int64)
-        self._run(ticks, np.array([scan], dtype=np.int64), tick, tick + 1)
+        self._run(ticks, np.array([scan], dtype=np.int64), tick + 1)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -212,52 +193,28 @@ class Node:
             else:
                 scans = np.full(len(ticks), -1, dtype=np.int64)
         if len(ticks):
-            self._run(ticks, scans, start, end)
+            self._run(ticks, scans, end)
 
-    def _run(self, ticks: IntArray, scans: IntArray, start: int, end: int) -> None:
-        held: dict[str, tuple[Message, IntArray]] = {}
-        missing = np.zeros(len(ticks), dtype=bool)
-        for port in self._held_ports:
-            for channel in self.channels.get(port, []):
-                sample = channel.sample(ticks, end)
-                if sample is not None:
-                    held[port] = sample
-                if self.component.inputs[port].required:
-                    missing |= True if sample is None else sample[1] < 0
-        if missing.any():  # before the first messages
-            there = np.flatnonzero(~missing)
-            if len(there) == 0:
-                return
-            ticks, scans = ticks[there], scans[there]
-            held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
-        arrived = {port: self._collect(port, end) for port in self._queue_ports}
-        wake = Wake(
-            ticks,
-            scans,
-            self.simulation.ticks_per_s,
-            held,
-            arrived,
-            partial(self._rows_asked_for, ticks),
-            self.simulation.span_ticks,
-        )
+    @cached_property
+    def _inputs(self) -> Inputs:
+        run = self.simulation
+        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.span_ticks)
+
+    def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
+        wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for)
+        if wake is None:
+            return
+        ticks = wake.ticks
         if self.simulation.trace is not None:
             self.simulation.trace += [(int(tick), self.name) for tick in ticks]
         try:
             self.send(self.runner.run(wake), ticks)
-        except Abort:
+        except (Abort, RunRefused):
             raise
         except BaseException as error:
             if is_ours_to_obey(error):
                 raise
-            self.simulation.fail(self, ticks, error, int(scans[0]))
-
-    def _collect(self, port: str, end: int) -> list[Arrivals]:
-        found = []
-        for channel in self.channels.get(port, []):
-            new = channel.collect(end)
-            if new is not None:
-                found.append(Arrivals(channel.source, *new))
-        return found
+            self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 
     def _rows_asked_for(self, ticks: IntArray) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
@@ -275,16 +232,10 @@ class Node:
         """Return the inputs as they are now, for a block with its own process."""
         self._missed = False
         tick = int(self.simulation.env.now)
-        ticks = np.array([tick], dtype=np.int64)
-        held = {}
-        for port in self._held_ports:
-            for channel in self.channels.get(port, []):
-                sample = channel.sample(ticks, tick + 1)
-                if sample is not None:
-                    held[port] = sample
-        arrived = {port: self._collect(port, tick + 1) for port in self._queue_ports}
-        scans = np.array([-1], dtype=np.int64)
-        return Wake(ticks, scans, self.simulation.ticks_per_s, held, arrived)
+        ticks, scans = np.array([tick], dtype=np.int64), np.array([-1], dtype=np.int64)
+        wake = self._inputs.seen(ticks, scans, tick + 1, complete=False)
+        assert wake is not None
+        return wake
 
     # -- sending -------------------------------------------------------------------------------
 
@@ -308,13 +259,13 @@ class Node:
             if self.processor is None:
                 self._deliver(port, message)
             else:
-                self.processor.submit(self.name, partial(self._deliver, port, message))
+                self.processor.submit(self.name, message, partial(self._deliver, port))
 
-    def _deliver(self, port: str, message: Message, sent: int | None = None) -> None:
+    def _deliver(self, port: str, message: Message, sent: int | IntArray | None = None) -> None:
         for channel, node, target_port in self.subscribers.get(port, []):
             arrivals = channel.push(message, sent)
             if node.component.inputs[target_port].mode == "sampled":
-                channel.forget(self.simulation.window[0])
+                channel.forget(self.simulation.window.start)
             if not node.windowed and target_port in node._trigger_ports:
                 for arrival in arrivals.tolist():
                     node.wake_at(arrival)

@@ -10,12 +10,13 @@ from typing import Any, Protocol
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.running.windows import Failure
 
 
 class Repeated(Protocol):
     """A run of the same scene once more."""
 
-    failed_at: IntArray
+    failure: Failure | None
 
     def run(self) -> Any:
         """Run to the end, or raise the `BlockFailure`."""
@@ -41,9 +42,9 @@ def pinpoint(repeat: Callable[[set[int]], Repeated], ticks: IntArray) -> BlockFa
         try:
             again.run()
         except BlockFailure as failure:
-            if len(again.failed_at) <= 1:
+            if again.failure is None or len(again.failure.ticks) <= 1:
                 return failure
-            ticks = again.failed_at
+            ticks = again.failure.ticks
         else:
             return None
     return None

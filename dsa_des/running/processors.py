@@ -7,9 +7,9 @@ every message is recorded in the table ``processing``.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import simpy
@@ -24,7 +24,10 @@ from dsa_des.time.randomness import Stream, key_of
 FINISH_PRIORITY = 0.5
 ENTRY_PRIORITY = 1e9
 
+DONE, DROPPED, SKIPPED = range(3)
 _OUTCOMES = ("done", "dropped", "skipped")
+#: Takes a message and the tick, or the tick of each row, at which work on it ended.
+Deliver = Callable[[Message, Any], None]
 
 
 @dataclass(eq=False)
@@ -74,11 +77,69 @@ class Processing(Message):
         return {"processing": columns}
 
 
+def noted(
+    tick: IntArray,
+    entered: IntArray,
+    started: IntArray,
+    queue_length: IntArray,
+    outcome: int,
+    processor: str,
+    ticks_per_s: int,
+) -> Processing:
+    """Return the rows for messages with the same outcome."""
+    return Processing(
+        tick,
+        entered,
+        started,
+        queue_length,
+        np.full(len(tick), outcome, dtype=np.int64),
+        processor=processor,
+        ticks_per_s=ticks_per_s,
+    )
+
+
+class Service:
+    """How long a processor works on each message.
+
+    Parameters
+    ----------
+    name : str
+    parameters : ProcessorParameters
+    ticks_per_s : int
+    stream : Stream
+        Draws of the extra times, keyed by block and instant.
+
+    Raises
+    ------
+    ValueError
+        If the time is shorter than one tick.
+    """
+
+    def __init__(
+        self, name: str, parameters: ProcessorParameters, ticks_per_s: int, stream: Stream
+    ) -> None:
+        self._least = round(parameters.service_s * ticks_per_s)
+        self._spread = float(parameters.service_spread_s * ticks_per_s)
+        self._stream = stream
+        if self._least < 1:
+            raise ValueError(f"processors.{name}: service_s is shorter than one tick")
+
+    def ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
+        """Return the time for each message, by its block and the tick at which it entered."""
+        if not self._spread:
+            return np.full(len(entered), self._least, dtype=np.int64)
+        pairs = zip(blocks, entered.tolist(), strict=True)
+        keys = np.array([key_of("job", block, tick) for block, tick in pairs], dtype=np.uint64)
+        extra = np.rint(self._stream.uniform(keys, 0) * self._spread)
+        return self._least + extra.astype(np.int64)
+
+
 @dataclass
 class _Job:
     block: str
     entered: int
-    deliver: Callable[[int], None]
+    message: Message | None = None
+    deliver: Deliver | None = None
 
 
 class Processor:
@@ -92,10 +153,9 @@ class Processor:
     ----------
     name : str
     parameters : ProcessorParameters
+    service : Service
     env : simpy.Environment
     ticks_per_s : int
-    stream : Stream
-        Draws of the service times, keyed by block and instant.
     record : callable
         Takes the block's name and a `Processing` message.
     """
@@ -104,25 +164,21 @@ class Processor:
         self,
         name: str,
         parameters: ProcessorParameters,
+        service: Service,
         env: simpy.Environment,
         ticks_per_s: int,
-        stream: Stream,
         record: Callable[[str, Message], None],
     ) -> None:
         self.name = name
         self.p = parameters
         self._env = env
         self._ticks_per_s = ticks_per_s
-        self._service = round(parameters.service_s * ticks_per_s)
-        self._spread = float(parameters.service_spread_s * ticks_per_s)
-        self._stream = stream
+        self._service = service
         self._record = record
         self._entering: list[_Job] = []
         self._line: deque[_Job] = deque()
         self._busy = False
         self._bell = Bell(env)
-        if self._service < 1:
-            raise ValueError(f"processors.{name}: service_s is shorter than one tick")
 
     def start(self) -> None:
         """Start the processor's SimPy process."""
@@ -133,26 +189,29 @@ class Processor:
         if self.p.when_busy != "skip" or not self._busy:
             return False
         now = int(self._env.now)
-        self._note(_Job(block, now, lambda tick: None), now, "skipped")
+        self._note(_Job(block, now), now, SKIPPED)
         return True
 
-    def submit(self, block: str, deliver: Callable[[int], None]) -> None:
+    def open_window(self, start: int, end: int) -> None:
+        """Do nothing: it works message by message."""
+
+    def submit(self, block: str, message: Message, deliver: Deliver) -> None:
         """Hand in what `block` made at this instant; `deliver` is called when it is worked on."""
         now = int(self._env.now)
         if not self._entering:
             entry = WakeUp(self._env, 0, ENTRY_PRIORITY)
             entry.callbacks.append(self._enter)
-        self._entering.append(_Job(block, now, deliver))
+        self._entering.append(_Job(block, now, message, deliver))
 
     def _enter(self, event: simpy.Event) -> None:
         entering, self._entering = sorted(self._entering, key=lambda job: job.block), []
         now = int(self._env.now)
         for job in entering:
             if self.p.when_busy == "skip" and (self._busy or self._line):
-                self._note(job, now, "skipped")  # another block of this instant was first
+                self._note(job, now, SKIPPED)  # another block of this instant was first
                 continue
             if self.p.when_busy == "drop_oldest" and self._line:
-                self._note(self._line.popleft(), now, "dropped")
+                self._note(self._line.popleft(), now, DROPPED)
             self._line.append(job)
         if self._line and not self._busy and self._bell.callbacks:
             self._bell.ring()
@@ -165,21 +224,16 @@ class Processor:
             job = self._line.popleft()
             self._busy = True
             started = int(self._env.now)
-            yield WakeUp(self._env, self._service_ticks(job), FINISH_PRIORITY)
+            service = self._service.ticks([job.block], np.array([job.entered], dtype=np.int64))
+            yield WakeUp(self._env, int(service[0]), FINISH_PRIORITY)
             self._busy = False
             now = int(self._env.now)
-            self._note(job, now, "done", started)
-            job.deliver(now)
+            self._note(job, now, DONE, started)
+            assert job.deliver is not None and job.message is not None
+            job.deliver(job.message, now)
 
-    def _service_ticks(self, job: _Job) -> int:
-        if not self._spread:
-            return self._service
-        draw = self._stream.uniform(np.uint64(key_of("job", job.block, job.entered)), 0)
-        return self._service + round(float(draw) * self._spread)
-
-    def _note(self, job: _Job, tick: int, outcome: str, started: int = -1) -> None:
-        row = [np.array([value], dtype=np.int64) for value in (tick, job.entered, started)]
-        length = np.array([len(self._line)], dtype=np.int64)
-        code = np.array([_OUTCOMES.index(outcome)], dtype=np.int64)
-        message = Processing(row[0], row[1], row[2], length, code, self.name, self._ticks_per_s)
+    def _note(self, job: _Job, tick: int, outcome: int, started: int = -1) -> None:
+        values = (tick, job.entered, started, len(self._line))
+        row = [np.array([value], dtype=np.int64) for value in values]
+        message = noted(row[0], row[1], row[2], row[3], outcome, self.name, self._ticks_per_s)
         self._record(job.block, message)

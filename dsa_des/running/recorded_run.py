@@ -18,7 +18,7 @@ from dsa_des.record.recording import ObserverSink, Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.version import __version__
 from dsa_des.running.long_run import say_if_long
-from dsa_des.running.pacing import Pacer
+from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.reports import draw_all, load_reports
 from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.running.warnings import say_warnings, warnings_of
@@ -41,6 +41,7 @@ def record_run(
     pacer: Pacer | None = None,
     told: bool = True,
     progress: Callable[[float], None] | None = None,
+    draw: bool = True,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
@@ -60,6 +61,8 @@ def record_run(
         Whether notes are written to standard error.
     progress : callable, optional
         Called with the simulated time in s after each window, instead of a bar.
+    draw : bool
+        Whether reports draw their figures.
 
     Raises
     ------
@@ -84,7 +87,7 @@ def record_run(
     if warn:
         say_warnings(warnings, "note")
     if pacer is not None:
-        simulation.limit_windows(pacer.longest_window_s)
+        simulation.windows = PacedWindows(simulation.windows, pacer, simulation.ticks_per_s)
     reports = load_reports()
     notes: list[str] = []
     observers = ObserverSink(
@@ -99,7 +102,7 @@ def record_run(
         started = time.perf_counter()
         try:
             with _progress(simulation, silent=silent) as bar:
-                outcome = simulation.run(_paced(progress or bar, pacer))
+                outcome = simulation.run(progress or bar)
         finally:
             tables.release()
         summary = summary_of(observers, outcome, target.path, notes)
@@ -117,7 +120,8 @@ def record_run(
     summary["out"] = str(target.path)
     # The run has its name: whatever happens while figures are drawn, it is not lost.
     try:
-        notes += draw_all(reports, simulation, target.path, summary)
+        if draw:
+            notes += draw_all(reports, simulation, target.path, summary)
         write_run_json(target.path, info)  # with the figures among its files
     except OSError as error:
         what = f"figures cannot be written: {error.strerror or error}"
@@ -170,22 +174,6 @@ def info_of(
         "summary": sections,
         "timings": timings,
     }
-
-
-def _paced(
-    progress: Callable[[float], None] | None, pacer: Pacer | None
-) -> Callable[[float], None] | None:
-    """Return what is called after each window: the pacer first, then the progress bar."""
-    if pacer is None:
-        return progress
-
-    def after_window(time_s: float) -> None:
-        pacer(time_s)
-        if progress is not None:
-            progress(time_s)
-
-    pacer.start()
-    return after_window
 
 
 @contextmanager

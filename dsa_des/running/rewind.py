@@ -8,208 +8,127 @@ while nothing comes back.
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
-from dsa_des.block.component import Component
 from dsa_des.record.recording import Recorder
-from dsa_des.running.channel import Channel
-from dsa_des.running.rewind_check import Witness
-from dsa_des.running.run_state import RewindableRun, RunningBlock
-from dsa_des.scene.graph import in_cycles, window_order
+from dsa_des.running.run_state import RunningBlock
+from dsa_des.running.windows import EqualWindows, Failure, Window
 
 # At the start, and after something came back, a window has this part of its full length.
 _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
-def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[tuple[str, str]]:
-    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
-
-    Edges into inputs that a block can do without are the first to go: that is where a loop closes.
+class Rewinder:
+    """Takes all blocks, wires and the record of a run back to how they were.
 
     Parameters
     ----------
-    graph : networkx.DiGraph
-        From `dsa_des.scene.graph.build_graph`.
-    classes : mapping
-        The class of each block.
-    """
-    looped = in_cycles(graph)
-    inside = [
-        (source, target)
-        for source, target in sorted(graph.edges)
-        if source in looped and looped.get(target) == looped[source]
-    ]
-    kept = nx.DiGraph()
-    kept.add_nodes_from(looped)
-    kept.add_edges_from(edge for edge in inside if not graph.edges[edge]["delayed"])
-    cut = set()
-    delayed = (edge for edge in inside if graph.edges[edge]["delayed"])
-    for edge in sorted(delayed, key=lambda edge: _optional(graph, classes, edge)):
-        kept.add_edge(*edge)
-        if not nx.is_directed_acyclic_graph(kept):
-            kept.remove_edge(*edge)
-            cut.add(edge)
-    return cut
-
-
-def _optional(
-    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
-) -> bool:
-    """Whether the receiving block can do without what comes over an edge."""
-    inputs = classes[edge[1]].inputs
-    return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
-
-
-def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
-    """Return the place of each block in the order in which blocks tell each other what they offer.
-
-    Requests go the other way. Both pass over wires with and without delay; loops are opened where
-    an input can be done without, and else at a delay.
-    """
-    looped = in_cycles(graph)
-    opened = nx.DiGraph(graph)
-    opened.remove_edges_from(
-        edge
-        for edge in graph.edges
-        if edge[0] in looped
-        and looped[edge[0]] == looped.get(edge[1])
-        and _optional(graph, classes, edge)
-    )
-    return window_order(opened, set(graph), cut_loops(opened, classes))
-
-
-def cannot_rewind(
-    classes: Mapping[str, type[Component]], queued: Collection[str] = ()
-) -> dict[str, str]:
-    """Return the blocks that the engine cannot take back to an earlier state, and why each.
-
-    Parameters
-    ----------
-    classes : mapping
-        The class of each block.
-    queued : collection of str
-        Blocks on a shared processor.
-    """
-    found = {}
-    for name, cls in sorted(classes.items()):
-        if cls.process is not None:
-            found[name] = "has a process of its own"
-        elif not cls.windowed:
-            found[name] = "runs scan by scan (windowed is False)"
-        elif not cls.rewindable:
-            found[name] = "does not let itself be rewound (rewindable is False)"
-        elif name in queued:
-            found[name] = "shares a processor"
-    return found
-
-
-def rewinding_windows(simulation: RewindableRun, end: int) -> Iterator[tuple[int, int]]:
-    """Run and yield windows in which nothing came back unseen."""
-    feedback = [
-        channel
-        for node in simulation.nodes.values()
-        for wires in node.channels.values()
-        for channel in wires
-        if (channel.source, node.name) in simulation.cut_edges
-    ]
-    start, length = 0, max(1, simulation.window_ticks // _RESTART)
-    came = 0  # when something came back last
-    while start < end:
-        stop = min(start + length, end, *(cut for cut in simulation.cuts if cut > start))
-        checkpoint = Checkpoint(simulation.nodes.values(), simulation.recorder, simulation.trace)
-        simulation.window = (start, stop)
-        simulation.run_window(start, stop)
-        early = checkpoint.earliest_since(feedback, stop)
-        if simulation.failure is not None and (early < stop or len(simulation.failed_at) > 1):
-            # What failed may never have happened: look less far.
-            simulation.failure = None
-            checkpoint.restore()
-            middle = int(simulation.failed_at[len(simulation.failed_at) // 2])
-            length = max(1, min(early, middle) - start)
-            continue
-        simulation.raise_failure()
-        if early < stop:
-            checkpoint.restore()
-            stop = early
-            simulation.window = (start, stop)
-            simulation.run_window(start, stop)
-            simulation.raise_failure()
-        if simulation.witness is not None:
-            _run_again(simulation, simulation.witness, checkpoint, start, stop)
-        coming = checkpoint.earliest_since(feedback, -1)
-        if coming < 0:
-            length = min(2 * length, simulation.window_ticks)
-        else:  # what comes back often comes regularly; at first, or after a hurry, start small
-            small = simulation.window_ticks // _RESTART
-            length = min(max(1, coming - came if came else small), simulation.window_ticks)
-            came = coming
-        yield start, stop
-        start = stop
-
-
-def _run_again(
-    simulation: RewindableRun, witness: Witness, checkpoint: "Checkpoint", start: int, stop: int
-) -> None:
-    """Run a window a second time from its saved state; it must give the same."""
-    first = witness.seen()
-    checkpoint.restore()
-    simulation.run_window(start, stop)
-    times_s = start / simulation.ticks_per_s, stop / simulation.ticks_per_s
-    witness.compare(first, simulation.failure, times_s)
-
-
-class Checkpoint:
-    """The state of all blocks and wires at the start of a window.
-
-    Parameters
-    ----------
-    nodes : iterable of RunningBlock
+    nodes : collection of RunningBlock
+    cut_edges : collection of (source, target)
+        Over the wires between these blocks messages come back.
     recorder : Recorder or None
     trace : list or None
     """
 
     def __init__(
         self,
-        nodes: Iterable[RunningBlock],
+        nodes: Collection[RunningBlock],
+        cut_edges: Collection[tuple[str, str]],
         recorder: Recorder | None,
         trace: list[tuple[int, str]] | None,
     ) -> None:
-        self._objects: list[tuple[Any, dict[str, Any]]] = []
-        for node in nodes:
-            for thing in (node.component, *node.component.context.effects.values()):
-                if hasattr(thing, "__dict__"):
-                    self._objects.append((thing, _copied(vars(thing))))
-        channels = {
-            id(channel): channel
+        self._recorder, self._trace = recorder, trace
+        self._things = [
+            thing
             for node in nodes
-            for wires in node.channels.values()
-            for channel in wires
-        }
-        self._channels: list[tuple[Channel, Any]] = [(c, c.state()) for c in channels.values()]
-        self._recorder, self._recorded = recorder, None if recorder is None else recorder.mark()
-        self._trace, self._traced = trace, 0 if trace is None else len(trace)
+            for thing in (node.component, *node.component.context.effects.values())
+            if hasattr(thing, "__dict__")
+        ]
+        into = [(n.name, c) for n in nodes for wires in n.channels.values() for c in wires]
+        self._channels = [channel for _, channel in into]
+        self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
-    def earliest_since(self, channels: Iterable[Channel], end: int) -> int:
-        """Return the first arrival over some wires of what was sent since, or `end`."""
-        ticks = [channel.earliest_pushed() for channel in channels]
-        return min((tick for tick in ticks if tick is not None), default=end)
+    def mark(self) -> None:
+        """Remember how everything is now."""
+        self._states = [_copied(vars(thing)) for thing in self._things]
+        self._wires = [channel.state() for channel in self._channels]
+        self._recorded = None if self._recorder is None else self._recorder.mark()
+        self._traced = 0 if self._trace is None else len(self._trace)
 
     def restore(self) -> None:
-        """Bring everything back to how it was."""
-        for thing, state in self._objects:
+        """Bring everything back to how it was at `mark`."""
+        for thing, state in zip(self._things, self._states, strict=True):
             vars(thing).clear()
             vars(thing).update(_copied(state))
-        for channel, state in self._channels:
-            channel.set_state(state)
+        for channel, wire in zip(self._channels, self._wires, strict=True):
+            channel.set_state(wire)
         if self._recorder is not None and self._recorded is not None:
             self._recorder.rewind(self._recorded)
         if self._trace is not None:
             del self._trace[self._traced :]
+
+    def came_back(self) -> int | None:
+        """Return when the first message arrives that came back since `mark` or `restore`."""
+        ticks = [channel.earliest_pushed() for channel in self._feedback]
+        return min((tick for tick in ticks if tick is not None), default=None)
+
+
+class RewindingWindows(EqualWindows):
+    """Windows in which nothing came back unseen.
+
+    Parameters
+    ----------
+    end_tick, longest_ticks, cuts
+        As for `EqualWindows`.
+    rewinder : Rewinder
+    """
+
+    def __init__(
+        self, end_tick: int, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder
+    ) -> None:
+        super().__init__(end_tick, longest_ticks, cuts)
+        self._rewinder = rewinder
+        self._length = 0
+        self._came = 0  # when something came back last
+        self._right: Window | None = None  # what is right of a window that was undone
+
+    def next(self) -> Window | None:
+        """Return what was right of the last window, or a new one that may be undone."""
+        if self._right is not None or self.start >= self.end_tick:
+            return self._right
+        self._rewinder.mark()
+        return Window(self.start, self.end_after(self._length or self._small()), True)
+
+    def heard(self, window: Window, failure: Failure | None) -> int | None:
+        """Undo a window inside of which a message came back."""
+        back = self._rewinder.came_back()
+        early = window.end if back is None else back
+        if self._right is None and failure is not None:
+            if early < window.end or len(failure.ticks) > 1:
+                # What failed may never have happened: look less far.
+                self._rewinder.restore()
+                middle = int(failure.ticks[len(failure.ticks) // 2])
+                self._length = max(1, min(early, middle) - self.start)
+                return None
+        elif self._right is None and early < window.end:
+            self._rewinder.restore()
+            self._right = Window(self.start, early, True)
+            return None
+        self._right = None
+        if back is None:
+            self._length = min(2 * (self._length or self._small()), self.longest_ticks)
+        else:  # what comes back often comes regularly; at first, or after a hurry, start small
+            length = max(1, back - self._came) if self._came else self._small()
+            self._length = min(length, self.longest_ticks)
+            self._came = back
+        return super().heard(window, failure)
+
+    def _small(self) -> int:
+        return max(1, self.longest_ticks // _RESTART)
 
 
 def _copied(state: Mapping[str, Any]) -> dict[str, Any]:

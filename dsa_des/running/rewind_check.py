@@ -1,4 +1,4 @@
-"""Whether blocks come back when they are rewound: each window runs twice, and must be the same.
+"""A check that blocks can be rewound: each window runs twice and must be the same.
 
 `Component.rewindable` is a promise about all of a block's state. A generator of random numbers, a
 list within a list or a variable of its module that breaks it would show in nothing but results
@@ -14,6 +14,9 @@ from dsa_des.block.message import by_output
 from dsa_des.block.wake import Wake
 from dsa_des.errors import BlockFailure
 from dsa_des.running.fingerprint import message_fingerprints, state_fingerprints
+from dsa_des.running.rewind import Rewinder
+from dsa_des.running.run_state import RunningBlock
+from dsa_des.running.windows import Failure, Window, Windows
 
 #: What a block sent in one call: fingerprints by output and field.
 Sent = dict[str, bytes]
@@ -70,7 +73,7 @@ class Witness:
     def compare(
         self,
         first: Seen,
-        failure: tuple[BlockFailure, BaseException] | None,
+        failure: Failure | None,
         times_s: tuple[float, float],
     ) -> None:
         """Compare what was seen since `begin` with the first run of the same window.
@@ -78,7 +81,7 @@ class Witness:
         Parameters
         ----------
         first : Seen
-        failure : tuple, optional
+        failure : Failure, optional
             What a block raised the second time.
         times_s : (start, end)
             Of the window, s.
@@ -95,11 +98,9 @@ class Witness:
                 what = _first_difference(one, other)
                 raise _not_the_same(name, component, times_s, f"sends something else ({what})")
         if failure is not None:
-            failed, cause = failure
-            said = f"fails the second time ({failed.reason})"
-            raise _not_the_same(
-                failed.block, self._components[failed.block], times_s, said
-            ) from cause
+            block = failure.said.block
+            said = f"fails the second time ({failure.said.reason})"
+            raise _not_the_same(block, self._components[block], times_s, said) from failure.cause
         ran = list(dict.fromkeys(name for name, _, _ in first.calls))
         for name in [*ran, *sorted(set(self._components) - set(ran))]:
             if first.states[name] != again.states[name]:
@@ -123,6 +124,58 @@ class Watched:
                 sent[f"output {port}, field {name}"] = value
         self._witness.note(self._component, sent)
         return result
+
+
+class WindowsRunTwice:
+    """Windows of a run that is rewound, each of which runs a second time and must give the same.
+
+    Parameters
+    ----------
+    windows : Windows
+        Those that may be undone.
+    rewinder : Rewinder
+        Theirs.
+    nodes : mapping
+        The running blocks, which are watched from now on.
+    ticks_per_s : int
+    """
+
+    def __init__(
+        self,
+        windows: Windows,
+        rewinder: Rewinder,
+        nodes: Mapping[str, RunningBlock],
+        ticks_per_s: int,
+    ) -> None:
+        self._windows, self._rewinder, self._ticks_per_s = windows, rewinder, ticks_per_s
+        self.witness = Witness(node.component for node in nodes.values())
+        for node in nodes.values():
+            node.runner = self.witness.runner(node.component)
+        #: A window that stands, up to where all is final then, and what was seen of it.
+        self._again: tuple[Window, int, Seen] | None = None
+
+    def limit(self, longest_ticks: int) -> None:
+        """Let no window be longer than this."""
+        self._windows.limit(longest_ticks)
+
+    def next(self) -> Window | None:
+        """Return the same window again, or the next."""
+        self.witness.begin()
+        return self._windows.next() if self._again is None else self._again[0]
+
+    def heard(self, window: Window, failure: Failure | None) -> int | None:
+        """Have a window that stands run again, and compare."""
+        if self._again is None:
+            final = self._windows.heard(window, failure)
+            if final is None or failure is not None:
+                return final
+            self._again = window, final, self.witness.seen()
+            self._rewinder.restore()
+            return None
+        (_, final, first), self._again = self._again, None
+        times_s = window.start / self._ticks_per_s, window.end / self._ticks_per_s
+        self.witness.compare(first, failure, times_s)
+        return final
 
 
 def _first_difference(one: Mapping[str, bytes], other: Mapping[str, bytes]) -> str:

@@ -1,4 +1,4 @@
-"""What blocks say of their own values before a run: defaults that decide, what cannot be meant."""
+"""Warnings of blocks about their own values before a run: defaults that decide, slips."""
 
 from dsa_des.record.attempts import attempt
 from dsa_des.running.simulation import Simulation

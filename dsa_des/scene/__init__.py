@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Block", "Scene", "check_scene", "load_scene", "load_tables", "open_scene"]
 
-# Looked up on first use: whoever imports one file of the package does not pay for the others.
+# Looked up on first use: importing one file of the package does not pay for the others.
 _HOMES = {
     "Block": "dsa_des.scene.block",
     "Scene": "dsa_des.scene.scene",

@@ -22,7 +22,7 @@ class Origin:
     Parameters
     ----------
     file : SceneFile
-        Its tables as they were read; nobody changes them.
+        Its tables as they were read; they are never changed.
     changes : tuple of (key, value)
         In their order; the key ``swap.BLOCK`` puts a type into a block.
     """

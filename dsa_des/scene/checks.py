@@ -1,7 +1,7 @@
 """Checks of a scene that need both its wiring and the parameters of its blocks.
 
 Values of the wrong kind, clocks that 64-bit ticks cannot hold, blocks that would never run, and
-wires that would hold a message where nobody looks for it.
+wires that would hold a message where no block looks for it.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,23 +1,13 @@
-"""Scenes and studies that packages ship, found by name: ``first_light``.
+"""Scenes and studies that packages ship, found by name: ``first_light``."""
 
-A package registers a function under the entry-point group `GROUP`. It takes nothing and returns
-the folder of its scenes and studies.
-"""
-
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Literal
 
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
-from dsa_des.block.strangers import Left, strangers_code
-from dsa_des.errors import SceneError, UsageError
+from dsa_des.errors import SceneError
 from dsa_des.scene.scene_file import read_scene_file
-
-#: The entry points of functions that return a folder of scenes and studies.
-GROUP = "dsa_des.examples"
+from dsa_des.scene.shipped_files import files_named, shipped_files
 
 
 @dataclass(frozen=True)
@@ -52,7 +42,7 @@ def examples() -> list[Example]:
     """
     found = [
         (place, path, *read)
-        for place, path in _files()
+        for place, path in shipped_files()
         if (read := _kind_and_title(path)) is not None
     ]
     stems = [(place.name, kind) for place, _, kind, _ in found]
@@ -85,45 +75,11 @@ def find_example(name: str, kind: Literal["scene", "study"] | None = None) -> Pa
     UsageError
         If a package that registered a folder cannot be imported.
     """
-    wanted = PurePosixPath(name.removesuffix(".toml"))
-    if not wanted.name or wanted.is_absolute() or ".." in wanted.parts:
-        return None
-    whole = [path for place, path in _files() if place == wanted]
-    if whole:
-        return whole[0]
-    if len(wanted.parts) > 1:
-        return None
-    same_stem = [path for place, path in _files() if place.name == wanted.name]
-    if len(same_stem) > 1:
-        kinds = {path: read[0] for path in same_stem if (read := _kind_and_title(path))}
-        same_stem = [path for path, one in kinds.items() if kind in (None, one)]
-    return same_stem[0] if len(same_stem) == 1 else None
-
-
-def folders() -> list[Path]:
-    """Return the folders of examples of all installed packages.
-
-    Raises
-    ------
-    UsageError
-        If one of them cannot be asked.
-    """
-    found = []
-    for point in registered(GROUP).values():
-        try:
-            with strangers_code(UsageError):
-                found.append(Path(installed(point)()))
-        except Left as error:
-            message = f"{GROUP}: {point.name} gives no folder: {error}"
-            raise UsageError(message) from error.__cause__
-    return [folder for folder in found if folder.is_dir()]
-
-
-def _files() -> Iterator[tuple[PurePosixPath, Path]]:
-    """Yield every TOML file of the folders with its place there, without ``.toml``."""
-    for folder in folders():
-        for path in sorted(folder.rglob("*.toml")):
-            yield PurePosixPath(path.relative_to(folder).with_suffix("").as_posix()), path
+    found = files_named(name)
+    if len(found) > 1:
+        kinds = {path: read[0] for path in found if (read := _kind_and_title(path))}
+        found = [path for path, one in kinds.items() if kind in (None, one)]
+    return found[0] if len(found) == 1 else None
 
 
 @cache

@@ -155,16 +155,60 @@ def windowed_blocks(
 
 
 def window_order(
-    graph: nx.DiGraph, windowed: set[str], cut: Collection[tuple[str, str]] = ()
+    graph: nx.DiGraph,
+    windowed: set[str],
+    cut: Collection[tuple[str, str]] = (),
+    queues: Mapping[str, Collection[str]] | None = None,
 ) -> dict[str, int]:
     """Return the depth of windowed blocks over all their edges, delayed ones included.
 
     A window is handled block by block, so a sender must be done with it before its receiver
-    starts, whatever the delay between them; over the edges in `cut` it need not be.
+    starts, whatever the delay between them; over the edges in `cut` it need not be. A queue (name
+    to the blocks that line up in it) comes after all of its blocks and before their receivers; its
+    depth stands under `queue_key`.
     """
     part = nx.DiGraph(graph.subgraph(windowed))
     part.remove_edges_from(cut)
+    part = with_queues(part, queues or {})
     depth: dict[str, int] = {}
     for name in nx.topological_sort(part):
         depth[name] = max((depth[before] + 1 for before in part.predecessors(name)), default=0)
     return depth
+
+
+def queue_key(name: str) -> str:
+    """Return what stands for a shared processor among blocks, whose names hold no colon."""
+    return f"processor: {name}"
+
+
+def with_queues(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
+    """Return the graph in which what blocks send goes through the queue that they line up in."""
+    wired = nx.DiGraph()
+    wired.add_nodes_from(graph)
+    wired.add_nodes_from(queue_key(name) for name in queues)
+    queue_of = {block: queue_key(name) for name, blocks in queues.items() for block in blocks}
+    for source, target in graph.edges:
+        wired.add_edge(queue_of.get(source, source), target)
+    wired.add_edges_from((block, queue) for block, queue in queue_of.items() if block in graph)
+    return wired
+
+
+def windowed_queues(
+    graph: nx.DiGraph,
+    classes: Mapping[str, type[Component]],
+    queues: Mapping[str, Collection[str]],
+) -> set[str]:
+    """Return the queues that can be worked through a window at a time.
+
+    Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
+    the queue, through whichever blocks or other queues.
+    """
+    able = set(queues)
+    while True:
+        looped = in_cycles(with_queues(graph, {name: queues[name] for name in able}))
+        others = {block for name in set(queues) - able for block in queues[name]}
+        windowed = windowed_blocks(graph, classes, others)
+        left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
+        if left == able:
+            return able
+        able = left

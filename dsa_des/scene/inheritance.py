@@ -1,4 +1,4 @@
-"""How the keys of a file lie over those of the files it extends.
+"""Merging the keys of a file over those of the files it extends.
 
 Table by table, own keys win. What more there is to it: keys that ``remove`` takes away, items of a
 list that are changed by their ``name``, and parameters that came from a block of another type.

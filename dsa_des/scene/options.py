@@ -1,4 +1,4 @@
-"""What the engine itself understands in a block's table, whatever its type.
+"""The keys of a block's table that the engine itself understands, whatever the block's type.
 
 ``latency_s`` is the time a block takes to work on what it saw; ``processor`` names a table of
 ``[processors]`` for which it queues with others.

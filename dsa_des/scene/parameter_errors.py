@@ -1,4 +1,4 @@
-"""What pydantic found wrong with a table, said in a scene's own words."""
+"""The errors that pydantic found in a table, in a scene's own words."""
 
 import re
 import typing

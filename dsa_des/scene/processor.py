@@ -1,4 +1,4 @@
-"""What a scene says of a shared processor."""
+"""The table of a shared processor in a scene."""
 
 from fractions import Fraction
 from typing import Literal

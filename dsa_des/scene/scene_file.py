@@ -3,7 +3,8 @@
 A table may say ``extends = "other.toml"`` (or a list of files): the keys of those files come
 first and its own keys override them, table by table; a list whose items have a ``name`` is also
 changed item by item, by a table of these names. ``remove = ["calibrate"]`` takes inherited keys
-away. Paths are taken from the folder of the file that holds them.
+away. Paths are taken from the folder of the file that holds them; where no file lies there, what
+is extended may be a shipped one by its name (``extends = "first_light"``).
 """
 
 import os
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.class_text import sourced
-from dsa_des.errors import Problem, SceneError
+from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
     InputFileError,
@@ -25,6 +26,7 @@ from dsa_des.files.input_files import (
 )
 from dsa_des.files.toml_input import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
+from dsa_des.scene.shipped_files import files_named
 from dsa_des.scene.steps import Key, dotted
 from dsa_des.text.safe_text import shortened
 
@@ -159,7 +161,7 @@ class _Reader:
         return {}
 
     def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
-        return self._table(tables, path, (), (path,))
+        return self.inheritance.finished(self._table(tables, path, (), (path,)), ())
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values
@@ -184,7 +186,7 @@ class _Reader:
                 continue
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
-            self.inheritance.merge(merged, self.file(path.parent / base, at, chain), at)
+            self.inheritance.merge(merged, self.file(self._extended(path, base), at, chain), at)
             self.sources[at] = base_source
         own = {
             key: self._value(value, path, (*at, key), chain)
@@ -194,6 +196,17 @@ class _Reader:
         if REMOVE in own:
             own[REMOVE] = self.inheritance.removals(own[REMOVE], str(path))
         return self.inheritance.merge(merged, own, at)
+
+    def _extended(self, path: Path, base: str) -> Path:
+        """Return the file that one extends: beside it, or else the shipped one of that name."""
+        beside = path.parent / base
+        if "\0" in base or os.path.lexists(beside):
+            return beside
+        try:
+            shipped = files_named(base)
+        except UsageError as error:
+            raise SceneError([Problem(str(path), "extends", str(error))]) from None
+        return shipped[0] if len(shipped) == 1 else beside
 
     def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
         self._count(path)

@@ -12,12 +12,12 @@ A wire names blocks, and ports where a block has several that fit::
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.time.clock import parse_rational
@@ -77,6 +77,27 @@ class Wire:
 
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
+
+    def written(self) -> dict[str, Any] | str:
+        """Return the wire as an entry of ``wires``."""
+        plain = Wire(self.source, self.output, self.target, self.input)
+        if plain == replace(self, latency_s=plain.latency_s, queued=plain.queued):
+            return str(self)
+        table: dict[str, Any] = {
+            "from": f"{self.source}.{self.output}",
+            "to": f"{self.target}.{self.input}",
+        }
+        if self.delay_scans:
+            table["delay"] = f"{self.delay_scans} scan{'s' if self.delay_scans > 1 else ''}"
+        elif self.delay_s:
+            table["delay_s"] = as_written(self.delay_s)
+        if self.jitter_s:
+            table["jitter_s"] = as_written(self.jitter_s)
+        if self.drop_probability:
+            table["drop_probability"] = self.drop_probability
+        if self.holds is not None:
+            table["holds"] = self.holds
+        return table
 
 
 def read_wires(

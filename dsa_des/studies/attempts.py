@@ -1,8 +1,8 @@
-"""Which runs are tried again after the process that was at them died.
+"""Runs that are tried again after the process that was at them died.
 
 A chunk whose process dies is run once more; then it is cut in halves until the guilty run is
 alone. A single run is tried again when nothing else is under way, so that neither the memory of
-others nor somebody's kill of all workers is its fault. Only then it has crashed.
+others nor a kill of all workers is its fault. Only then it has crashed.
 """
 
 from collections import deque

@@ -159,7 +159,7 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
     for item in patterns:
         try:
             path = Path(item).expanduser()
-        except RuntimeError as error:  # the ~ of nobody
+        except RuntimeError as error:  # the ~ of an unknown user
             raise ValueError(f"files: {item!r}: {error}") from None
         folder = getattr(item, "folder", Path.cwd())
         base = path if path.is_absolute() else folder / path

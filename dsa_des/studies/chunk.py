@@ -1,6 +1,6 @@
 """Running one chunk of a study: from cells and replicas to the bytes of one Parquet file.
 
-It is a pure function of the study and the chunk; whoever runs it, where and when, the bytes are
+It is a pure function of the study and the chunk; whichever worker runs it, and when, the bytes are
 the same.
 """
 
@@ -12,12 +12,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import AnyArray
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
 from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, wanted_by
+from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, Result, wanted_by
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Chunk, Study, set_text
 
@@ -46,30 +46,34 @@ def schema_of(study: Study) -> pa.Schema:
     return columns_of(
         [(axis.column, axis.numeric) for axis in study.axes],
         [(draw_column(draw.key), draw.numeric) for draw in study.draws],
-        [(result.name, result.kind) for metric in metrics for result in metric.results()],
+        [result for metric in metrics for result in metric.results()],
     )
 
 
 def columns_of(
     axes: Sequence[tuple[str, bool]],
     draws: Sequence[tuple[str, bool]],
-    results: Sequence[tuple[str, str]],
+    results: Sequence[Result],
 ) -> pa.Schema:
     """Return the columns of a part.
 
     Parameters
     ----------
     axes, draws : sequence of (column, whether it holds numbers)
-    results : sequence of (name, kind)
+    results : sequence of Result
     """
     fields = [("cell", pa.int64()), ("replica", pa.int64()), ("seed", pa.int64())]
     fields += [
         (name, pa.float64() if numeric else pa.string()) for name, numeric in [*axes, *draws]
     ]
-    for name, kind in results:
-        fields.append((name, pa.float64()))
-        if kind == SHARE:
-            fields.append((name + TRIALS, pa.float64()))
+    cut_off: set[str] = set()
+    for result in results:
+        fields.append((result.name, pa.float64()))
+        if result.kind == SHARE:
+            fields.append((result.name + TRIALS, pa.float64()))
+        if result.cut_off is not None and result.cut_off not in cut_off:
+            cut_off.add(result.cut_off)
+            fields.append((result.cut_off, pa.string()))
     fields += [("status", pa.string()), ("error", pa.string()), ("command", pa.string())]
     return pa.schema(fields)
 
@@ -114,7 +118,7 @@ def joined(name: str, parts: Sequence[Done]) -> Done:
 
 
 def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
-    replicas = [study.replica(number) for number in numbers]
+    replicas = [study.replica(number, cell) for number in numbers]
     rows: dict[str, list[Any]] = {
         "cell": [cell] * len(numbers),
         "replica": list(numbers),
@@ -136,7 +140,7 @@ def _table(
     schema: pa.Schema,
     cell: int,
     rows: dict[str, list[Any]],
-    values: Mapping[str, FloatArray],
+    values: Mapping[str, AnyArray],
 ) -> pa.Table:
     count = len(rows["cell"])
     if "status" not in rows:
@@ -150,9 +154,13 @@ def _table(
         if field.name in rows:
             arrays.append(pa.array(rows[field.name], type=field.type))
         else:
-            column = values.get(field.name, np.full(count, np.nan))
+            column = values.get(field.name, _nothing(count, text=field.type == pa.string()))
             arrays.append(pa.array(column, type=field.type, from_pandas=True))
     return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _nothing(count: int, *, text: bool) -> AnyArray:
+    return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
 def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) -> pa.Table:
@@ -164,16 +172,16 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
     except (SceneError, ValueError) as error:
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
-    replicas = [study.replica(number) for number in numbers]
+    replicas = [study.replica(number, cell) for number in numbers]
     outcomes = _outcomes(scene, replicas, wanted_by(metrics))
     good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
     for k, outcome in enumerate(outcomes):
         if isinstance(outcome, Failed):
             rows["error"][k] = outcome.error
-    values: dict[str, FloatArray] = {}
+    values: dict[str, AnyArray] = {}
     found, errors = _measured(scene, metrics, [(replicas[k], outcomes[k]) for k in good])
     for name, column in found.items():
-        values[name] = np.full(len(numbers), np.nan)
+        values[name] = _nothing(len(numbers), text=column.dtype == object)
         values[name][good] = column
     for k, text in errors.items():
         rows["error"][good[k]] = text
@@ -194,14 +202,14 @@ def _outcomes(
 
 def _measured(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
-) -> tuple[dict[str, FloatArray], dict[int, str]]:
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Return result → values over the runs, and the error of every run that gave none."""
     if not runs:
         return {}, {}
     group = Group(
         scene, [replica for replica, _ in runs], [run for _, run in runs], wanted_by(metrics)
     )
-    found: dict[str, FloatArray] = {}
+    found: dict[str, AnyArray] = {}
     for metric in metrics:
         try:
             found.update(metric.measure(group))
@@ -216,14 +224,15 @@ def _measured(
 
 def _one_by_one(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
-) -> tuple[dict[str, FloatArray], dict[int, str]]:
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
-    found: dict[str, FloatArray] = {}
+    found: dict[str, AnyArray] = {}
     errors: dict[int, str] = {}
     for k, run in enumerate(runs):
         values, wrong = _measured(scene, metrics, [run])
         if wrong:
             errors[k] = wrong[0]
         for name, column in values.items():
-            found.setdefault(name, np.full(len(runs), np.nan))[k] = column[0]
+            nothing = _nothing(len(runs), text=column.dtype == object)
+            found.setdefault(name, nothing)[k] = column[0]
     return found, errors

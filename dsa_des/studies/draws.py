@@ -1,8 +1,8 @@
 """Random draws of a study: each value is a function of (seed, key, replica) and of nothing else.
 
 The same replica has the same draws in every cell of a study, so cells compare on common random
-numbers. Times (``_s``) are rounded to nanoseconds and rates (``_hz``) to millihertz: clocks stay
-exact.
+numbers; members of a sample (`dsa_des.studies.sample`) have a seed each. Times (``_s``) are rounded
+to nanoseconds and rates (``_hz``) to millihertz: clocks stay exact.
 """
 
 import math
@@ -53,7 +53,7 @@ class Draw:
         Parameters
         ----------
         seed : int
-            The study's.
+            The study's, or that of a member of its sample.
         replica : int
         batch : int
             How many consecutive replicas a Latin hypercube covers together.
@@ -89,7 +89,7 @@ def as_text(value: Any) -> str:
 
 
 def replica_seed(seed: int, replica: int) -> int:
-    """Return the seed of one replica's run: the same in every cell."""
+    """Return the seed of one replica's run, the same in every cell of one seed."""
     return key_of(seed, "study replica", replica) >> 1
 
 

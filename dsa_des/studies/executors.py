@@ -1,4 +1,4 @@
-"""Who runs the chunks of a study: this process, a pool of processes, or a Dask cluster.
+"""Executors of a study's chunks: this process, a pool of processes, or a Dask cluster.
 
 An executor gives results as they come, in any order, and survives workers that die. What a chunk
 gives does not depend on who ran it, so neither do the results.

@@ -12,6 +12,8 @@ FIGURES = {
     "axis": ("metric", "axis", "lines"),
     "heat": ("metric", "x", "y"),
     "polar": ("metric", "axis"),
+    "histogram": ("metric", "axis"),
+    "cdf": ("metric", "axis"),
     "run": ("cell", "replica"),
 }
 _AXES = ("axis", "lines", "x", "y")

@@ -1,16 +1,19 @@
 """Figures of a study: a result against an axis with intervals, heat maps, polar plots."""
 
-from collections.abc import Sequence
+import math
+import textwrap
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.studies.labels import axis_label, readable, unit_of, value_label
 from dsa_des.studies.summary import Compared, Line
 
 #: Okabe and Ito's colours and markers, told apart with any kind of colour vision.
-_STYLES = (
+STYLES = (
     ("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "D"), ("#E69F00", "^"), ("#CC79A7", "v"),
     ("#56B4E9", "P"), ("#000000", "X"),
 )  # fmt: skip
@@ -23,23 +26,6 @@ _MOST_NAMES = 60
 Target = Path | BinaryIO
 
 
-def readable(name: str) -> str:
-    """Return ``declaration range (radar), m`` for ``declaration_range_m.radar``."""
-    words, _, who = name.partition(".")
-    unit = unit_of(words)
-    words, who = (
-        words.removesuffix(f"_{unit}").replace("_", " "),
-        figure_text(who.replace("_", " ")),
-    )
-    return f"{words}{f' ({who})' if who else ''}{f', {unit}' if unit else ''}"
-
-
-def unit_of(name: str) -> str:
-    """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
-    ending = name.partition(".")[0].rpartition("_")[2]
-    return ending if ending in ("s", "m", "deg", "rad", "hz", "km") else ""
-
-
 class Places:
     """Lines of a summary by axis value.
 
@@ -48,11 +34,21 @@ class Places:
     axes : sequence of str
         Columns of the axes, in the order of `Line.at`.
     lines : sequence of Line
+    categories : collection of str
+        Axes of numbers that are names: there is nothing between two of them.
     """
 
-    def __init__(self, axes: Sequence[str], lines: Sequence[Line]) -> None:
+    def __init__(
+        self, axes: Sequence[str], lines: Sequence[Line], categories: Collection[str] = ()
+    ) -> None:
         self.axes = list(axes)
         self.lines = lines
+        self.categories = categories
+
+    def style(self, metric: str, number: int, of: int) -> tuple[str, str]:
+        """Return colour and marker of a series: a lone one has those of the block it is of."""
+        marks = [line.result.mark for line in self.of(metric)[:1] if line.result.mark is not None]
+        return marks[0] if of == 1 and marks else STYLES[number % len(STYLES)]
 
     def of(self, metric: str) -> list[Line]:
         """Return the lines of one result."""
@@ -66,14 +62,9 @@ class Places:
             others.sort(key=lambda k: self.axes[k] != by)
         found: dict[str, list[Line]] = {}
         for line in self.of(metric):
-            named = ", ".join(_label(self.axes[k], line.at[k], len(others)) for k in others)
+            named = ", ".join(value_label(self.axes[k], line.at[k]) for k in others)
             found.setdefault(named, []).append(line)
         return found
-
-
-def _label(axis: str, value: Any, many: int) -> str:
-    text = f"{value:g}" if isinstance(value, float) else figure_text(value)
-    return text if many == 1 and not isinstance(value, float) else f"{figure_text(axis)} = {text}"
 
 
 def draw_axis(
@@ -90,13 +81,14 @@ def draw_axis(
     shown = [item for item in compared if item.result.name == metric]
     place = places.axes.index(axis)
     values = list(dict.fromkeys(line.at[place] for line in places.of(metric)))
-    where, numeric = _positions(values)
-    with drawing(7.5, 6.4 if shown else 4.2, path) as figure:
+    where, numeric = _positions(values, axis in places.categories)
+    many = len(places.series(metric, axis, by)) > 4
+    with drawing(9.6 if many else 7.5, 6.4 if shown else 4.2, path) as figure:
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
         series = list(places.series(metric, axis, by).items())
         for number, (who, lines) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _STYLES[number % len(_STYLES)]
+            colour, marker = places.style(metric, number, len(series))
             shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
             x = np.array([where[line.at[place]] for line in lines]) + shift
             known = any(not np.isnan(line.estimate.half_width) for line in lines)
@@ -105,7 +97,8 @@ def draw_axis(
             expected = [line.expected for line in lines]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
-                note = f"analytic{', ' + who if who else ''}"
+                # One entry for all: each is dotted in the colour of its series.
+                note = "analytic" if number == 0 else None
                 top.plot(
                     x,
                     y,
@@ -118,18 +111,21 @@ def draw_axis(
                 )
         top.set_ylabel(readable(metric))
         top.set_title(figure_text(title, _TITLE), loc="left")
-        top.legend()
+        if len(series) > 1 or top.get_legend_handles_labels()[1][1:]:
+            beside_or_inside(top)
+        else:
+            top.legend()
         if shown:
-            _differences(grid[1], shown, where, places.axes, axis, confidence)
+            _differences(grid[1], shown, where, places, axis, confidence)
         bottom = grid[-1]
-        bottom.set_xlabel(figure_text(axis))
+        bottom.set_xlabel(axis_label(axis))
         _ticks(bottom, values, where, numeric)
         tight(figure)
 
 
-def _positions(values: list[Any]) -> tuple[dict[Any, float], bool]:
+def _positions(values: list[Any], category: bool) -> tuple[dict[Any, float], bool]:
     numeric = all(isinstance(v, int | float) for v in values)
-    if numeric:
+    if numeric and not category:
         return {v: float(v) for v in values}, True
     return {v: float(k) for k, v in enumerate(values)}, False
 
@@ -137,15 +133,40 @@ def _positions(values: list[Any]) -> tuple[dict[Any, float], bool]:
 def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
     if not numeric:
         shown = values[:: -(-len(values) // _MOST_NAMES)]
-        axes.set_xticks([where[v] for v in shown], [str(v) for v in shown])
+        names = [f"{v:g}" if isinstance(v, float) else figure_text(v) for v in shown]
+        axes.set_xticks([where[v] for v in shown], names)
+        if sum(map(len, names)) > 60:
+            axes.tick_params(axis="x", labelrotation=30)
+            for label in axes.get_xticklabels():
+                label.set_ha("right")
         axes.set_xlim(-0.5, len(values) - 0.5)
         return
     positive = [v for v in values if v > 0]
     if len(positive) == len(values) > 2 and max(values) / min(values) >= 8:
         axes.set_xscale("log")
-        if len(values) <= 12:
-            axes.set_xticks(values, [f"{v:g}" for v in values])
-            axes.set_xticks([], minor=True)
+        ticks = _apart(values)
+        axes.set_xticks(ticks, [f"{v:g}" for v in ticks])
+        axes.set_xticks([], minor=True)
+
+
+def _apart(values: list[float]) -> list[float]:
+    """Return those values whose labels do not touch on a log axis, the first and the last first."""
+    low, high = math.log(min(values)), math.log(max(values))
+    kept: list[float] = []
+    for value in [min(values), max(values), *values]:
+        at = (math.log(value) - low) / (high - low)
+        if all(abs(at - (math.log(other) - low) / (high - low)) >= 0.055 for other in kept):
+            kept.append(value)
+    return sorted(kept)
+
+
+def beside_or_inside(axes: Any) -> None:
+    """Put the legend inside where it is short, and beside the axes where it would cover them."""
+    names = axes.get_legend_handles_labels()[1]
+    if len(names) > 4:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    else:
+        axes.legend()
 
 
 def _points(
@@ -165,7 +186,7 @@ def _differences(
     axes: Any,
     shown: Sequence[Compared],
     where: dict[Any, float],
-    names: list[str],
+    places: Places,
     axis: str,
     confidence: float,
 ) -> None:
@@ -175,13 +196,13 @@ def _differences(
     groups: dict[tuple[Any, ...], list[Compared]] = {}
     for item in shown:
         groups.setdefault(item.at, []).append(item)
-    others = [name for name in names if name != axis]
+    others = [name for name in places.axes if name != axis]
     for number, (at, items) in enumerate(list(groups.items())[:_MOST_LINES]):
-        colour, marker = _STYLES[number % len(_STYLES)]
+        colour, marker = places.style(shown[0].result.name, number, len(groups))
         x = np.array([where[item.value] for item in items])
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
-        who = ", ".join(_label(n, v, len(others)) for n, v in zip(others, at, strict=True))
+        who = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
         axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
                       ls="none", label=who or None)  # fmt: skip
         if len(groups) == 1:
@@ -191,9 +212,9 @@ def _differences(
                 text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(f"{_signed(e.value)}{width}", (px, e.value), **text_at)
     unit = unit_of(shown[0].result.name)
-    axes.set_ylabel(f"difference from that at {text}{f', {unit}' if unit else ''}")
+    axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
     axes.set_title(
-        f"paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
+        f"Paired differences on the same units, {100 * confidence:g} % intervals", loc="left"
     )
     axes.margins(x=0.12, y=0.2)
 
@@ -235,9 +256,9 @@ def draw_heat(path: Target, places: Places, metric: str, x: str, y: str, title: 
                 if not np.isnan(value):
                     ink = "white" if value < middle else "black"
                     axes.text(c, r, _digits(value), ha="center", va="center", color=ink, size=8)
-        axes.set_xlabel(figure_text(x))
-        axes.set_ylabel(figure_text(y))
-        axes.set_title(figure_text(title, _TITLE), loc="left")
+        axes.set_xlabel(axis_label(x))
+        axes.set_ylabel(axis_label(y))
+        axes.set_title(textwrap.fill(figure_text(title, _TITLE), 44), loc="left")
         figure.colorbar(image, label=readable(metric))
         tight(figure)
 
@@ -255,7 +276,7 @@ def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str)
         axes.set_theta_direction(-1)
         series = list(places.series(metric, axis, None).items())
         for number, (who, lines) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _STYLES[number % len(_STYLES)]
+            colour, marker = places.style(metric, number, len(series))
             lines = sorted(lines, key=lambda line: line.at[place])
             angle = np.radians([line.at[place] for line in lines])
             low, value, high = (
@@ -268,10 +289,10 @@ def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str)
             axes.plot(angle[ring], value[ring], color=colour, marker=marker, ms=4, label=who)
             axes.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         axes.set_ylim(bottom=0.0)
-        over = f"{readable(metric)} over {figure_text(axis)}"
+        over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
         axes.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
-            axes.legend(loc="lower left", bbox_to_anchor=(-0.12, -0.12))
+            axes.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
         tight(figure)
 
 

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
+from dsa_des.files.output_file import write_file
+from dsa_des.files.unfinished import PREFIX
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.record import StudyHead, StudyRecord
-from dsa_des.studies.safe_files import open_lock, read_regular, write_whole
+from dsa_des.studies.safe_files import open_lock, read_regular
 from dsa_des.studies.seal import is_sealed, sealed
 from dsa_des.studies.study import Study
 
@@ -128,7 +130,8 @@ class StudyFolder:
 
     def _clear(self) -> None:
         """Remove what processes left that were killed while they wrote."""
-        ours = re.compile(r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+")
+        earlier = r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+"
+        ours = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{12}}|{earlier}")
         for folder in (self.parts, self.path):
             for left in folder.iterdir():
                 if ours.fullmatch(left.name):
@@ -209,7 +212,8 @@ class StudyFolder:
         OSError
             If it cannot be written; nothing is left behind then.
         """
-        write_whole(self.parts / f"{name}.parquet", sealed(content, self._owner(name)))
+        path = self.parts / f"{name}.parquet"
+        write_file(path, sealed(content, self._owner(name)), to_disk=True)
 
     def remove_part(self, name: str) -> None:
         """Remove a part that no longer belongs to the study."""
@@ -255,7 +259,7 @@ class StudyFolder:
 
     def write_file(self, name: str, content: bytes) -> None:
         """Write a file beside the parts as a whole."""
-        write_whole(self.path / name, content)
+        write_file(self.path / name, content, to_disk=True)
 
     def write_table(self, name: str, content: bytes) -> None:
         """Write a table beside the parts, sealed as one of this study."""

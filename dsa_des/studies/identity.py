@@ -1,4 +1,4 @@
-"""What fixes every result of a study, as one digest, and the ``study.json`` that holds it."""
+"""The digest of all that fixes a study's results, and the ``study.json`` that holds it."""
 
 import hashlib
 import json
@@ -9,6 +9,7 @@ from typing import Any
 from dsa_des.errors import UsageError
 from dsa_des.record.version import __version__
 from dsa_des.studies.record import StudyRecord, record_text
+from dsa_des.studies.sample import file_digest
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_tables import json_safe
 
@@ -28,9 +29,11 @@ def description_text(study: Study) -> str:
         "stop_when": None if study.stop_when is None else vars(study.stop_when),
         "version": __version__,
     }
+    if study.over:  # each member of a sample has seeds and draws of its own
+        identity["over"] = sorted(study.over)
     files = _files_in([study.base.data, study.sets, [axis.sets for axis in study.axes]])
     try:
-        identity["files"] = {str(path): _sha256(path) for path in sorted(files)}
+        identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
     text = json.dumps(json_safe(identity), sort_keys=True)
@@ -64,8 +67,3 @@ def _files_in(value: Any) -> set[Path]:
         return {path.resolve()} if path.is_absolute() and path.is_file() else set()
     except (OSError, ValueError):  # a text that can be no path
         return set()
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,4 +1,4 @@
-"""What a study measures: metrics, found by the entry-point group ``dsa_des.metrics``.
+"""Metrics, which a study measures, found by the entry-point group ``dsa_des.metrics``.
 
 A metric reads the recorded tables of a *group* of replicas at once: every table has one more
 column, ``replica``, with the number of the replica each row belongs to. It is written over arrays,
@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
@@ -34,6 +34,23 @@ TRIALS = ".trials"
 
 
 @dataclass(frozen=True)
+class Told:
+    """How a change of a result is told: ``radar``, ``sees a target earlier``, ``... later``.
+
+    Parameters
+    ----------
+    who : str
+    less, more : str
+        What it does where the result is smaller, or larger; of an event, where it no longer
+        happens, or now does.
+    """
+
+    who: str
+    less: str
+    more: str
+
+
+@dataclass(frozen=True)
 class Result:
     """One column of a study's results.
 
@@ -45,11 +62,24 @@ class Result:
         A number may be NaN (no value in this run); an event is 0 or 1; a share has a second
         column ``NAME.trials``, and is NaN without trials.
     meaning : str
+    cut_off : str, optional
+        Name of a further column, a text: where the run's start or end cut this value off (``at the
+        start``, ``never``), nothing where it did not. Results may share one.
+    told : Told, optional
+        How comparisons tell a change of it.
+    block : str, optional
+        The block it is of, if that is not what stands behind the dot of its name.
+    mark : (colour, marker), optional
+        How figures mark that block; a study fills it in.
     """
 
     name: str
     kind: str
     meaning: str
+    cut_off: str | None = None
+    told: Told | None = None
+    block: str | None = None
+    mark: tuple[str, str] | None = None
 
 
 class Group:
@@ -158,8 +188,11 @@ class Metric:
         """Return the columns this metric gives."""
         raise NotImplementedError
 
-    def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return result name → values, shape (replicas,); NaN where a run has no value."""
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return result name → values, shape (replicas,); NaN where a run has no value.
+
+        Columns that `Result.cut_off` names hold texts, or None.
+        """
         raise NotImplementedError
 
     def check(self, blocks: Mapping[str, Component]) -> None:

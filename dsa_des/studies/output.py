@@ -1,4 +1,4 @@
-"""What a study leaves beside its parts: ``summary.parquet``, ``differences.parquet``, figures."""
+"""Results beside a study's parts: ``summary.parquet``, ``differences.parquet``, figures."""
 
 import hashlib
 import io
@@ -6,16 +6,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
+from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
+from dsa_des.studies.labels import value_label
 from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
+from dsa_des.text.safe_text import shortened
 
 #: Replicas whose random draws an analytic answer is averaged over.
 _EXPECTED_OVER = 64
@@ -75,7 +81,7 @@ class Tables:
     def _expected(self, study: Study) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers at every place, averaged over draws and encounters."""
         sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
-        replicas = [study.replica(k) for k in range(min(study.replicas, _EXPECTED_OVER))]
+        many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
         for cell in range(len(study.cells)):
             labels = study.labels(cell)
             at = tuple(
@@ -86,8 +92,8 @@ class Tables:
             try:
                 scene = study.scene(cell)
                 metrics = [spec.build(scene) for spec in study.metrics]
-                for replica in replicas if study.draws else replicas[:1]:
-                    own = scene_of(scene, replica)
+                for number in range(many):
+                    own = scene_of(scene, study.replica(number, cell))
                     for metric in metrics:
                         for name, value in metric.expected(own).items():
                             sums.setdefault((name, at), []).append(value)
@@ -122,6 +128,8 @@ class Tables:
             "count": [line.estimate.count for line in self.lines],
             "missing": [line.missing for line in self.lines],
             "few": [line.estimate.few for line in self.lines],
+            "cut_off": [sum(many for _, many in line.cut_off) for line in self.lines],
+            "cut_off_where": [cut_off_text(line) for line in self.lines],
             "expected": [line.expected for line in self.lines],
         }
         return columns
@@ -172,7 +180,10 @@ class Tables:
         return self.folder.path / name
 
     def _draw_one(self, target: BinaryIO, figure: FigureRecord) -> bool:
-        places = Places(self.rows.axes, self.lines)
+        if figure.kind in ("histogram", "cdf"):
+            return self._draw_spread(target, figure)
+        categories = {axis.column for axis in self.record.axes if axis.category}
+        places = Places(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
         if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False
@@ -192,6 +203,26 @@ class Tables:
             compared = self.compared if own else []
             by = figure.lines
             draw_axis(target, places, metric, axis, by, compared, title, self.record.confidence)
+        return True
+
+    def _draw_spread(self, target: BinaryIO, figure: FigureRecord) -> bool:
+        """Draw how a result is spread over the runs, one series per value of an axis."""
+        metric = str(figure.metric)
+        if figure.axis is not None and figure.axis not in self.rows.axes:
+            return False
+        axis = figure.axis or next(iter(self.rows.axes), None)
+        found: dict[Any, list[FloatArray]] = {}
+        for at, rows in self.rows.each_place():
+            value = None if axis is None else at[self.rows.axes.index(axis)]
+            found.setdefault(value, []).append(self.rows.column(metric)[rows].astype(float))
+        series = [
+            ("" if axis is None else value_label(axis, value), np.concatenate(values))
+            for value, values in found.items()
+        ]
+        (mark,) = (result.mark for result in self.results if result.name == metric)
+        draw = draw_histogram if figure.kind == "histogram" else draw_cdf
+        title = _shortened(self.record.title if figure.title is None else figure.title)
+        draw(target, series, metric, title, mark)
         return True
 
     def telling(self, only: Sequence[str] = ()) -> list[str]:
@@ -229,12 +260,19 @@ class Tables:
             return []
         if cell >= len(self.study.cells) or replica >= self.study.replicas:
             return []
-        scene = scene_of(self.study.scene(cell), self.study.replica(replica))
+        scene = scene_of(self.study.scene(cell), self.study.replica(replica, cell))
         target = self.folder.path / f"run-cell-{cell}-replica-{replica}"
         if target.is_symlink():
             raise UsageError(f"{target}: is a link; the figures of a run are in a folder")
         record_run(scene, target)
         return sorted(target.glob("*.png"))
+
+
+def cut_off_text(line: Line) -> str:
+    """Return ``12 of 200 at the start, 3 never``; nothing where the run cut nothing off."""
+    texts = [f"{many:,} {shortened(where)}" for where, many in line.cut_off]
+    texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
+    return ", ".join(texts)
 
 
 def _shortened(title: str) -> str:

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dsa_des.studies.output import Tables
+from dsa_des.studies.output import Tables, cut_off_text
+from dsa_des.studies.statistics import Estimate
+from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
 
 #: Lines of a table that are printed.
@@ -20,29 +22,35 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     only : sequence of str
         Results to show; by default those that the study draws or waits for, or else all.
     """
-    from rich.table import Table
-
     study = tables.record
     lines = tables.shown_lines(only)
     level = f"{100 * study.confidence:g} %"
     unit = "encounters" if study.over else "replicas"
-    table = Table(title=shortened(study.title), title_justify="left", box=None, pad_edge=False)
     expected = any(line.expected is not None for line in lines)
-    heads = [*tables.rows.axes, "result", "mean or share", f"{level} interval", unit, "without"]
-    for heading in [*heads, *(["analytic"] if expected else [])]:
-        table.add_column(heading)
+    heads = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
+    heads += ["without"]
+    rows = []
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
+        cut_off = cut_off_text(line)
         row = [*map(short, line.at), line.result.name, short(e.value)]
-        row += [f"{short(e.low)} to {short(e.high)}" + (" *" if e.few else "")]
-        row += [str(e.count), str(line.missing or "")]
+        row += [f"({cut_off})" if cut_off else "", interval_text(e), str(e.count)]
+        row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
         if expected:
             row.append("" if line.expected is None else short(line.expected))
-        table.add_row(*row)
-    console.print(table)
+        rows.append(row)
+    heads += ["analytic"] if expected else []
+    notes = {result.name: result.meaning for result in tables.results}
+    group = len(tables.rows.axes)
+    print_table(console, shortened(study.title), heads, rows, group=group, notes=notes)
+    if study.over:
+        console.print(
+            "intervals are over encounters like these, of which each counts once, whatever its "
+            "replicas"
+        )
     if tables.compared:
         console.print()
-        console.print(_difference_table(tables, {line.result.name for line in lines}))
+        _show_differences(console, tables, {line.result.name for line in lines})
     longest = max(len(lines), len(tables.compared))
     if longest > _MOST_SHOWN:
         console.print(f"... and {longest - _MOST_SHOWN:,} more lines in summary.parquet")
@@ -51,6 +59,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         console.print(
             f"* warning: too few values to rely on the interval in {len(few)} of {len(lines)} "
             f"lines; give more {unit}"
+        )
+    if any(line.cut_off for line in lines):
+        console.print(
+            "(N of RUNS at the start): so many values are only where the run began or ended; "
+            "without that they would lie beyond it"
         )
     _note_unreached(console, tables)
     if len(lines) < len(tables.lines):
@@ -80,28 +93,31 @@ def _note_unreached(console: Any, tables: Tables) -> None:
         )
 
 
-def _difference_table(tables: Tables, names: set[str]) -> Any:
-    from rich.table import Table
-
+def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
     assert tables.baseline is not None
     axis, baseline = tables.baseline
-    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     others = [name for name in tables.rows.axes if name != axis]
-    for heading in (axis, *others, "result", "difference", "paired interval", "pairs",
-                    "only one has it", "unpaired interval", "narrower"):  # fmt: skip
-        table.add_column(heading)
+    heads = [axis, *others, "result", "difference", "paired interval", "pairs",
+             "only one has it", "unpaired interval", "narrower"]  # fmt: skip
+    rows = []
     shown = [item for item in tables.compared if item.result.name in names]
     for item in shown[:_MOST_SHOWN]:
         d = item.difference
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
-        table.add_row(
-            short(item.value), *map(short, item.at), item.result.name, short(d.paired.value),
-            f"{short(d.paired.low)} to {short(d.paired.high)}" + (" *" if d.paired.few else ""),
-            str(d.paired.count), only, f"{short(d.unpaired.low)} to {short(d.unpaired.high)}",
-            times(d.narrower),
+        rows.append(
+            [short(item.value), *map(short, item.at), item.result.name, short(d.paired.value),
+             interval_text(d.paired), str(d.paired.count), only,
+             interval_text(d.unpaired).rstrip(" *"), times(d.narrower)]
         )  # fmt: skip
-    return table
+    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
+    print_table(console, title, heads, rows, group=1 + len(others))
+
+
+def interval_text(estimate: Estimate) -> str:
+    """Return an interval for a table; nothing without one, an asterisk where values are few."""
+    if estimate.low != estimate.low:
+        return ""
+    return f"{short(estimate.low)} to {short(estimate.high)}" + (" *" if estimate.few else "")
 
 
 #: Intervals that shrink more than this rest on the rounding of equal numbers.

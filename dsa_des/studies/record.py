@@ -1,4 +1,4 @@
-"""What a study's folder says of itself: enough to read its tables, without the scene or any block.
+"""The record of a study in its folder: enough to read its tables without scene or blocks.
 
 It is written when the study is begun and checked when it is read, since a folder may come from a
 stranger. Nothing that it names is opened or imported.
@@ -6,12 +6,16 @@ stranger. Nothing that it names is opened or imported.
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import astuple, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from dsa_des.block.mark import Mark, marks_of
 from dsa_des.record.version import __version__
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.axes import Axis
+from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result, Told
 from dsa_des.studies.study import Study, run_command, set_text
 from dsa_des.studies.study_tables import json_safe
 
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _Whole = Annotated[int, Field(ge=0, lt=2**63)]
+_Marker = Literal["o", "s", "D", "d", "^", "v", "<", ">", "P", "X", "p", "h", "8", "*"]
 _Label = str | int | float
 
 
@@ -33,6 +38,8 @@ class AxisRecord(_Strict):
     values: list[_Label]
     over: bool
     numeric: bool
+    #: Whether its numbers are names: nothing lies between two of them.
+    category: bool = False
     sets: list[list[tuple[str, str]]]
     swaps: list[list[tuple[str, str]]]
 
@@ -51,6 +58,10 @@ class ResultRecord(_Strict):
     name: str
     kind: Literal["number", "event", "share"]
     meaning: str
+    cut_off: str | None = None
+    told: tuple[str, str, str] | None = None
+    block: str | None = None
+    mark: tuple[Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")], _Marker] | None = None
 
 
 class StopRecord(_Strict):
@@ -63,7 +74,7 @@ class StopRecord(_Strict):
 class FigureRecord(_Strict):
     """A figure; see `read_figures`."""
 
-    kind: Literal["axis", "heat", "polar", "run"]
+    kind: Literal["axis", "heat", "polar", "histogram", "cdf", "run"]
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
@@ -135,7 +146,7 @@ class StudyRecord(StudyHead):
         return columns_of(
             [(axis.column, axis.numeric) for axis in self.axes],
             [(draw.column, draw.numeric) for draw in self.draws],
-            [(result.name, result.kind) for result in self.results],
+            self.results_list(),
         )
 
     @property
@@ -146,7 +157,13 @@ class StudyRecord(StudyHead):
     def results_list(self) -> list[Result]:
         """Return what the metrics gave."""
         kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
-        return [Result(r.name, kinds[r.kind], r.meaning) for r in self.results]
+        return [
+            Result(
+                r.name, kinds[r.kind], r.meaning, r.cut_off,
+                None if r.told is None else Told(*r.told), r.block, r.mark,
+            )
+            for r in self.results
+        ]  # fmt: skip
 
     def command(self, row: Mapping[str, Any]) -> str:
         """Return the command that repeats a run.
@@ -172,7 +189,36 @@ class StudyRecord(StudyHead):
 def results_of(study: Study) -> list[Result]:
     """Return the results that a study's metrics give."""
     scene = study.scene(0)
-    return [result for spec in study.metrics for result in spec.build(scene).results()]
+    found = [result for spec in study.metrics for result in spec.build(scene).results()]
+    marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
+    return [_marked(result, scene, marks) for result in found]
+
+
+def _marked(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
+    """Return a result with the mark of its block, if that block's class has one."""
+    name = result.block or result.name.partition(".")[2]
+    if name not in scene.blocks or getattr(scene.blocks[name].cls, "mark", None) is None:
+        return result
+    return replace(result, mark=(marks[name].colour, marks[name].marker))
+
+
+def is_category(axis: Axis, scene: Scene) -> bool:
+    """Return whether an axis sets what is one of a few names: a type, a flag, a model's number."""
+    for key, _ in axis.sets[0] if axis.sets else ():
+        parts = key.split(".")
+        if len(parts) != 3 or parts[0] != "blocks" or parts[1] not in scene.blocks:
+            return False
+        known = scene.blocks[parts[1]].cls.Parameters.model_fields.get(parts[2])
+        if known is None or not _of_names(known.annotation):
+            return False
+    return bool(axis.swaps and axis.swaps[0]) or bool(axis.sets and axis.sets[0])
+
+
+def _of_names(annotation: Any) -> bool:
+    if get_origin(annotation) is Literal or annotation is bool:
+        return True
+    parts = [part for part in get_args(annotation) if part is not type(None)]
+    return bool(parts) and all(_of_names(part) for part in parts)
 
 
 def record_text(study: Study, digest: str) -> str:
@@ -200,6 +246,7 @@ def record_text(study: Study, digest: str) -> str:
                 "values": axis.labels,
                 "over": axis.column in study.over,
                 "numeric": axis.numeric,
+                "category": is_category(axis, study.scene(0)),
                 "sets": [[(key, set_text(value)) for key, value in one] for one in axis.sets],
                 "swaps": axis.swaps,
             }
@@ -209,7 +256,10 @@ def record_text(study: Study, digest: str) -> str:
             {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.numeric}
             for draw in study.draws
         ],
-        "results": [vars(result) for result in results_of(study)],
+        "results": [
+            vars(result) | {"told": None if result.told is None else astuple(result.told)}
+            for result in results_of(study)
+        ],
         "sets": [(key, set_text(value)) for key, value in study.sets],
         "swaps": study.swaps,
         "compare": study.baseline,

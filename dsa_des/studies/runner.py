@@ -35,10 +35,10 @@ class Stopped(Exception):
 
 def why_one_by_one(study: Study) -> str | None:
     """Return why replicas of the first or the last cell cannot run in lock step, if so."""
-    replicas = [study.replica(number) for number in range(min(2, study.replicas))]
-    if len(replicas) < 2:
+    if study.replicas < 2:
         return None
     for cell in sorted({0, len(study.cells) - 1}):
+        replicas = [study.replica(number, cell) for number in range(2)]
         try:
             reason = why_apart(study.scene(cell), replicas)
         except SceneError:  # its rows say so

@@ -1,50 +1,15 @@
-"""Files of a folder that somebody else may have filled: no link is followed, no pipe is waited for.
+"""Reading files of a folder that others may have filled: no link is followed, no pipe waited for.
 
-A folder of results can come from a stranger. Its names may be links to files elsewhere, so writing
-never opens a name that is there: a new file is made beside it and takes its name.
+A folder of results can come from a stranger, and its names may be links to files elsewhere.
 """
 
 import os
 import stat
-from contextlib import suppress
 from pathlib import Path
 
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 _BINARY = getattr(os, "O_BINARY", 0)
-#: How many names of temporary files are tried.
-_MOST_NAMES = 100
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name and rename it; a link of that name is replaced.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; nothing is left behind then.
-    """
-    temporary, number = _new_beside(path)
-    try:
-        with os.fdopen(number, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
-
-
-def _new_beside(path: Path) -> tuple[Path, int]:
-    """Make a new file beside `path`; return its name and its descriptor."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
-    for number in range(_MOST_NAMES):
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.{number}")
-        with suppress(FileExistsError):
-            return temporary, os.open(temporary, flags, 0o666)
-    raise FileExistsError(17, f"has {_MOST_NAMES} temporary files beside it", str(path))
 
 
 def read_regular(path: Path, most: int | None = None) -> bytes:

@@ -10,6 +10,9 @@ from dsa_des.arrays.types import FloatArray
 
 #: Below this many values (effective trials, for a share) an interval says little.
 FEW = 10
+#: Below this many units with a trial that went otherwise than most, an interval of a share of
+#: trials that hang together says little.
+FEW_UNLIKE = 5
 _RESAMPLES = 2000
 
 
@@ -55,7 +58,7 @@ def wilson(successes: float, trials: float, confidence: float) -> tuple[float, f
     """
     if trials <= 0:
         return math.nan, math.nan
-    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
+    z = _z(confidence)
     share = successes / trials
     middle = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials)
     spread = share * (1.0 - share) / trials + z * z / (4.0 * trials * trials)
@@ -65,12 +68,21 @@ def wilson(successes: float, trials: float, confidence: float) -> tuple[float, f
     return low, high
 
 
+def _z(confidence: float) -> float:
+    """Return the two-sided quantile of the normal distribution."""
+    return NormalDist().inv_cdf(0.5 + confidence / 2.0)
+
+
 def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estimate:
     """Return a share over independent units, each with trials that may hang together.
 
     The interval is Wilson's with the effective number of trials: units that differ more from each
     other than chance allows count for less (Rao and Scott, "A simple method for the analysis of
-    clustered binary data", Biometrics 48, 1992).
+    clustered binary data", Biometrics 48, 1992). How much they differ is itself known from so many
+    units only, for which the number is reduced once more (Korn and Graubard, "Confidence intervals
+    for proportions with small expected number of positive counts", Survey Methodology 24, 1998).
+    Where all trials went alike nothing tells how they hang together, and each unit counts once; of
+    one unit with several trials there is no interval.
 
     Parameters
     ----------
@@ -83,13 +95,27 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
         return Estimate(math.nan, math.nan, math.nan, 0, True)
     value = math.fsum(successes) / total
     effective, units = total, len(trials)
+    clustered = float(trials.max()) > 1.0
+    if clustered and units == 1:
+        return Estimate(value, math.nan, math.nan, 1, True)
     plain = value * (1.0 - value) / total
-    if units > 1 and plain > 0.0:
+    if plain > 0.0 and units > 1:
         residuals = successes - value * trials
         spread = units / (units - 1) * math.fsum(residuals**2) / total**2
+        if clustered:
+            spread *= (t_quantile(units - 1, confidence) / _z(confidence)) ** 2
         effective = total / max(1.0, spread / plain)
+    elif clustered:
+        effective = float(units)
     low, high = wilson(value * effective, effective, confidence)
-    return Estimate(value, low, high, units, effective < FEW)
+    few = effective < FEW or (clustered and _rests_on_few(successes, trials))
+    return Estimate(value, low, high, units, few)
+
+
+def _rests_on_few(successes: FloatArray, trials: FloatArray) -> bool:
+    """Return whether few units say how trials hang together: few in all, or few unlike the rest."""
+    unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
+    return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
 
 def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
@@ -100,7 +126,9 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     values : (n,)
     confidence : float
     method : {"t", "bootstrap"}
-        Student's t, or percentiles of the means of 2000 resamples (always the same ones).
+        Student's t, or the studentised bootstrap over 2000 resamples (always the same ones),
+        which leans to the side of the longer tail (Efron and Tibshirani, "An introduction to the
+        bootstrap", 1993, chapter 12.5).
     """
     values = values[~np.isnan(values)]
     count = len(values)
@@ -109,11 +137,11 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     value = math.fsum(values) / count
     if count == 1:
         return Estimate(value, math.nan, math.nan, 1, True)
+    error = standard_error(values)
+    below = above = t_quantile(count - 1, confidence)
     if method == "bootstrap":
-        low, high = _bootstrap(values, confidence)
-    else:
-        half = t_quantile(count - 1, confidence) * standard_error(values)
-        low, high = value - half, value + half
+        below, above = _bootstrap(values, confidence) or (below, above)
+    low, high = value - below * error, value + above * error
     return Estimate(value, low, high, count, count < FEW)
 
 
@@ -131,21 +159,31 @@ def t_quantile(degrees: float, confidence: float) -> float:
     return float(stdtrit(degrees, 0.5 + confidence / 2.0))
 
 
-def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float]:
+def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float] | None:
+    """Return how many standard errors an interval reaches below and above the mean.
+
+    None where most resamples hold one value only, so that they tell nothing.
+    """
     generator = np.random.Generator(np.random.Philox(len(values)))
-    means = np.empty(_RESAMPLES)
+    middle, root = values.mean(), math.sqrt(len(values))
+    pivots = []
     step = max(1, 1_000_000 // len(values))  # memory stays flat in the number of values
     for start in range(0, _RESAMPLES, step):
         some = min(step, _RESAMPLES - start)
-        chosen = generator.integers(0, len(values), (some, len(values)))
-        means[start : start + some] = values[chosen].mean(axis=1)
+        drawn = values[generator.integers(0, len(values), (some, len(values)))]
+        errors = drawn.std(axis=1, ddof=1) / root
+        good = np.ptp(drawn, axis=1) > 0.0
+        pivots.append((drawn[good].mean(axis=1) - middle) / errors[good])
+    known = np.concatenate(pivots)
+    if len(known) < _RESAMPLES // 2:
+        return None
     tail = (1.0 - confidence) / 2.0
-    low, high = np.quantile(means, [tail, 1.0 - tail])
-    return float(low), float(high)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return float(high), -float(low)
 
 
 @dataclass(frozen=True)
-class Difference:
+class EstimatedDifference:
     """How two conditions differ on the same units.
 
     Parameters
@@ -172,24 +210,58 @@ class Difference:
 
 
 def difference(
-    first: FloatArray, second: FloatArray, confidence: float, method: str = "t"
-) -> Difference:
+    first: FloatArray,
+    second: FloatArray,
+    confidence: float,
+    method: str = "t",
+    *,
+    kind: str = "number",
+) -> EstimatedDifference:
     """Return second minus first on common units.
 
     Parameters
     ----------
     first, second : (units,)
         NaN where a unit has no value.
+    confidence : float
+    method : {"t", "bootstrap"}
+    kind : {"number", "event", "share"}
+        Events, and shares of which each unit has all or nothing, are counted: their paired interval
+        is that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
+        proportions based on paired data", Journal of Educational and Behavioral Statistics 37
+        (2012). It is no point where no unit differs.
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
-    paired = mean(second[both] - first[both], confidence, method)
-    return Difference(
+    changes = second[both] - first[both]
+    whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
+    counted = len(changes) > 1 and (kind == "event" or whole)
+    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
+    return EstimatedDifference(
         paired,
         _welch(first[both], second[both], confidence),
         int((here & ~there).sum()),
         int((there & ~here).sum()),
     )
+
+
+def _counted(changes: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
+
+    Units of several runs differ by parts of an event: there the two lie the smallest part that is
+    seen to either side of the mean.
+    """
+    count = len(changes)
+    value = math.fsum(changes) / count
+    sizes = np.abs(changes)
+    step = float(sizes[sizes > 1e-9].min(initial=1.0))
+    about = 0.0 if step == 1.0 else value
+    more = np.append(changes, [about - step, about + step])
+    middle = math.fsum(more) / len(more)
+    error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
+    half = t_quantile(count - 1, confidence) * error
+    low, high = max(-1.0, middle - half), min(1.0, middle + half)
+    return Estimate(value, low, high, count, count < FEW)
 
 
 def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:

@@ -23,6 +23,7 @@ from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
+from dsa_des.studies.sample import member_seed
 from dsa_des.studies.study_tables import existing_file
 
 
@@ -74,7 +75,7 @@ class Chunk:
         return sum(end - start for _, start, end in self.runs)
 
 
-class Cells(Sequence[tuple[int, ...]]):
+class StudyCells(Sequence[tuple[int, ...]]):
     """The cells of a study, each made when it is asked for; the last axis runs fastest.
 
     Parameters
@@ -131,7 +132,8 @@ class Study:
     swaps : tuple of (block, type)
         Made in every cell.
     over : tuple of str
-        Columns of axes that are a sample (of encounters): statistics are taken over them.
+        Columns of axes that are a sample (of encounters): statistics are taken over them, and each
+        member has seeds and draws of its own.
     baseline : (column, label) or None
         With which value of which axis the others are compared.
     stop_when : StopWhen or None
@@ -166,9 +168,9 @@ class Study:
     tables: dict[str, Any]
 
     @property
-    def cells(self) -> Cells:
+    def cells(self) -> StudyCells:
         """Index of each axis's value, cell by cell; the last axis runs fastest."""
-        return Cells(len(axis.labels) for axis in self.axes)
+        return StudyCells(len(axis.labels) for axis in self.axes)
 
     @property
     def batch(self) -> int:
@@ -198,17 +200,29 @@ class Study:
         """
         return changed_scene(self.base, *self.changes(cell), str(self.path))
 
-    def replica(self, number: int) -> Replica:
-        """Return the seed and the drawn values of a replica; they are the same in all cells."""
+    def member_seed(self, cell: int) -> int:
+        """Return the seed of a cell's encounter; without a sample the study's."""
+        if not self.over:
+            return self.seed
+        places = zip(self.axes, self.cells[cell], strict=True)
+        return member_seed(self.seed, ((a, i) for a, i in places if a.column in self.over))
+
+    def replica(self, number: int, cell: int = 0) -> Replica:
+        """Return the seed and the drawn values of a replica.
+
+        They are the same in all cells, or in all cells of the same encounter where the study runs
+        over a sample (`over`).
+        """
+        seed = self.member_seed(cell)
         return Replica(
-            replica_seed(self.seed, number),
-            {draw.key: draw.value(self.seed, number, self.batch) for draw in self.draws},
+            replica_seed(seed, number),
+            {draw.key: draw.value(seed, number, self.batch) for draw in self.draws},
         )
 
     def command(self, cell: int, number: int) -> str:
         """Return the command that runs one replica of a cell again."""
         swaps, sets = self.changes(cell)
-        replica = self.replica(number)
+        replica = self.replica(number, cell)
         changes = [(key, set_text(value)) for key, value in [*sets, *replica.changes.items()]]
         return run_command(str(self.scene_path), replica.seed, swaps, changes)
 

@@ -1,6 +1,6 @@
 """Checks of a study that need its scenes: every value of every axis, its draws and its metrics."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +11,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.metric import TRIALS, Metric, Result
+from dsa_des.studies.metric import EVENT, TRIALS, Metric, Result
 from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -66,7 +66,7 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
             whole = False
             break
     if whole:
-        _check_names(study, [name for name in results if not name.endswith(TRIALS)], add)
+        _check_names(study, results, add)
     if not problems:
         problems += _check_set_up(study, scenes, file)
     return problems
@@ -109,8 +109,9 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
     return [file.problem(("metrics", k), text, names[k]) for k, text in wrong.items()]
 
 
-def _check_names(study: Study, names: list[str], add: Callable[..., None]) -> None:
-    """Report names of results that no metric gives."""
+def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
+    """Report names of results that no metric gives, and figures of results they cannot show."""
+    names = [name for name in results if not name.endswith(TRIALS)]
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
@@ -118,6 +119,11 @@ def _check_names(study: Study, names: list[str], add: Callable[..., None]) -> No
         if figure["kind"] != "run" and figure["metric"] not in names:
             message = "no metric of the study gives it"
             message += did_you_mean(str(figure["metric"]), names)
+            add(("figures", number, "metric"), message, str(figure["metric"]))
+        elif figure["kind"] in ("histogram", "cdf") and results[figure["metric"]].kind == EVENT:
+            numbers = [name for name in names if results[name].kind != EVENT]
+            message = f"is an event, 0 or 1: a {figure['kind']} shows how numbers are spread"
+            message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""
             add(("figures", number, "metric"), message, str(figure["metric"]))
 
 
@@ -162,7 +168,9 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     if draw.kind == "choice":
         return list(draw.values)
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
-    drawn = [draw.value(study.seed, number, study.batch) for number in range(count)]
+    cells = range(len(study.cells) if study.over else 1)
+    seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
+    drawn = [draw.value(seed, number, study.batch) for seed in seeds for number in range(count)]
     return list(dict.fromkeys([min(drawn), max(drawn)]))
 
 

@@ -54,7 +54,7 @@ def read_study(
     SceneError
         With every problem found.
     """
-    reader = _Reader(read_scene_file(path))
+    reader = _StudyReader(read_scene_file(path))
     for assignment in sets:
         reader.problems += apply_set(reader.file, assignment)
     return reader.study(swaps)
@@ -70,7 +70,7 @@ def study_of_scene(
         "replicas": replicas,
         "metrics": list(metrics),
     }
-    return _Reader(SceneFile(scene, data)).study(swaps)
+    return _StudyReader(SceneFile(scene, data)).study(swaps)
 
 
 def study_of_tables(
@@ -99,7 +99,7 @@ def study_of_tables(
     return _GivenReader(tables, base, swaps, sets).study(())
 
 
-class _Reader:
+class _StudyReader:
     def __init__(self, file: SceneFile) -> None:
         self.file = file
         self.data = file.data
@@ -206,7 +206,7 @@ class _Reader:
             return None, None
         try:
             path = Path(str(name)).expanduser()
-        except RuntimeError as error:  # the ~ of nobody
+        except RuntimeError as error:  # the ~ of an unknown user
             self.add(("scene",), str(error), name)
             return None, None
         if not path.is_absolute():
@@ -339,7 +339,7 @@ class _Reader:
         return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
 
 
-class _GivenReader(_Reader):
+class _GivenReader(_StudyReader):
     """Reads a study whose scene, and what is changed in it, are not in its tables."""
 
     def __init__(

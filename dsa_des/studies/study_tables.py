@@ -43,7 +43,7 @@ def _absolute(value: Any, key: str = "") -> Any:
 def existing_file(text: str, folder: Path) -> Path | None:
     """Return the file that a text names, seen from a folder; None if it names none.
 
-    Any text may be asked about: one too long for a name, with a NUL, or with the ``~`` of nobody.
+    Any text may be asked about: too long for a name, with a NUL, or with an unknown user's ``~``.
     """
     try:
         path = folder / Path(text).expanduser()

@@ -4,6 +4,7 @@ Where a study runs over a sample of encounters (`over`), the encounters are the 
 and a cell of the summary joins all of them; otherwise the replicas are.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.studies.chunk import CRASHED
 from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
-from dsa_des.studies.statistics import Difference, Estimate, difference, mean, share
+from dsa_des.studies.statistics import Estimate, EstimatedDifference, difference, mean, share
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -28,6 +29,9 @@ class Line:
     estimate: Estimate
     missing: int
     expected: float | None
+    #: Runs of this place, and (where, how many) of those whose value the run cut off.
+    runs: int = 0
+    cut_off: tuple[tuple[str, int], ...] = ()
 
 
 class Rows:
@@ -112,6 +116,13 @@ class Rows:
         tried = np.bincount(place, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
+    def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
+        """Return where the run cut a result off in some rows, and in how many, sorted."""
+        if result.cut_off is None:
+            return ()
+        said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]
+        return tuple(sorted(Counter(said).items()))
+
 
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
@@ -135,7 +146,9 @@ def summarise(
     for at, chosen in rows.each_place():
         for result in results:
             estimate, missing = rows.estimate(result, chosen, confidence, method)
-            lines.append(Line(at, result, estimate, missing, expected.get((result.name, at))))
+            known = expected.get((result.name, at))
+            cut_off = rows.cut_off(result, chosen)
+            lines.append(Line(at, result, estimate, missing, known, len(chosen), cut_off))
     return lines
 
 
@@ -147,7 +160,7 @@ class Compared:
     value: Any
     baseline: Any
     result: Result
-    difference: Difference
+    difference: EstimatedDifference
 
 
 def compare_axis(
@@ -167,7 +180,7 @@ def compare_axis(
         for result in results:
             first, second = paired(rows, result.name, by_place[base], chosen)[1:]
             others = (*at[:place], *at[place + 1 :])
-            change = difference(first, second, confidence, method)
+            change = difference(first, second, confidence, method, kind=result.kind)
             found.append(Compared(others, at[place], baseline, result, change))
     return found
 
@@ -176,7 +189,39 @@ def paired(
     rows: Rows, name: str, first: IntArray, second: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the units that both sets of rows have, and the values of each in both."""
-    one, of_one = rows.by_unit(name, first)
-    two, of_two = rows.by_unit(name, second)
-    units, here, there = np.intersect1d(one, two, return_indices=True)
-    return units, of_one[here], of_two[there]
+    values, replica = rows.column(name), rows.column("replica")
+    runs = rows.units * (int(replica.max(initial=0)) + 1) + replica
+    _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
+    one, two = first[here], second[there]
+    return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
+
+
+def paired_units(
+    units: IntArray, first: FloatArray, second: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return units, and each one's mean value in two conditions, over runs that have both.
+
+    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
+    with a value on one side only would compare other draws.
+
+    Parameters
+    ----------
+    units : (runs,)
+    first, second : (runs,)
+        NaN where a run has no value.
+    """
+    found, place = np.unique(units, return_inverse=True)
+
+    def means(values: FloatArray, used: AnyArray) -> FloatArray:
+        many = np.bincount(place[used], minlength=len(found))
+        total = np.bincount(place[used], weights=values[used], minlength=len(found))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(many > 0, total / many, np.nan)
+
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = means(first, here & there), means(second, here & there)
+    without = np.isnan(one)
+    alone = np.where(without, means(first, here), np.nan)
+    one = np.where(without, alone, one)
+    two = np.where(without & np.isnan(alone), means(second, there), two)
+    return found, one, two

@@ -1,1 +1,1 @@
-"""What is between a command and the person at the terminal: what is shown, and ctrl-C."""
+"""The layer between a command and the person at the terminal: printing, and ctrl-C."""

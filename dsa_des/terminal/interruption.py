@@ -1,4 +1,4 @@
-"""What ctrl-C and SIGTERM do to a command: it clears up, says so in one line, and ends.
+"""Ctrl-C and SIGTERM in a command: it clears up, says so in one line, and ends.
 
 The exit code is 128 and the number of the signal, as a shell has it: 130 for ctrl-C, 143 for
 SIGTERM.
@@ -26,7 +26,7 @@ def plain_ending() -> Iterator[None]:
     """End the program by one line and the exit code of the signal when one arrives.
 
     What a signal interrupts may raise anything (an import that is broken off, a thread pool that
-    is closed), so after a signal every exception is its consequence. Handlers that somebody else
+    is closed), so after a signal every exception is its consequence. Handlers that other code
     has installed, and signals that are ignored, stay as they are.
 
     Raises
@@ -59,7 +59,7 @@ def plain_ending() -> Iterator[None]:
 
 
 def _say(what: str) -> None:
-    with suppress(OSError, ValueError):  # nobody can read it any more
+    with suppress(OSError, ValueError):  # its reader is gone
         from dsa_des.terminal.terminal import say
 
         if sys.stderr.isatty():  # it has just shown ^C

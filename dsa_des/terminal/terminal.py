@@ -4,6 +4,7 @@ No other file prints, echoes, makes a console or writes to the standard streams;
 that. Rich is imported only when it is asked for.
 """
 
+import os
 import sys
 from typing import Any
 
@@ -48,14 +49,16 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     Parameters
     ----------
     width : int, optional
-        Letters in a line where the stream is no terminal; that of a terminal is its own.
+        Letters in a line where the stream is no terminal and ``COLUMNS`` is not set; a terminal
+        has its own.
     err : bool
         On standard error.
     """
     from dsa_des.terminal.safe_console import SafeConsole
 
     found = SafeConsole(stderr=err)
-    return found if width is None or found.is_terminal else SafeConsole(stderr=err, width=width)
+    known = width is None or found.is_terminal or os.environ.get("COLUMNS", "").isdecimal()
+    return found if known else SafeConsole(stderr=err, width=width)
 
 
 def progress(text: str) -> Any:

@@ -112,6 +112,8 @@ class ScanClock:
     ticks_per_s : int
     jitter_draw : callable, optional
         Standard normal draws keyed by the scan numbers given to it.
+    always_draws : bool
+        Draw also where the jitter is 0.
     """
 
     def __init__(
@@ -119,6 +121,8 @@ class ScanClock:
         spec: ClockSpec,
         ticks_per_s: int,
         jitter_draw: Callable[[IntArray], np.ndarray] | None = None,
+        *,
+        always_draws: bool = False,
     ) -> None:
         self.spec = spec
         self.ticks_per_s = ticks_per_s
@@ -133,7 +137,7 @@ class ScanClock:
         self.period = period
         self._whole, rest = divmod(period.numerator, period.denominator)
         self._rest, self._denominator = rest, period.denominator
-        self._jitter_draw = jitter_draw if spec.jitter_s > 0 else None
+        self._jitter_draw = jitter_draw if spec.jitter_s > 0 or always_draws else None
         self._jitter_ticks = spec.jitter_s * ticks_per_s
         self._jitter_limit = 0.45 * float(period)
         self._last: tuple[int, int, Any] = (0, -1, None)

@@ -3,7 +3,7 @@
 The key is (seed, block, purpose, target, scan, draw number), hashed into the key and counter of
 Philox4x32-10 (Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11).
 Leaving out a scan, adding a target, swapping another block or changing the window therefore moves
-nobody else's draws.
+no other block's draws.
 """
 
 from collections.abc import Callable

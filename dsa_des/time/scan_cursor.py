@@ -1,4 +1,4 @@
-"""Which scans of a clock fall due when a host program calls, and which it has missed."""
+"""The scans of a clock that fall due when a host program calls, and those it has missed."""
 
 from dsa_des.time.clock import ScanClock
 

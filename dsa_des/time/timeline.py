@@ -18,22 +18,30 @@ _SCAN_BITS = 40
 
 @dataclass(frozen=True)
 class ReplicaTime:
-    """How replicas lie on their common timeline.
+    """How replicas lie on their common timeline; one run by itself is one replica.
 
     Parameters
     ----------
     replicas : int
-    end_tick : int
-        Length of each run.
+    run_ticks : int
+        Length of each run: it covers [0, run_ticks) of its own ticks.
+    span_ticks : int
+        Ticks from one replica's start to the next; 0 for a run by itself.
     """
 
     replicas: int
-    end_tick: int
+    run_ticks: int
+    span_ticks: int = 0
+
+    @classmethod
+    def end_to_end(cls, replicas: int, run_ticks: int) -> "ReplicaTime":
+        """Return replicas so far apart that nothing of one run reaches the other's."""
+        return cls(replicas, run_ticks, 1 << (2 * run_ticks).bit_length())
 
     @property
-    def span_ticks(self) -> int:
-        """Ticks from one replica's start to the next: nothing of one run reaches the other's."""
-        return 1 << (2 * self.end_tick).bit_length()
+    def end_tick(self) -> int:
+        """First tick of the timeline that is no longer simulated."""
+        return (self.replicas - 1) * self.span_ticks + self.run_ticks
 
     @property
     def fits(self) -> bool:

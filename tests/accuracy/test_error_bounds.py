@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
+from components.geometry import ellipsoid, geodesic
 from components.geometry.attitude import unit_vector
 from components.geometry.enu import enu_to_geodetic
 from components.geometry.error_bounds import (
@@ -18,11 +18,12 @@ from components.geometry.error_bounds import (
     azimuth_error_rad,
     error_bound,
 )
+from components.geometry.line_of_sight import LineOfSight
 from components.geometry.sensor_angles import sensor_angles
 
 MODELS = {
-    "flat_earth": flat_earth.line_of_sight,
-    "local_radii": local_radii.line_of_sight,
+    "flat_earth": LineOfSight("flat_earth").in_ned,
+    "local_radii": LineOfSight("local_radii").in_ned,
     "geodesic": partial(geodesic.line_of_sight, backend="pyproj"),
 }
 LOW, HIGH, DEEP = (0.0, 500.0), (9000.0, 12000.0), (-400.0, 3000.0)

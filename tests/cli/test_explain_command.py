@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from dsa_des.block.entry_points import registered
+from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.commands.explain import measured_shares
 from dsa_des.scene.scene import load_scene
@@ -35,8 +37,56 @@ def test_measuring_shows_a_share_for_every_effect_that_calculates() -> None:
 def test_a_sentence_is_one_line_for_who_reads_a_pipe() -> None:
     lines = call("explain", SCENE).stdout.splitlines()
     assert any("rain: not simulated, [weather] rain_rate_mm_h is 0" in line for line in lines)
-    assert all(line.split()[0] in {"block", "eo", "ir", "radar", "transform", "traffic"}
-               for line in lines)  # fmt: skip
+    table = lines[: lines.index("")]
+    assert all(line.split()[0] in {"block", "eo", "ir", "radar", "transform", "traffic", "every"}
+               for line in table)  # fmt: skip
+
+
+def rows_told(*arguments: object) -> set[str]:
+    return {" ".join(line.split()) for line in call("explain", *arguments).stdout.splitlines()}
+
+
+def test_effects_of_time_are_effects_like_others() -> None:
+    changes = ["blocks.radar.latency_s=0.25", "blocks.eo.jitter_s=0.01"]
+    sets = sets_of([*changes, "blocks.ir.rate_error_ppm=9"])
+    assert {
+        "radar latency: simulated, latency_s is 0.25",
+        "every other block latency: not simulated, latency_s is 0",
+        "eo clock jitter: simulated, jitter_s is 0.01",
+        "ir clock drift: simulated, rate_error_ppm is 9",
+        "every wire loss: not simulated, drop_probability is 0",
+        "every wire wire jitter: not simulated, jitter_s is 0",
+        "every block shared processor: not simulated, processor is not given",
+    } <= rows_told(SCENE, *sets)
+    assert {
+        "every wire loss: simulated, though drop_probability is 0: everything is simulated",
+        "every block shared processor: not simulated, processor is not given",
+    } <= rows_told(SCENE, *sets, "--simulate-everything")
+
+
+def sets_of(sets: list[str]) -> list[str]:
+    return [word for change in sets for word in ("--set", change)]
+
+
+def test_what_everything_leaves_out_is_listed_with_its_reason() -> None:
+    said = call("explain", SCENE).stdout
+    outside = said[said.index("not covered by its proof") :]
+    for name in ("background and sun", "mounting", "navigation", "false alarms", "beam sweep",
+                 "shared processor"):  # fmt: skip
+        assert f"{name}: " in outside
+    assert "rain" not in outside
+    seen = call("explain", SCENE, "--set", "blocks.radar.beam_sweep=true").stdout
+    assert "beam sweep: it fills" not in seen
+
+
+def test_every_effect_that_is_not_neutral_says_why() -> None:
+    silent = [
+        effect.name
+        for type_name in registered()
+        for effect in find(type_name).effects
+        if not effect.neutral and not effect.outside_the_proof
+    ]
+    assert silent == []
 
 
 @pytest.mark.parametrize(

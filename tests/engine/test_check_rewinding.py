@@ -157,7 +157,7 @@ def test_blocks_that_keep_their_promise_record_the_same(lab, monkeypatch, wires)
     path = loop(lab, monkeypatch, End, wires)
     _, plain = recorded(path, window=4)
     simulation, twice = recorded(path, window=4, check_rewinding=True)
-    assert simulation.witness.windows > 1
+    assert simulation.windows.witness.windows > 1
     for name in ("tick", "value", "seen"):
         assert plain[name].tobytes() == twice[name].tobytes()
 

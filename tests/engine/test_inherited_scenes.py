@@ -6,6 +6,7 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.scene.scene import load_scene
+from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.study_file import read_study
 
 BASE = """
@@ -211,3 +212,23 @@ def test_studies_address_items_by_name(write, tmp_path):
         file.write('draws."blocks.traffic.intruders[0].east_m" = {uniform = [0, 5]}\n')
     with pytest.raises(SceneError, match="is set by the axis"):
         read_study(study)
+
+
+def test_a_shipped_scene_is_extended_by_its_name_unless_a_file_has_it(write, tmp_path):
+    scene = load_scene(write("duration_s = 3", base="first_light"))
+    assert scene.duration_s == 3
+    assert {"radar", "traffic", "fusion"} <= scene.blocks.keys()
+    (tmp_path / "first_light").write_text(BASE)
+    mine = load_scene(write("duration_s = 3", base="first_light"))
+    assert [i.name for i in mine.blocks["traffic"].parameters.intruders] == ["head_on", "N12.3 [b]"]
+
+
+def test_a_part_of_a_scene_is_extended_by_its_place_among_the_shipped_ones(write):
+    text = '[blocks.radar]\nextends = "{}"\nscan_rate_hz = 5\n'
+    part = read_scene_file(write(text.format("sensors/afrl_eo"))).data["blocks"]["radar"]
+    assert part["type"].startswith("optical.") or "azimuth_pixels" in part
+    assert part["scan_rate_hz"] == 5
+    with pytest.raises(SceneError, match=r"there is no file .*no_such_part"):
+        load_scene(write(text.format("sensors/no_such_part")))
+    with pytest.raises(SceneError, match="there is no file"):
+        load_scene(write(text.format("../first_light")))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from components.aircraft.rcs_table import AspectTable, dbsm_to_m2
+from components.aircraft.rcs_table import RcsTable, dbsm_to_m2
 from components.geometry.field_of_view import inside
 from components.radar.detection import (
     detection_probability,
@@ -196,7 +196,7 @@ def test_field_of_view(source, field, seen, unseen):
         assert not inside(azimuth * DEG, 0.0, **limits), azimuth
 
 
-TABLE = AspectTable.from_rows([350, 10, 350, 10], [0, 0, 90, 90], [0.0, 10.0, 20.0, 20.0])
+TABLE = RcsTable.from_rows([350, 10, 350, 10], [0, 0, 90, 90], [0.0, 10.0, 20.0, 20.0])
 # source, azimuth, elevation (deg), dBsm
 RCS = [
     ("issue: interpolated in dB with wrap, across 0", 0.0, 0.0, 5.0),
@@ -215,9 +215,9 @@ def test_rcs_table(source, azimuth, elevation, expected):
 LOOK = {"false_alarm_probability": 1e-4}
 # source, call, message
 REFUSED = [
-    ("issue: table with a hole", lambda: AspectTable.from_rows([0, 90, 0], [0, 0, 9], [1, 1, 1]),
+    ("issue: table with a hole", lambda: RcsTable.from_rows([0, 90, 0], [0, 0, 9], [1, 1, 1]),
      "the table has a hole: no value at az_deg 90, el_deg 9"),
-    ("issue: NaN", lambda: AspectTable.from_rows([0, 90], [0, 0], [1, math.nan]), "dbsm is nan"),
+    ("issue: NaN", lambda: RcsTable.from_rows([0, 90], [0, 0], [1, math.nan]), "dbsm is nan"),
     ("issue: NaN", lambda: miss_probability([1.0, math.nan], **LOOK), "snr is nan: it must"),
     ("issue: NaN", lambda: detection_threshold(math.nan, 0.1), "pulses is nan: it must"),
     ("issue: NaN", lambda: BUDGET.snr(math.nan, 1.0), "range_m is nan: it must"),

@@ -151,3 +151,48 @@ def test_a_script_without_a_guard_may_have_workers(tmp_path):
         [sys.executable, str(script)], capture_output=True, text=True, timeout=120
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "begun\n", "")
+
+
+def test_a_study_file_gives_the_bytes_of_the_command_line(both):
+    home, _ = both
+    result = dsa_des.study(home / "study.toml", workers=1, out=home / "file")
+    assert result.runs.num_rows == 12
+    for name in ("parts", "."):
+        here, there = (sorted((home / f / name).glob("*.parquet")) for f in ("file", "cli"))
+        assert [p.read_bytes() for p in here] == [p.read_bytes() for p in there] != []
+    assert (home / "file" / "study.json").read_bytes() == (home / "cli" / "study.json").read_bytes()
+
+
+def test_a_shipped_study_is_found_by_its_name_and_changed_by_sets():
+    small = ["replicas=2", "set.duration_s=5", "axes.blocks.radar.scan_rate_hz=[1, 5]"]
+    result = dsa_des.study("radar_scan_rate", sets=small, workers=1)
+    assert result.runs.num_rows == 4
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "says"),
+    [
+        ("first_light", {}, "metrics: is missing: this file is a scene"),
+        ({"blocks": {}}, {}, "study: metrics: is missing"),
+        ("radar_scan_rate", {"replicas": 3}, r'study: replicas: .*sets=\["replicas=..."\]'),
+        ("radar_scan_rate", {"title": "x"}, "study: title: stands in the study file"),
+        ("radar_scan_ratte", {}, "did you mean the shipped 'radar_scan_rate'"),
+        ("first_light", {"metrics": ["first_detection"], "sets": ["seed=1"]}, "study: sets"),
+    ],
+)
+def test_what_is_neither_a_study_nor_a_scene_with_metrics_is_said(source, more, says):
+    with pytest.raises(dsa_des.SceneError, match=says):
+        dsa_des.study(source, **more)
+
+
+def test_tables_become_data_frames(both, short):
+    pytest.importorskip("pandas")
+    _, result = both
+    summary = result.summary.to_pandas()
+    assert list(summary.columns) == result.summary.column_names
+    assert len(summary) == result.summary.num_rows > 0
+    run = dsa_des.run(short)
+    detections = run.detections.to_pandas()
+    assert len(detections) == run.detections.num_rows > 0
+    assert detections["time_s"].is_monotonic_increasing
+    assert detections["range_m"].dtype == float

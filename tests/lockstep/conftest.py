@@ -6,7 +6,7 @@ import pyarrow.compute as pc
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.replicas.lockstep import LockStep
+from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 
@@ -21,7 +21,7 @@ def tables_of(kind, scenes, **options):
 
 def same_as_alone(scenes, **options):
     """Run scenes in lock step, check each against a run of its own, and return the simulation."""
-    simulation, together = tables_of(LockStep, scenes, **options)
+    simulation, together = tables_of(lock_step, scenes, **options)
     assert sum(table.num_rows for table in together.values()) > 0
     for number, scene in enumerate(scenes):
         for name, alone in tables_of(Simulation, scene)[1].items():

@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas, scene_of
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.running.simulation import Simulation
@@ -41,7 +41,7 @@ def recorded(simulation_type, scenes, **kwargs):
 
 
 def assert_equal_to_separate_runs(scenes, **kwargs):
-    simulation, together = recorded(LockStep, scenes, **kwargs)
+    simulation, together = recorded(lock_step, scenes, **kwargs)
     rows = 0
     for number, scene in enumerate(scenes):
         _, alone = recorded(Simulation, scene)
@@ -57,7 +57,7 @@ def assert_equal_to_separate_runs(scenes, **kwargs):
 def test_other_seeds_and_offsets(window):
     scene = load_scene(FIRST_LIGHT, duration_s="70")
     simulation = assert_equal_to_separate_runs(variants(scene), window=window)
-    assert not simulation.split
+    assert not simulation.timeline.split
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_traffic_that_differs_is_split():
     scene = load_scene(FIRST_LIGHT, duration_s="60")
     changes = [{}, {"blocks.traffic.intruders[0].east_m": 900}]
     simulation = assert_equal_to_separate_runs(variants(scene, changes))
-    assert list(simulation.split) == ["traffic"]
+    assert list(simulation.timeline.split) == ["traffic"]
 
 
 def test_random_traffic_is_drawn_from_each_seed():
@@ -105,7 +105,7 @@ def test_what_cannot_run_together_says_so(sets, what):
     else:
         scene = load_scene(FIRST_LIGHT, sets=sets)
     with pytest.raises(NotInLockStep, match=what):
-        LockStep([scene, scene])
+        lock_step([scene, scene])
 
 
 def test_aircraft_that_differ_are_refused_not_mixed():
@@ -113,7 +113,7 @@ def test_aircraft_that_differ_are_refused_not_mixed():
     changes = [{}, {"blocks.traffic.intruders[0].rcs_dbsm": 20.0}]
     scenes = [scene_of(scene, Replica(1, change)) for change in changes]
     with pytest.raises(NotInLockStep, match="differs between replicas"):
-        recorded(LockStep, scenes)
+        recorded(lock_step, scenes)
     # They run all the same, one by one.
     outcomes = run_replicas(scene, [Replica(1, change) for change in changes])
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
@@ -141,7 +141,7 @@ def test_a_block_that_never_runs_has_its_say():
         replicas = [Replica(1, change) for change in changes]
         scenes = [scene_of(scene, replica) for replica in replicas]
         with pytest.raises(NotInLockStep, match="block radar asks for something else"):
-            recorded(LockStep, scenes)
+            recorded(lock_step, scenes)
         # They run all the same, one by one; and what they count differs.
         culled = []
         for one, outcome in zip(scenes, run_replicas(scene, replicas), strict=True):
@@ -159,7 +159,7 @@ def test_a_block_that_never_runs_reports():
     change = {"blocks.traffic.ownship.heading_deg": 3.0}
     scenes = [scene_of(scene, Replica(seed, change if seed == 3 else {})) for seed in (1, 2, 3)]
     found = {}
-    LockStep(scenes, report=lambda number, report: found.update({number: report})).run()
+    lock_step(scenes, report=lambda number, report: found.update({number: report})).run()
     for number, one in enumerate(scenes):
         alone = Simulation(one).run().report
         assert found[number]["targets"] == alone["targets"]

@@ -4,7 +4,7 @@ import pytest
 
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.running.rewind import cut_loops
+from dsa_des.running.loops import cut_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
@@ -45,9 +45,9 @@ def test_windows_are_few_when_what_comes_back_is_regular():
     windows = []
 
     class Counted(Simulation):
-        def run_window(self, start, end):
-            windows.append(end - start)
-            super().run_window(start, end)
+        def run_window(self, window):
+            windows.append(window.end - window.start)
+            return super().run_window(window)
 
     simulation = Counted(scene, recorder=Recorder([sink := MemorySink()]))
     simulation.run()

@@ -8,7 +8,7 @@ import pytest
 from dsa_des.block.component import ClockedParameters, Component
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
 from dsa_des.replicas.split_block import SplitBlock, _part
 from dsa_des.replicas.watched_parameters import WatchedParameters
@@ -29,11 +29,11 @@ def test_a_split_block_is_no_block(lock):
     """It has nothing that the engine could ask in the place of the block itself."""
     assert not issubclass(SplitBlock, Component)
     scenes = lock.replicas_of(near(), {HEADING: 0.5}, {HEADING: -0.5})
-    simulation = LockStep(scenes)
+    simulation = lock_step(scenes)
     for name, node in simulation.nodes.items():
         assert type(node.component) is scenes[0].blocks[name].cls
         assert node.component is simulation.components[name]
-    assert simulation.nodes["traffic"].runner is simulation.split["traffic"]
+    assert simulation.nodes["traffic"].runner is simulation.timeline.split["traffic"]
     public = {name for name in dir(SplitBlock) if not name.startswith("_")}
     assert public == {"run", "close"}
 
@@ -42,7 +42,7 @@ def test_a_split_block_is_no_block(lock):
 def test_positions_are_published_at_their_rate_when_the_traffic_is_split(lock, rate):
     scene = near(f"blocks.traffic.update_rate_hz={rate}")
     simulation = lock.same_as_alone(lock.replicas_of(scene, {HEADING: 0.5}, {HEADING: -0.5}))
-    assert list(simulation.split) == ["traffic"]
+    assert list(simulation.timeline.split) == ["traffic"]
 
 
 def test_the_publishing_rate_itself_can_be_drawn(lock):
@@ -54,7 +54,7 @@ def test_a_clock_in_some_replicas_only_is_run_one_by_one(lock):
     scene, rate = near(), {"blocks.traffic.update_rate_hz": 2}
     for changes in ([{}, rate], [rate, {}]):
         with pytest.raises(NotInLockStep, match="in some replicas only"):
-            LockStep(lock.replicas_of(scene, *changes))
+            lock_step(lock.replicas_of(scene, *changes))
     replicas = [Replica(20), Replica(21, rate)]
     outcomes = run_replicas(scene, replicas)
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
@@ -75,7 +75,7 @@ def test_a_delay_in_scans_follows_the_replicas_own_clock(lock):
     scene = near(DELAYED)
     rates = [{"blocks.radar.scan_rate_hz": rate} for rate in (4, 5)]
     with pytest.raises(NotInLockStep, match="scans that differ"):
-        LockStep(lock.replicas_of(scene, *rates))
+        lock_step(lock.replicas_of(scene, *rates))
     offsets = [{"blocks.radar.offset_s": Fraction(n, 100)} for n in (0, 5, 13)]
     lock.same_as_alone(lock.replicas_of(scene, *offsets))
 
@@ -102,7 +102,7 @@ CLOCKS = [{"rate_error_ppm": 100}, {"jitter_s": 0.01}, {"scan_rate_hz": 4}, {"of
 def test_one_instance_serves_clocks_that_differ(lock, change):
     changes = {f"blocks.radar.{name}": value for name, value in change.items()}
     simulation = lock.same_as_alone(lock.replicas_of(near(duration_s="15"), {}, changes, changes))
-    assert not simulation.split
+    assert not simulation.timeline.split
 
 
 @pytest.mark.parametrize("change", CLOCKS)
@@ -115,7 +115,7 @@ def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
         with pytest.raises(NotInLockStep, match="radar asks for something else"):
             lock.same_as_alone(scenes)
     else:
-        assert list(lock.same_as_alone(scenes).split) == ["radar"]
+        assert list(lock.same_as_alone(scenes).timeline.split) == ["radar"]
 
 
 class Reader(ClockedParameters):

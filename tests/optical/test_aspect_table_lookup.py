@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.aircraft.silhouette_table import AspectTable, read_aspect_table, table_from_nodes
+from components.aircraft.silhouette_table import (
+    SilhouetteTable,
+    read_aspect_table,
+    table_from_nodes,
+)
 from components.optical.silhouette import visible_area
 
 AZIMUTHS = np.arange(0.0, 360.0, 30.0)
@@ -79,7 +83,7 @@ def test_silhouette_call_looks_from_the_observers_side(rows, view, seen_from):
 @given(st.floats(-20.0, 20.0), st.floats(-np.pi / 2, np.pi / 2))
 def test_interpolation_wraps_and_stays_between_its_nodes(azimuth, elevation):
     az, el = np.meshgrid(AZIMUTHS, ELEVATIONS)
-    table = AspectTable(AZIMUTHS, ELEVATIONS, lopsided(az, el))
+    table = SilhouetteTable(AZIMUTHS, ELEVATIONS, lopsided(az, el))
     area = table.area(azimuth, elevation)
     assert table.area(azimuth + 2 * np.pi, elevation) == pytest.approx(area, rel=1e-12)
     assert table.area_m2.min() <= area <= table.area_m2.max()
@@ -143,7 +147,7 @@ def test_unequal_steps_are_no_hole():
     azimuths = np.array([0, 1, 2, 3, 5, 10, 15, 30, 45, 90, 135, 180, 225, 270, 315, 330, 345.0])
     elevations = np.array([-90, -45, -15, -5, 0, 5, 15, 45, 90.0])
     az, el = np.meshgrid(azimuths, elevations)
-    table = AspectTable(azimuths, elevations, lopsided(az, el))
+    table = SilhouetteTable(azimuths, elevations, lopsided(az, el))
     assert table.area(np.radians(2.0), np.radians(5.0)) == pytest.approx(lopsided(2, 5))
 
 

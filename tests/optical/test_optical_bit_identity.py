@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import AspectTable
+from components.aircraft.silhouette_table import SilhouetteTable
 from components.optical.contrast import contrast_gain
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
@@ -18,7 +18,9 @@ PIXEL = {"pixel_azimuth_rad": 6.2e-4, "pixel_elevation_rad": 5.1e-4}
 
 def table():
     azimuth, elevation = np.arange(0.0, 360.0, 15.0), np.arange(-90.0, 91.0, 15.0)
-    return AspectTable(azimuth, elevation, 5.0 + np.abs(np.add.outer(elevation, azimuth) % 77.0))
+    return SilhouetteTable(
+        azimuth, elevation, 5.0 + np.abs(np.add.outer(elevation, azimuth) % 77.0)
+    )
 
 
 CASES = {

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.optical.line_of_sight_rate import angle_between
+from components.geometry.directions import angle_between
 from components.optical.signature import (
     confidence,
     detection_range,

@@ -9,10 +9,9 @@ from scipy.special import bdtr, gammaincc
 
 from components.radar.false_alarms import (
     false_alarm_count,
-    false_alarm_positions,
     false_alarm_snr,
 )
-from components.radar.resolution_cells import ResolutionCells, resolution_cells
+from components.radar.resolution_cells import resolution_cells
 
 # The thesis's radar: ±110° by ±20° at 1°, 76.2 m cells out to 6.5 km.
 OASYS = resolution_cells(
@@ -93,22 +92,6 @@ def test_long_run_agrees_with_pfa_times_cells():
     assert abs(int(count.sum()) - expected) < 4 * math.sqrt(expected)
 
 
-def test_positions_are_cell_centres_and_every_cell_is_as_likely():
-    cells = ResolutionCells(4, 2, 5, (-1.0, 2.0), (0.0, 0.2), (100.0, 500.0))
-    number = 40_000
-    azimuth, elevation, distance = false_alarm_positions(
-        *(uniforms(number, axis) for axis in range(3)), cells
-    )
-    place = np.stack([(azimuth + 1) / 0.5, elevation / 0.1, (distance - 100) / 100]) - 0.5
-    np.testing.assert_allclose(place, np.round(place), atol=1e-9)
-    index = np.round(place).astype(int)
-    hits = np.bincount(index[0] + 4 * (index[1] + 2 * index[2]), minlength=40)
-    # χ² with 39 degrees of freedom exceeds 80 with a probability of 1e-4.
-    assert np.sum((hits - number / 40) ** 2) / (number / 40) < 80.0
-    edge = false_alarm_positions(1 - 2**-53, 0.0, 1 - 2**-53, cells)
-    assert edge == pytest.approx((0.75, 0.05, 550.0))
-
-
 @pytest.mark.parametrize("pulses", [1, 5])
 def test_a_false_alarm_lies_above_the_threshold(pulses):
     pfa = 0.01
@@ -127,7 +110,6 @@ def test_a_false_alarm_lies_above_the_threshold(pulses):
         (lambda: false_alarm_count(1.0, cells=10, false_alarm_probability=0.5), "uniform is 1"),
         (lambda: false_alarm_count(0.5, cells=1.5, false_alarm_probability=0.5), "cells is 1.5"),
         (lambda: false_alarm_count(0.5, cells=10**9, false_alarm_probability=0.5), "at most 0.01"),
-        (lambda: false_alarm_positions(0.5, -0.1, 0.5, OASYS), "elevation_uniform is -0.1"),
         (lambda: false_alarm_snr(0.5, false_alarm_probability=0.0), "strictly between 0 and 1"),
     ],
 )

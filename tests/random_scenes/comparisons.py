@@ -16,7 +16,7 @@ from random_scene import Case
 from dsa_des.block.message import Text
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import ColumnSink, Recorder
-from dsa_des.replicas.lockstep import LockStep, NotInLockStep
+from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
@@ -227,7 +227,7 @@ def _in_lock_step(scenes: list[Scene], window: int) -> dict[str, dict[str, Any]]
     NotInLockStep, SceneError
     """
     sink = ColumnSink()
-    LockStep(scenes, recorder=Recorder([sink]), window=window).run()
+    lock_step(scenes, recorder=Recorder([sink]), window=window).run()
     return plain(sink.tables())
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsa_des.studies import statistics
-from dsa_des.studies.figures import readable, unit_of
+from dsa_des.studies.labels import axis_label, readable, unit_of, value_label
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,14 @@ def test_few_values_are_marked() -> None:
 
 
 def test_axes_of_figures_carry_units() -> None:
-    assert readable("declaration_range_m.radar") == "declaration range (radar), m"
-    assert readable("track_breaks") == "track breaks"
-    assert readable("fused_share.ir_with_radar") == "fused share (ir with radar)"
+    assert readable("declaration_range_m.radar") == "Declaration range, radar (m)"
+    assert readable("track_breaks") == "Track breaks"
+    assert readable("fused_share.ir_with_radar") == "Fused share, IR with radar"
+    assert axis_label("radar.scan_rate_hz") == "Radar scan rate (Hz)"
+    assert axis_label("swap.fusion") == "Type of fusion"
+    assert axis_label("weather.rain_mm_per_h") == "Weather rain (mm/h)"
+    assert axis_label("traffic.intruders[0].rcs_dbsm") == "Traffic intruders[0] RCS (dBsm)"
+    assert value_label("bearing_deg", 30.0) == "bearing 30°"
+    assert value_label("ir.rate_error_ppm", 100) == "IR rate error 100 ppm"
+    assert value_label("swap.fusion", "fusion.gated") == "fusion.gated"
     assert unit_of("declaration_time_s.any") == "s" and unit_of("track_breaks") == ""

@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 from dsa_des.block.component import SourcedText
 from dsa_des.cli import main
 from dsa_des.studies.draws import parse_draw
-from dsa_des.studies.study import Cells
+from dsa_des.studies.study import StudyCells
 from dsa_des.studies.study_tables import resolved
 
 STUDY = """
@@ -131,11 +131,11 @@ def test_a_scene_compared_with_itself_is_run_once(small: Path) -> None:
 def test_cells_are_counted_like_a_product() -> None:
     import itertools
 
-    cells = Cells((2, 3, 1, 4))
+    cells = StudyCells((2, 3, 1, 4))
     every = list(itertools.product(range(2), range(3), range(1), range(4)))
     assert list(cells) == every == cells[:] and len(cells) == 24
     assert [cells.number(cell) for cell in every] == list(range(24))
-    assert cells[-1] == every[-1] and len(Cells(())) == 1 and Cells(())[0] == ()
+    assert cells[-1] == every[-1] and len(StudyCells(())) == 1 and StudyCells(())[0] == ()
     with pytest.raises(IndexError):
         cells[24]
 

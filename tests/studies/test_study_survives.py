@@ -78,7 +78,8 @@ def test_a_killed_study_continues_to_the_same_bytes(small: Path) -> None:
     before = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
     assert 2 <= len(before) < len([name for name in whole if name.startswith("parts/")])
     released.touch()
-    (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # as a kill leaves it
+    (parts / ".dsa_des-0123456789ab").write_bytes(b"half a par")  # as a kill leaves it
+    (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # of an earlier version
     again = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--resume")
     again.communicate()
     assert again.returncode == 0
@@ -229,10 +230,10 @@ def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.M
     folder = StudyFolder(Path("broken"))
     folder.open(study, resume=False)
 
-    def full(path: object, content: bytes) -> None:
+    def full(path: object, content: bytes, **how: bool) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("dsa_des.studies.folder.write_whole", full)
+    monkeypatch.setattr("dsa_des.studies.folder.write_file", full)
     from dsa_des.studies.executors import Serial
 
     with pytest.raises(Stopped, match="No space left"):

@@ -1,1 +1,1 @@
-"""What a run costs, measured against a plain loop over the same physics."""
+"""The cost of a run, measured against a plain loop over the same physics."""

@@ -14,7 +14,7 @@ CLOCKED = ("eo", "ir", "radar")
 
 
 @dataclass(frozen=True)
-class Case:
+class BenchmarkCase:
     """One line of the benchmark.
 
     Parameters
@@ -44,26 +44,38 @@ class Case:
 
 
 CASES = (
-    Case("thesis", "4 intruders, 3 sensors at 1 Hz, 1800 s", 3.0),
-    Case("clocks", "4 intruders, 5, 20 and 2 Hz, 600 s", 2.5, every=3),
-    Case("hundred", "100 intruders, 3 sensors at 1 Hz, 1800 s", 14.0, every=6),
-    Case(
-        "ten_thousand", "10,000 intruders, 3 sensors at 1 Hz, 180 s", 20.0, every=30,
+    BenchmarkCase("thesis", "4 intruders, 3 sensors at 1 Hz, 1800 s", 3.0),
+    BenchmarkCase("clocks", "4 intruders, 5, 20 and 2 Hz, 600 s", 2.5, every=3),
+    BenchmarkCase("hundred", "100 intruders, 3 sensors at 1 Hz, 1800 s", 14.0, every=6),
+    BenchmarkCase(
+        "ten_thousand",
+        "10,000 intruders, 3 sensors at 1 Hz, 180 s",
+        20.0,
+        every=30,
         quick=("duration_s=30",),
     ),
-    Case(
-        "sparse", "10,000 intruders, 97 % never in reach, 180 s", 100.0, every=30,
+    BenchmarkCase(
+        "sparse",
+        "10,000 intruders, 97 % never in reach, 180 s",
+        100.0,
+        every=30,
         quick=("duration_s=60",),
     ),
-    Case("manoeuvres", "100 intruders, the ownship turns away every 60 s, 1800 s", 5.0, every=6),
-    Case(
-        "monte_carlo", "1000 replicas of 120 s, 1 intruder, 5, 20 and 2 Hz", 10.0, every=1,
-        replicas=1000, quick_replicas=100,
+    BenchmarkCase(
+        "manoeuvres", "100 intruders, the ownship turns away every 60 s, 1800 s", 5.0, every=6
     ),
-)  # fmt: skip
+    BenchmarkCase(
+        "monte_carlo",
+        "1000 replicas of 120 s, 1 intruder, 5, 20 and 2 Hz",
+        10.0,
+        every=1,
+        replicas=1000,
+        quick_replicas=100,
+    ),
+)
 
 
-def chosen(names: Sequence[str]) -> list[Case]:
+def chosen(names: Sequence[str]) -> list[BenchmarkCase]:
     """Return the cases of these names, all for none.
 
     Raises
@@ -79,7 +91,7 @@ def chosen(names: Sequence[str]) -> list[Case]:
 
 
 def scene_of(
-    case: Case, *, quick: bool, duration_s: str | None = None, sets: tuple[str, ...] = ()
+    case: BenchmarkCase, *, quick: bool, duration_s: str | None = None, sets: tuple[str, ...] = ()
 ) -> Scene:
     """Load a case's scene, perhaps shortened or changed."""
     sets = (*case.quick, *sets) if quick else sets

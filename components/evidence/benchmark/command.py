@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from components.evidence.benchmark.cases import Case, chosen
+from components.evidence.benchmark.cases import BenchmarkCase, chosen
+from components.evidence.benchmark.pairs import PAIRS, Pair
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file
 from dsa_des.files.output_names import named
@@ -28,7 +29,9 @@ def run_benchmark(
     """Measure the cases; without names, all of them."""
     if embed and (scenes or compare):
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
-    cases = [] if embed else chosen(scenes)
+    pairs = [] if embed else [pair for pair in PAIRS if not scenes or pair.name in scenes]
+    names = [name for name in scenes if name not in {pair.name for pair in pairs}]
+    cases = [] if embed or (scenes and not names) else chosen(names)
     before = {} if compare is None else _read(Path(compare))
     target = None if json_file is None else named(json_file, "--json")
     if target is not None:
@@ -44,7 +47,10 @@ def run_benchmark(
         wanted_ms = rows[0]["wanted_p99_us"] / 1000.0
         console.print(f"{share:.1%} of the calls within {wanted_ms:g} ms of wall time")
     else:
-        rows += _measured_cases(console, cases, quick, repeats, before)
+        if cases:
+            rows += _measured_cases(console, cases, quick, repeats, before)
+        if pairs:
+            rows += _measured_pairs(console, pairs, quick, repeats)
     if target is not None:
         try:
             write_json(target, rows)
@@ -54,13 +60,17 @@ def run_benchmark(
 
 
 _LEGEND = (
-    "M/s: million target-scans per s of CPU; x plain: times the plain loop; ms/s: CPU per "
-    "simulated s; MB: peak memory; Parquet: CPU that writing it adds"
+    "M/s: million target-scans per s of CPU, building and running; x plain: times the plain loop; "
+    "ms/s: CPU per simulated s; MB: peak memory; Parquet: CPU that writing it adds"
 )
 
 
 def _measured_cases(
-    console: Any, cases: list[Case], quick: bool, repeats: int | None, before: dict[str, Any]
+    console: Any,
+    cases: list[BenchmarkCase],
+    quick: bool,
+    repeats: int | None,
+    before: dict[str, Any],
 ) -> list[dict[str, Any]]:
     rows = []
     for case in cases:
@@ -75,7 +85,29 @@ def _measured_cases(
     return rows
 
 
-def _measured(case: Case, quick: bool, repeats: int) -> dict[str, Any]:
+def _measured_pairs(
+    console: Any, pairs: list[Pair], quick: bool, repeats: int | None
+) -> list[dict[str, Any]]:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for heading in ("what costs little", "times", "half of them", "at most"):
+        justify: Any = "left" if heading == "what costs little" else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    rows = []
+    for pair in pairs:
+        console.print(f"{pair.name}: {pair.what} ...", style="dim")
+        options = [f"--repeats={repeats or (2 if quick else 5)}", *(["--quick"] if quick else [])]
+        row = _fresh("pairs", [pair.name, *options])
+        low, high = row["times_quartiles"]
+        table.add_row(pair.name, f"{row['times']:.3f}", f"{low:.3f}-{high:.3f}", f"{pair.wanted:g}")
+        rows.append(row)
+    console.print(table)
+    console.print("times: CPU of building and running, by that without it", style="dim")
+    return rows
+
+
+def _measured(case: BenchmarkCase, quick: bool, repeats: int) -> dict[str, Any]:
     """Measure times and memory in a fresh process."""
     options = [f"--repeats={repeats}", *(["--quick"] if quick else [])]
     return _fresh("measure", [case.name, *options])
@@ -127,11 +159,11 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
         raise UsageError(f"--compare {path}: not the rows of a benchmark ({error})") from error
 
 
-def _table(cases: list[Case], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
+def _table(cases: list[BenchmarkCase], rows: list[dict[str, Any]], before: dict[str, Any]) -> Any:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0))
-    headings = ["scene", "M/s", "x plain", "wanted", "CPU s", "build s", "ms/s", "MB", "Parquet"]
+    headings = ["scene", "M/s", "x plain", "wanted", "run s", "build s", "ms/s", "MB", "Parquet"]
     for heading in [*headings, *(["since"] if before else [])]:
         justify: Any = "left" if heading == "scene" else "right"
         table.add_column(heading, justify=justify, no_wrap=True)

@@ -1,4 +1,4 @@
-"""How cost grows: ``python -m components.evidence.benchmark.growth DIR`` measures it and draws it.
+"""The growth of cost: ``python -m components.evidence.benchmark.growth DIR`` draws it.
 
 One thing grows at a time: intruders, scan rate, simulated time, replicas. A point is the best of
 three runs in a fresh process; what is drawn is CPU time of the whole run with recording, per
@@ -64,7 +64,7 @@ def point(axis: str, value: float, folder: Path) -> dict[str, Any]:
     scene, scenes = _scenes(axis, value)
     to_disk = axis in ("simulated time, s", "replicas")
     runs = [engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)]
-    cpu_s, units = min(runs)
+    cpu_s, units = min((run_s, units) for _, run_s, units in runs)
     return {
         "axis": axis,
         "value": value,

@@ -32,7 +32,7 @@ OwnState = tuple[Position, tuple[float, float]]
 
 
 @dataclass
-class Sensor:
+class LoopSensor:
     """What the loop needs to know of one sensor."""
 
     name: str
@@ -55,7 +55,7 @@ class Sensor:
 
 
 @dataclass
-class Result:
+class LoopResult:
     """What the loop found: its detections by (sensor, scan, target index), fused and held."""
 
     detections: dict[tuple[str, int, int], tuple[float, float, float]]
@@ -72,14 +72,14 @@ class Prepared:
     own: Callable[[float], OwnState]
     flights: list[Callable[[float], Position]]
     pitch_roll: list[tuple[float, float]]
-    calendar: dict[int, list[tuple[Sensor, int]]]
+    calendar: dict[int, list[tuple[LoopSensor, int]]]
 
 
 def prepare(simulation: Simulation) -> Prepared:
     """Read a scene that is ready to run; only its data are used."""
     traffic: Any = simulation.components["traffic"]
     targets = [target.segments[0] for target in traffic.targets]
-    calendar: dict[int, list[tuple[Sensor, int]]] = {}
+    calendar: dict[int, list[tuple[LoopSensor, int]]] = {}
     for sensor in _sensors(simulation):
         for tick, scan in sensor.scans:
             calendar.setdefault(tick, []).append((sensor, scan))
@@ -110,7 +110,7 @@ def _own_flight(own: Any, ticks: list[int], ticks_per_s: int) -> Callable[[float
     return lambda time_s: flown[time_s]
 
 
-def _sensors(simulation: Simulation) -> list[Sensor]:
+def _sensors(simulation: Simulation) -> list[LoopSensor]:
     roster = simulation.components["traffic"].roster  # type: ignore[attr-defined]
     sensors = []
     for name in ("radar", "eo", "ir"):
@@ -119,7 +119,7 @@ def _sensors(simulation: Simulation) -> list[Sensor]:
         assert clock is not None
         numbers, ticks = clock.between(0, simulation.end_tick)
         reach = block.stated_reach
-        sensor = Sensor(
+        sensor = LoopSensor(
             name,
             "radar" if block.measures_range else name,
             list(zip(ticks.tolist(), numbers.tolist(), strict=True)),
@@ -155,7 +155,7 @@ def _areas(
     return list(zip(*columns, strict=True))
 
 
-def run(scene: Prepared, every: int = 1) -> Result:
+def run(scene: Prepared, every: int = 1) -> LoopResult:
     """Run the scene as one loop.
 
     Parameters
@@ -165,7 +165,7 @@ def run(scene: Prepared, every: int = 1) -> Result:
         Take only every so many instants: a fair sample of a long scene.
     """
     seconds, flights, angles = scene.seconds_per_tick, scene.flights, scene.pitch_roll
-    result = Result({}, 0, 0, {})
+    result = LoopResult({}, 0, 0, {})
     detections, held = result.detections, result.held
     for tick in list(scene.calendar)[::every]:
         looking = scene.calendar[tick]

@@ -6,7 +6,7 @@ DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Case:
+class NumericalCase:
     """One hard case with three results.
 
     Parameters

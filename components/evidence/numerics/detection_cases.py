@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.evidence.numerics.case import Case
+from components.evidence.numerics.case import NumericalCase
 from components.high_precision.multiprecision import multiprecision
 from components.radar.detection import (
     detection_probability,
@@ -15,7 +15,7 @@ from components.radar.detection import (
 from components.radar.link_budget import LinkBudget
 
 
-def detection_cases() -> list[Case]:
+def detection_cases() -> list[NumericalCase]:
     """Return the hard cases of radar detection."""
     return [
         _threshold(),
@@ -27,10 +27,10 @@ def detection_cases() -> list[Case]:
     ]
 
 
-def _threshold() -> Case:
+def _threshold() -> NumericalCase:
     from scipy.special import gammaincinv
 
-    return Case(
+    return NumericalCase(
         "1 pulse, Pfa 1e-12: threshold V",
         "inverse of P(n, V) at 1 - Pfa",
         float(gammaincinv(1.0, 1.0 - 1e-12)),
@@ -40,10 +40,16 @@ def _threshold() -> Case:
     )
 
 
-def _swerling_1(what: str, pulses: int, pfa: float, snr: float) -> Case:
+def _swerling_1(what: str, pulses: int, pfa: float, snr: float) -> NumericalCase:
     ours = detection_probability(snr, pulses=pulses, false_alarm_probability=pfa)
-    return Case(f"{what}: Pd", "thesis eq. 32", _equation_32(pulses, pfa, snr), float(ours),
-                _swerling_1_truth(pulses, pfa, snr), "mpmath")  # fmt: skip
+    return NumericalCase(
+        f"{what}: Pd",
+        "thesis eq. 32",
+        _equation_32(pulses, pfa, snr),
+        float(ours),
+        _swerling_1_truth(pulses, pfa, snr),
+        "mpmath",
+    )
 
 
 def _equation_32(pulses: int, pfa: float, snr: float) -> float:
@@ -95,14 +101,14 @@ def _swerling_1_truth(pulses: int, pfa: float, snr: float) -> float:
         )
 
 
-def _miss() -> Case:
+def _miss() -> NumericalCase:
     snr = 1e12
     radar: dict[str, Any] = {"pulses": 2, "false_alarm_probability": 1e-6, "model": "swerling2"}
     mpmath = multiprecision()
     with mpmath.workdps(60):
         x = _threshold_truth(mpmath, 2, 1e-6) / (1 + mpmath.mpf(snr))
         truth = float(1 - _upper(mpmath, 2, x))
-    return Case(
+    return NumericalCase(
         "2 pulses, 120 dB, Swerling II, Pfa 1e-6: 1 - Pd",
         "1 - Pd",
         1.0 - float(detection_probability(snr, **radar)),
@@ -112,7 +118,7 @@ def _miss() -> Case:
     )
 
 
-def _gram_charlier() -> Case:
+def _gram_charlier() -> NumericalCase:
     """Compare eq. 27 as printed at the point of errata 15."""
     pulses, pfa, snr = 5, 1e-4, 10.0**0.8
     v = float(detection_threshold(pulses, pfa))
@@ -134,13 +140,19 @@ def _gram_charlier() -> Case:
             truth += weight * _upper(mpmath, pulses + k, v_exact)
             weight *= echo / (k + 1)
     ours = detection_probability(snr, pulses=pulses, false_alarm_probability=pfa, model="swerling0")
-    return Case("5 pulses, 8 dB, steady, Pfa 1e-4: Pd", "thesis eq. 27 as printed", printed,
-                float(ours), float(truth), "mpmath")  # fmt: skip
+    return NumericalCase(
+        "5 pulses, 8 dB, steady, Pfa 1e-4: Pd",
+        "thesis eq. 27 as printed",
+        printed,
+        float(ours),
+        float(truth),
+        "mpmath",
+    )
 
 
-def _range_zero() -> Case:
+def _range_zero() -> NumericalCase:
     budget = LinkBudget(power_w=2.5, antenna_gain_db=29.5, bandwidth_hz=486.0, frequency_hz=35e9)
-    return Case(
+    return NumericalCase(
         "range 0: SNR",
         "thesis eq. 7",
         math.inf,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from components.evidence.numerics.case import Case
+from components.evidence.numerics.case import NumericalCase
 from components.evidence.numerics.detection_cases import detection_cases
 from components.evidence.numerics.geometry_cases import geometry_cases
 from components.evidence.numerics.grid_and_clock_cases import clock_cases, rounding_cases
@@ -11,7 +11,7 @@ from components.evidence.numerics.optical_cases import optical_cases
 
 PAGE = Path(__file__).parents[3] / "docs" / "numerics.md"
 
-SECTIONS: list[tuple[str, Callable[[], list[Case]]]] = [
+SECTIONS: list[tuple[str, Callable[[], list[NumericalCase]]]] = [
     ("Geometry", geometry_cases),
     ("Detection", detection_cases),
     ("Signature", optical_cases),
@@ -30,7 +30,7 @@ those digits are the noise this page is about.
 _COLUMNS = ("hard case", "naive formula", "naive result", "ours", "reference", "from")
 
 
-def _cells(case: Case) -> tuple[str, ...]:
+def _cells(case: NumericalCase) -> tuple[str, ...]:
     return (
         case.what,
         case.formula,

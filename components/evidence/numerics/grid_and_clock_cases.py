@@ -5,31 +5,31 @@ from fractions import Fraction
 
 import numpy as np
 
-from components.evidence.numerics.case import Case
+from components.evidence.numerics.case import NumericalCase
 from components.sensor.resolution import round_to_grid
 from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
 
 _HOUR_S = 3600
 
 
-def rounding_cases() -> list[Case]:
+def rounding_cases() -> list[NumericalCase]:
     """Return the hard cases of rounding to a sensor's grid."""
     value, step = math.nextafter(3.5 * 1.1, 0.0), 1.1
     return [
-        Case("a last place below the edge 3.85, grid 1.1", "round(x/step)·step",
+        NumericalCase("a last place below the edge 3.85, grid 1.1", "round(x/step)·step",
              round(value / step) * step, float(round_to_grid(value, step)),
              round(Fraction(value) / Fraction(step)) * step, "rational numbers"),
-        Case("110 at a field of view of ±110, grid 4", "round(x/step)·step",
+        NumericalCase("110 at a field of view of ±110, grid 4", "round(x/step)·step",
              round(110.0 / 4.0) * 4.0,
              float(round_to_grid(110.0, 4.0, limit_low=-110.0, limit_high=110.0)),
              108.0, "outermost point inside"),
-        Case("2.5 and -2.5, grid 1: sum of the two", "floor(x + ½)",
+        NumericalCase("2.5 and -2.5, grid 1: sum of the two", "floor(x + ½)",
              float(math.floor(2.5 + 0.5) + math.floor(-2.5 + 0.5)),
              float(round_to_grid(2.5, 1.0) + round_to_grid(-2.5, 1.0)), 0.0, "symmetry"),
     ]  # fmt: skip
 
 
-def clock_cases() -> list[Case]:
+def clock_cases() -> list[NumericalCase]:
     """Return the hard cases of scan clocks."""
     return [
         _meetings("10 and 30 Hz: scans at the same instant in an hour", "t += 1/f",
@@ -45,12 +45,12 @@ def clock_cases() -> list[Case]:
 
 def _meetings(
     what: str, formula: str, naive: int, rates: tuple[object, object], truth: int
-) -> Case:
+) -> NumericalCase:
     specs = [ClockSpec(parse_rational(rate)) for rate in rates]
     ticks_per_s = resolution([time for spec in specs for time in spec.exact_times()])
     scans = [ScanClock(spec, ticks_per_s).between(0, _HOUR_S * ticks_per_s)[1] for spec in specs]
     ours = np.intersect1d(scans[0], scans[1]).size
-    return Case(what, formula, naive, ours, truth, "rational numbers")
+    return NumericalCase(what, formula, naive, ours, truth, "rational numbers")
 
 
 def _meetings_of_sums(first_hz: float, second_hz: float) -> int:
@@ -73,7 +73,7 @@ def _meetings_of_fractions(first_hz: Fraction, second_hz: Fraction) -> int:
     return math.ceil(_HOUR_S / every_s)
 
 
-def _firings() -> Case:
+def _firings() -> NumericalCase:
     fired, last = 0, -1.0
     for step in range(10_000):
         time_s = step * 0.1
@@ -82,7 +82,7 @@ def _firings() -> Case:
     spec = ClockSpec(Fraction(5))
     ticks_per_s = resolution(spec.exact_times())
     ours = ScanClock(spec, ticks_per_s).between(0, 1000 * ticks_per_s)[0].size
-    return Case(
+    return NumericalCase(
         "5 Hz for 1000 s: scans",
         "if t - last >= 1/f, t = k·0.1 s",
         fired,

@@ -7,7 +7,7 @@ import numpy as np
 from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, ray, reported_places
-from components.evidence.thesis.plotting import legend_below, panels
+from components.evidence.thesis.plotting import RADAR, legend_below, panels
 from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
@@ -46,7 +46,7 @@ def make() -> Made:
                 for azimuth in np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 6)):
                     one.plot(*ray(azimuth, 6.0), color="#BBBBBB", linewidth=0.5, zorder=0.5)
                 east, north = reported_places(seen[step])
-                one.plot(east, north, "o", color="#CC0000", fillstyle="none", markersize=4.5,
+                one.plot(east, north, "o", color=RADAR, fillstyle="none", markersize=4.5,
                          label="reported by radar")  # fmt: skip
                 one.set_title(f"Radar detection: azimuth resolution {step:g}°", loc="left")
                 one.set(xlim=(-4.2, 4.2), ylim=(-0.4, 5.0))

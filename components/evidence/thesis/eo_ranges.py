@@ -22,7 +22,7 @@ CLIMB_DEG = 1.4
 
 
 @dataclass(frozen=True)
-class Case:
+class EoCase:
     """One line of Table 4.4; the Boeing 787 stands for the Convair (errata 23).
 
     The simulated cell is lost in the first line, and none in the others.
@@ -53,11 +53,11 @@ class Case:
 
 
 CASES = (
-    Case("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, lost=True),
-    Case("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG),
-    Case("Level abeam", "King Air", "king_air", 90.0, 0.0),
-    Case("Level head-on", "King Air", "king_air", 180.0, 0.0),
-    Case("Level head-on", "Convair", "boeing_787", 180.0, 0.0),
+    EoCase("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, lost=True),
+    EoCase("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG),
+    EoCase("Level abeam", "King Air", "king_air", 90.0, 0.0),
+    EoCase("Level head-on", "King Air", "king_air", 180.0, 0.0),
+    EoCase("Level head-on", "Convair", "boeing_787", 180.0, 0.0),
 )
 _CLIMBING = (
     "the exact projection shows the wings of an aircraft that climbs at us, where eq. 9-13 show "
@@ -151,7 +151,7 @@ def make() -> Made:
     return Made(rows, [Picture("table_4_4", caption, draw)], {"table_4_4": data})
 
 
-def range_km(case: Case, camera: Any, model: str, *, dynamic: float = 0.0) -> float:
+def range_km(case: EoCase, camera: Any, model: str, *, dynamic: float = 0.0) -> float:
     """Return the range at which a case's signature reaches the threshold, km."""
     areas = aircraft(case.file).eo.model_dump(exclude={"silhouette_table"})
     heading, climb = math.radians(case.heading_deg), math.radians(case.climb_deg)

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from components.display.styles import styles_of
 from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
-from components.evidence.thesis.plotting import legend_below, panels
+from components.evidence.thesis.plotting import GREY, legend_below, panels
 from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
@@ -44,10 +45,13 @@ def make() -> Made:
         with panels(path, 1, 3, sharey=True, width_in=9.0, height_in=3.6) as axes:
             for one, name in zip(axes, EDGES, strict=True):
                 draw_map(one, done, fields_of_view=(name,))
-                mark(one, done, seen[name], markersize=3.5, label="detected")
+                style = styles_of([name], done.simulation.components)[name]
+                mark(one, done, seen[name], markersize=3.5, color=style.colour)
                 one.set_title(f"{name}: ±{printed('fig-4.17', name)}°", loc="left")
                 one.set(xlim=(-6.4, 6.4), ylim=(-4.4, 6.4))
-            legend_below(axes[0])
+            grey = {"color": GREY, "linestyle": "none", "fillstyle": "none", "markersize": 3.5}
+            axes[0].plot([], [], "o", **grey, label="detected (in the sensor's colour)")
+            legend_below(axes[0], without="field of view")
             for one in axes[1:]:
                 one.set_ylabel("")
 

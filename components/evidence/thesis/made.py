@@ -1,4 +1,4 @@
-"""What an item gives: rows, data, and figures that are drawn when they are asked for."""
+"""The products of an item: rows, data, and figures that are drawn when they are asked for."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

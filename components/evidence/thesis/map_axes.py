@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from components.display.fields_of_view import outline_of
-from components.evidence.thesis.plotting import BLUE, GREEN, GREY, RED
+from components.display.styles import styles_of
+from components.evidence.thesis.plotting import GREY, RADAR
 from components.evidence.thesis.scene_run import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
 
@@ -24,8 +25,10 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
     from matplotlib.patches import Polygon
 
     flights = run.flights
-    for name, colour in zip(fields_of_view, (GREEN, BLUE, RED), strict=False):
+    styles = styles_of(fields_of_view, run.simulation.components)
+    for name in fields_of_view:
         sensor: Any = run.simulation.components[name]
+        colour = styles[name].colour
         outline = outline_of(flights.start_yaw_rad, sensor.stated_reach, sensor.axes)
         if outline.closed:
             shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
@@ -40,7 +43,7 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
     for number, track in enumerate(flights.targets):
         label = "intruder" if number == 0 else None
         axes.plot(track.east_km, track.north_km, color=GREY, linewidth=1.0, label=label)
-    axes.plot([0.0], [0.0], "*", color="#0000CC", markersize=11, label="ownship", zorder=3)
+    axes.plot([0.0], [0.0], "*", color="#000000", markersize=11, label="ownship", zorder=3)
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("east [km]")
     axes.set_ylabel("north [km]")
@@ -50,7 +53,7 @@ def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> N
     """Mark where targets were when they were detected: the rows of a recorded table."""
     east, north = true_places(run, rows)
     defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
-                "color": "#CC0000", "zorder": 2}  # fmt: skip
+                "color": RADAR, "zorder": 2}  # fmt: skip
     axes.plot(east, north, **{**defaults, **style})
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from components.evidence.thesis import overtaking_flights
 from components.evidence.thesis.basis import calibrated
 from components.evidence.thesis.made import Made, Picture
-from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, legend_below, panels
+from components.evidence.thesis.plotting import FUSION, GREY, RADAR, legend_below, panels
 from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
@@ -64,10 +64,10 @@ def make() -> Made:
                     values[alone],
                     "o",
                     markersize=3,
-                    color=ORANGE,
+                    color=RADAR,
                     label="radar alone",
                 )
-                one.plot(time_s[with_eo], values[with_eo], "s", markersize=3, color=BLUE,
+                one.plot(time_s[with_eo], values[with_eo], "s", markersize=3, color=FUSION,
                          label="radar and EO")  # fmt: skip
                 one.axvline(time_s[with_eo].max(), color=GREY, linestyle=":", linewidth=1.0)
                 one.set_ylabel(label)

@@ -23,7 +23,7 @@ _DURATION_S = 260
 
 
 @dataclass(frozen=True)
-class Flight:
+class Overtaking:
     """One overtaking flight and the range within which the EO camera joins."""
 
     file: str
@@ -32,17 +32,17 @@ class Flight:
     joins_km: float
 
 
-def flown() -> list[Flight]:
+def flown() -> list[Overtaking]:
     """Run the scene fig_4_14 with every aircraft, to every side and at every height."""
     return [
-        Flight(file, left, above, _joins_km(file, left, above))
+        Overtaking(file, left, above, _joins_km(file, left, above))
         for file in AIRCRAFT
         for above in ABOVE_M
         for left in LEFT_M
     ]
 
 
-def spread(flights: list[Flight]) -> tuple[list[Row], Picture, Columns]:
+def spread(flights: list[Overtaking]) -> tuple[list[Row], Picture, Columns]:
     """Return nearest and farthest range of each aircraft, the figure and its data."""
     text = printed("fig-4.14", "joins_km")
     where = (

@@ -1,17 +1,22 @@
-"""What the figures of this package share: panels, colours, a grid."""
+"""The common parts of the figures of this package: panels, colours, a grid."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from components.display.styles import STYLES
+from components.sensor import marks
 from dsa_des.record.drawing import drawing
 
 #: Half a page.
 WIDTH_IN, HEIGHT_IN = 6.6, 3.9
 
-BLUE, ORANGE, RED, GREEN, PINK, SKY = (colour for colour, _, _ in STYLES)
+#: By kind, as in every other figure.
+RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
+#: For whatever is no kind of sensor.
+BLUE, ORANGE, RED, GREEN, PINK, SKY = (
+    "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#56B4E9",
+)  # fmt: skip
 GREY = "#777777"
 
 

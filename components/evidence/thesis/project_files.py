@@ -1,4 +1,4 @@
-"""Where the scenes, sensors and aircraft of the project's folder ``configs`` are, and reading them.
+"""Scenes, sensors and aircraft of the project's folder ``configs``, and reading them.
 
 Nothing here changes a value: every item takes one sensor's parameters from the same file.
 """

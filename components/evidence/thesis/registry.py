@@ -1,4 +1,4 @@
-"""Which results of the thesis can be made, and which function makes each."""
+"""The results of the thesis that can be made, and the function that makes each."""
 
 import importlib
 import re

@@ -56,7 +56,7 @@ class SceneRun(Recording):
 
     @cached_property
     def flights(self) -> Flights:
-        """Where everybody was."""
+        """Where all aircraft were."""
         return flights_of(self.simulation)
 
 
@@ -67,7 +67,7 @@ def _values(column: AnyArray | Text) -> AnyArray:
 
 
 def flights_of(simulation: Simulation) -> Flights:
-    """Return where everybody is.
+    """Return where all aircraft are.
 
     Raises
     ------

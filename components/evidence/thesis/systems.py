@@ -36,6 +36,14 @@ TABLE_2_3 = (
     "aircraft/medium_aircraft",
     "aircraft/large_aircraft",
 )
+
+
+def _shown(target: str) -> str:
+    """Return ``King Air`` for ``king_air``, ``large aircraft`` for ``large_aircraft``."""
+    made_by_name = {"king_air": "King Air", "convair": "Convair", "1 m2": "1 m²"}
+    return made_by_name.get(target, target.replace("_", " "))
+
+
 _COLOURS = (BLUE, ORANGE, GREEN, SKY, GREY, "#CC79A7")
 
 
@@ -60,7 +68,9 @@ def make() -> Made:
                 start = height
                 for (target, km), colour in zip(found.items(), _COLOURS, strict=False):
                     axes.barh(height, km, 0.8, color=colour)
-                    axes.annotate(f" {target}, {km:.2f} km", (km, height), va="center", fontsize=7)
+                    axes.annotate(
+                        f" {_shown(target)}, {km:.2f} km", (km, height), va="center", fontsize=7
+                    )
                     height += 1.0
                 ticks.append(0.5 * (start + height - 1.0))
                 names.append(SYSTEMS[name].replace(": ", ":\n"))

@@ -8,11 +8,12 @@ import numpy as np
 from components.display.flights import Flights
 from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Columns, Picture
-from components.evidence.thesis.plotting import BLUE, GREEN, ORANGE, legend_below, panels
+from components.evidence.thesis.plotting import EO, RADAR, legend_below, panels
 from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import Recording, flights_of, monte_carlo, scene
 from components.geometry.ellipsoid import line_of_sight_ned
+from components.geometry.wrapping import wrap_by_sines
 from dsa_des.arrays.types import FloatArray
 from dsa_des.running.simulation import Simulation
 
@@ -72,7 +73,7 @@ def make() -> tuple[list[Row], Picture, Columns]:
     def draw(path: Path) -> None:
         with panels(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, places):
             for (name, colour), label in zip(
-                (("radar", BLUE), ("eo", ORANGE)), ("radar", "EO"), strict=True
+                (("radar", RADAR), ("eo", EO)), ("radar", "EO"), strict=True
             ):
                 for quantity, style in (("azimuth", "o-"), ("elevation", "s--")):
                     values = getattr(errors[name], f"{quantity}_deg")
@@ -80,7 +81,7 @@ def make() -> tuple[list[Row], Picture, Columns]:
                     angles.plot(middle, np.hypot(mean, spread), style, color=colour, markersize=4,
                                 label=f"{label}, {quantity}")  # fmt: skip
             middle, mean, spread = radar.by_range(radar.east_m)
-            places.errorbar(middle, mean, spread, fmt="o-", color=GREEN, markersize=4,
+            places.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
             angles.set_ylabel("root mean square angle error [deg]")
             places.set_ylabel("east error of the intruder's position [m]")
@@ -119,7 +120,7 @@ def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     turned = seen["ned_azimuth_rad"] - seen["true_azimuth_rad"]
     return Errors(
         range_km=seen["true_range_m"] / 1000.0,
-        azimuth_deg=np.degrees(np.arctan2(np.sin(turned), np.cos(turned))),
+        azimuth_deg=np.degrees(wrap_by_sines(turned)),
         elevation_deg=np.degrees(seen["ned_elevation_rad"] - seen["true_elevation_rad"]),
         east_m=_east_error_m(flights, seen),
     )

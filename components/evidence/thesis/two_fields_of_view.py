@@ -6,11 +6,11 @@ import numpy as np
 
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark, true_places
-from components.evidence.thesis.plotting import BLUE, GREEN, RED, legend_below, panels
+from components.evidence.thesis.plotting import EO, FUSION, RADAR, legend_below, panels
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 
-COMBINATIONS = {"radar": ("o", GREEN), "radar+eo": ("s", RED), "eo": ("D", BLUE)}
+COMBINATIONS = {"radar": ("s", RADAR), "radar+eo": ("D", FUSION), "eo": ("o", EO)}
 
 
 def make() -> Made:

@@ -7,12 +7,12 @@ import numpy as np
 from components.evidence.thesis.basis import predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
-from components.evidence.thesis.plotting import BLUE, GREEN, RED, legend_below, panels
+from components.evidence.thesis.plotting import FUSION, IR, RADAR, legend_below, panels
 from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 
-_MARKS = {"radar": ("o", GREEN, 3.0), "ir": ("^", BLUE, 5.0), "radar+ir": ("s", RED, 5.0)}
+_MARKS = {"radar": ("s", RADAR, 3.0), "ir": ("^", IR, 5.0), "radar+ir": ("D", FUSION, 5.0)}
 
 
 def make() -> Made:

@@ -1,0 +1,120 @@
+"""Angles between directions: of azimuths and elevations, of unit vectors, of chords.
+
+Forms that differ in their last bits and in their cost, so each caller names the one it means:
+`angle_between` is right to the last digits at every separation, `angle_by_haversine` takes half
+of its time and loses digits near half a turn, and the chord serves where it is wanted itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from components.arguments.checks import FloatArray, angle, broadcast_flat, unflatten
+from components.geometry.attitude import Triple, unit_vector_unchecked
+
+
+def angle_between(
+    first_azimuth_rad: ArrayLike,
+    first_elevation_rad: ArrayLike,
+    second_azimuth_rad: ArrayLike,
+    second_elevation_rad: ArrayLike,
+) -> Any:
+    """Give the angle between two directions, exact at every separation.
+
+    atan2(|a × b|, a·b) of the two unit vectors, with cross and dot product written in differences
+    of the angles so that a small separation keeps its digits: azimuths that wrap and directions
+    near the zenith are nothing special.
+
+    Parameters
+    ----------
+    first_azimuth_rad, first_elevation_rad, second_azimuth_rad, second_elevation_rad : array_like
+        Directions in any one frame, rad.
+
+    Returns
+    -------
+    array of the broadcast shape, rad
+        In [0, pi].
+
+    Raises
+    ------
+    ValueError
+        If an angle is not finite.
+    """
+    shape, flat = broadcast_flat(
+        first_azimuth_rad=angle("first_azimuth_rad", first_azimuth_rad),
+        first_elevation_rad=angle("first_elevation_rad", first_elevation_rad),
+        second_azimuth_rad=angle("second_azimuth_rad", second_azimuth_rad),
+        second_elevation_rad=angle("second_elevation_rad", second_elevation_rad),
+    )
+    p1, q1, p2, q2 = flat
+    turn, climb = p2 - p1, q2 - q1
+    cos1, cos2, sin1 = np.cos(q1), np.cos(q2), np.sin(q1)
+    versine = 2.0 * np.square(np.sin(0.5 * turn))
+    across = cos2 * np.sin(turn)
+    upward = np.sin(climb) + sin1 * cos2 * versine
+    along = np.cos(climb) - cos1 * cos2 * versine
+    return unflatten(np.arctan2(np.hypot(across, upward), along), shape)
+
+
+def angle_by_haversine(
+    azimuth_rad: FloatArray,
+    elevation_rad: FloatArray,
+    other_azimuth_rad: FloatArray,
+    other_elevation_rad: FloatArray,
+) -> FloatArray:
+    """Give the angle between two directions by the haversine, accurate when it is small.
+
+    Parameters
+    ----------
+    azimuth_rad, elevation_rad, other_azimuth_rad, other_elevation_rad : ndarray
+        Directions in any one frame, rad, of one shape; not checked, NaN stays NaN.
+
+    Returns
+    -------
+    ndarray
+        Rad, in [0, pi]; near pi only half of the digits are right.
+    """
+    high = np.sin(0.5 * (elevation_rad - other_elevation_rad))
+    wide = np.sin(0.5 * (azimuth_rad - other_azimuth_rad))
+    share = high * high + np.cos(elevation_rad) * np.cos(other_elevation_rad) * wide * wide
+    apart: FloatArray = 2.0 * np.arcsin(np.sqrt(np.minimum(share, 1.0)))
+    return apart
+
+
+def unit_vectors(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArray:
+    """Give unit vectors in NED, components along the last axis; angles are not checked."""
+    return np.stack(unit_vector_unchecked(azimuth_rad, elevation_rad), axis=-1)
+
+
+def angle_between_vectors(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Give the angle between vectors, components along the last axis; accurate if small, too.
+
+    Parameters
+    ----------
+    one, other : ndarray
+        (..., 3), any length; not checked, NaN stays NaN.
+
+    Returns
+    -------
+    ndarray
+        (...), rad, in [0, pi].
+    """
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    apart: FloatArray = np.arctan2(across, (one * other).sum(axis=-1))
+    return apart
+
+
+def chord_between(one: Triple, other: Triple) -> FloatArray:
+    """Give the distance between the tips of two unit vectors, in [0, 2]."""
+    x, y, z = (a - b for a, b in zip(one, other, strict=True))
+    chord: FloatArray = np.sqrt(x * x + y * y + z * z)
+    return chord
+
+
+def angle_of_chord(chord: FloatArray) -> FloatArray:
+    """Give the angle between two unit vectors from the distance of their tips, rad, in [0, pi]."""
+    apart: FloatArray = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+    return apart

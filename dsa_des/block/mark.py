@@ -1,0 +1,58 @@
+"""How a block is marked in every figure: told by its class, so that figures need not know it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A colour and a marker.
+
+    Parameters
+    ----------
+    colour : str
+        ``#RRGGBB``.
+    marker : str
+        As Matplotlib names it.
+    size_pt : float
+    """
+
+    colour: str
+    marker: str
+    size_pt: float = 5.0
+
+
+#: Of blocks whose class says nothing: the colours of Okabe and Ito, and of Tol, that no class of
+#: ours has; told apart with any kind of colour vision.
+NEUTRAL = (
+    Mark("#56B4E9", "P"),
+    Mark("#777777", "X"),
+    Mark("#882255", "v"),
+    Mark("#999933", "p"),
+    Mark("#332288", "h"),
+)
+#: Markers of the second, third, ... block of a kind; the colour stays.
+_FURTHER = ("d", "<", ">", "8", "*")
+
+
+def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
+    """Return name → mark, of blocks in order of their names.
+
+    Parameters
+    ----------
+    classes : mapping
+        Name → class, which may have a `Mark` as its ``mark``; None for a name that is no block.
+    """
+    found: dict[str, Mark] = {}
+    kinds: dict[Mark, int] = {}
+    unknown = 0
+    for name in sorted(classes):
+        own = getattr(classes[name], "mark", None)
+        if not isinstance(own, Mark):
+            found[name] = NEUTRAL[unknown % len(NEUTRAL)]
+            unknown += 1
+            continue
+        again = kinds.get(own, 0)
+        kinds[own] = again + 1
+        found[name] = replace(own, marker=_FURTHER[(again - 1) % len(_FURTHER)]) if again else own
+    return found

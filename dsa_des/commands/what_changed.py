@@ -1,0 +1,197 @@
+"""What changed between two conditions, in sentences: who does what earlier, later or no longer."""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dsa_des.studies.labels import unit_of
+from dsa_des.studies.metric import EVENT, Result
+from dsa_des.studies.output import Tables
+from dsa_des.studies.printing import short
+from dsa_des.terminal.terminal import console, say
+from dsa_des.text.safe_text import printable, shortened
+
+#: Places that are told one by one, and results that a line names.
+_MOST_PLACES, _MOST_NAMED = 12, 8
+
+
+class Units:
+    """Some rows of a study: one value of a result per (encounter, replica).
+
+    Parameters
+    ----------
+    tables : Tables
+    rows : (n,)
+        Numbers of its rows.
+    """
+
+    def __init__(self, tables: Tables, rows: Any) -> None:
+        self.rows = rows
+        self.tables = tables
+        replicas = tables.rows.column("replica")[rows]
+        over = tables.rows.over
+        labels = [tuple(str(tables.rows.column(n)[r]) for n in over) for r in rows]
+        self.keys = [(*at, int(k)) for at, k in zip(labels, replicas, strict=True)]
+
+    def values(self, metric: str) -> dict[tuple[Any, ...], float]:
+        """Return unit → value; NaN where it has none."""
+        column = self.tables.rows.column(metric)[self.rows].astype(float)
+        return dict(zip(self.keys, column.tolist(), strict=True))
+
+
+Pair = tuple[Units, Units]
+
+
+@dataclass(frozen=True)
+class _Change:
+    """How a result changed over pairs of runs: in how many it fell, rose, went and came."""
+
+    result: Result
+    pairs: int
+    fell: int
+    rose: int
+    gone: int
+    come: int
+    #: Mean change where both have a value.
+    mean: float
+
+    @property
+    def any(self) -> bool:
+        return bool(self.fell or self.rose or self.gone or self.come)
+
+    def clauses(self) -> list[str]:
+        """Return what is to be said of it, in the result's own words."""
+        of, told = f" of {self.pairs} runs", self.result.told
+        assert told is not None
+        parts = [
+            f"{words} in {many:,}{of}"
+            for words, many in ((told.less, self.fell), (told.more, self.rose))
+            if many
+        ]
+        if parts and self.result.kind != EVENT:
+            parts[-1] += f" (mean {self.amount})"
+        return parts
+
+    @property
+    def amount(self) -> str:
+        """The mean change with its sign and unit."""
+        if self.mean != self.mean:
+            return ""
+        unit = unit_of(self.result.name)
+        return f"{'+' if self.mean > 0 else ''}{short(float(f'{self.mean:.3g}'))} {unit}".strip()
+
+
+def say_what_changed(
+    names: tuple[str, str], places: Sequence[tuple[str, Pair]], results: Iterable[Result]
+) -> None:
+    """Say what changed from one condition to another.
+
+    Parameters
+    ----------
+    names : (str, str)
+        Of the conditions.
+    places : sequence of (where, pair)
+        What is compared: the runs of both conditions at each place of the other axes.
+    results : iterable of Result
+        That both have.
+    """
+    results = list(results)
+    width: int = console(160).width
+    say(f"What changed from {shortened(names[0])} to {shortened(names[1])}:")
+    for where, pair in places[:_MOST_PLACES]:
+        changes = [_change(result, pair) for result in results]
+        indent = "  "
+        if where:
+            say(f"  {where}")
+            indent = "    "
+        for line in _lines(changes):
+            for part in textwrap.wrap(
+                printable(line), width, initial_indent=indent, subsequent_indent=f"{indent}  ",
+                break_long_words=False, break_on_hyphens=False,
+            ):  # fmt: skip
+                say(part)
+    if len(places) > _MOST_PLACES:
+        say(f"  ... and {len(places) - _MOST_PLACES:,} more places in the tables")
+    say()
+
+
+def _lines(changes: Sequence[_Change]) -> list[str]:
+    if not any(change.pairs for change in changes):
+        return ["nothing can be said: no run is in both"]
+    clauses: dict[str, list[str]] = {}
+    for change in changes:
+        if change.result.told is not None:
+            clauses.setdefault(change.result.told.who, []).extend(change.clauses())
+    lines = [f"{shortened(who)}: {'; '.join(said)}" for who, said in clauses.items() if said]
+    same = [shortened(who) for who, said in clauses.items() if not said]
+    if same:
+        lines.append(f"as before: {', '.join(same)}")
+    others = [change for change in changes if change.result.told is None]
+    changed = [change for change in others if change.any]
+    if changed:
+        shown = [_brief(change) for change in changed[:_MOST_NAMED]]
+        more = len(changed) - _MOST_NAMED
+        lines.append(
+            ("also changed: " if clauses else "changed: ")
+            + ", ".join(shown)
+            + (f", and {more} more" * (more > 0))
+        )
+    if len(changed) < len(others):
+        lines.append(f"{len(others) - len(changed)} other results are the same in every run")
+    return lines
+
+
+def _brief(change: _Change) -> str:
+    name = shortened(change.result.name)
+    if change.amount:
+        return f"{name} ({change.amount} on average)"
+    return f"{name} (only one of the two has it in {change.gone + change.come})"
+
+
+def _change(result: Result, pair: Pair) -> _Change:
+    first, second = pair[0].values(result.name), pair[1].values(result.name)
+    keys = [key for key in first if key in second]
+    before = np.array([first[key] for key in keys])
+    after = np.array([second[key] for key in keys])
+    known = ~np.isnan(before) & ~np.isnan(after)
+    mean = float((after[known] - before[known]).mean()) if known.any() else float("nan")
+    fell, rose = before[known] > after[known], before[known] < after[known]
+    gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
+    counts = [int(which.sum()) for which in (fell, rose, gone, come)]
+    return _Change(result, len(keys), counts[0], counts[1], counts[2], counts[3], mean)
+
+
+def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
+    """Say what changes along the axis that a study compares, from its baseline to each value.
+
+    Parameters
+    ----------
+    tables : Tables
+    only : sequence of str
+        Results to tell of; by default all.
+    """
+    if tables.baseline is None:
+        return
+    axis, baseline = tables.baseline
+    place = tables.rows.axes.index(axis)
+    by_place = dict(tables.rows.each_place())
+    found: dict[Any, list[tuple[str, Pair]]] = {}
+    for at, rows in by_place.items():
+        base = (*at[:place], baseline, *at[place + 1 :])
+        if at[place] == baseline or base not in by_place:
+            continue
+        others = [
+            f"{shortened(name)} = {short(at[k])}"
+            for k, name in enumerate(tables.rows.axes)
+            if k != place
+        ]
+        pair = Units(tables, by_place[base]), Units(tables, rows)
+        found.setdefault(at[place], []).append((", ".join(others), pair))
+    results = [result for result in tables.results if not only or result.name in only]
+    swap = axis.startswith("swap.")
+    for value, places in found.items():
+        names = [short(item) if swap else f"{axis} = {short(item)}" for item in (baseline, value)]
+        say_what_changed((names[0], names[1]), places, results)

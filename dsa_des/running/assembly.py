@@ -1,0 +1,170 @@
+"""The blocks of a scene, built and set up: with their neighbours known and their effects built."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any
+
+from dsa_des.block.component import Component, Consumer, Context, Producer
+from dsa_des.block.strangers import is_ours_to_obey, told
+from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
+from dsa_des.running.effect_plan import Planned, plan, unspent
+from dsa_des.running.loops import telling_order
+from dsa_des.running.timeline import Timeline
+from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import MAX_TICK
+
+#: Given each planned effect and what was built of it, returns what is used instead.
+WrapEffect = Callable[[Planned, Any], Any]
+
+# What a block raises, before anything runs, because of what its table says: nothing it can be
+# made of, or nothing that can be computed or held in memory.
+_REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
+
+
+class Assembly:
+    """The blocks of a scene, ready to run.
+
+    Parameters
+    ----------
+    scene : Scene
+    timeline : Timeline
+    simulate_everything : bool
+    wrap_effect : callable, optional
+
+    Raises
+    ------
+    SceneError
+        If the scene has no length, or a block cannot be built or set up.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        timeline: Timeline,
+        simulate_everything: bool,
+        wrap_effect: WrapEffect | None,
+    ) -> None:
+        self._scene = scene
+        self._everything = simulate_everything
+        self._place = telling_order(scene.graph, scene.classes)
+        self.components = self._build(timeline)
+        self.duration_s = self._duration()
+        self._offer_down_the_chain()
+        self.plan = self._plan_effects(wrap_effect)
+        self._set_up()
+
+    def _build(self, timeline: Timeline) -> dict[str, Component]:
+        components: dict[str, Component] = {}
+        problems: list[Problem] = []
+        for name, block in self._scene.blocks.items():
+            context = Context(
+                timeline.streams,
+                self._scene.ticks_per_s,
+                sections=self._scene.sections,
+                simulate_everything=self._everything,
+            )
+            with self._preparing(name, problems):
+                components[name] = block.cls(name, timeline.parameters(name), context)
+        _raise_any(problems)
+        return components
+
+    def _duration(self) -> Fraction:
+        if self._scene.duration_s is not None:
+            return self._scene.duration_s
+        lengths = [self._asked(name, "natural_duration_s") for name in self.components]
+        known = [length for length in lengths if length is not None]
+        if not known:
+            message = "is required: no block of this scene has a length of its own"
+            raise SceneError([self._scene.problem("duration_s", message)])
+        longest = max(known)
+        if longest * self._scene.ticks_per_s >= MAX_TICK:
+            message = f"is {float(longest):.4g} s by the data of its blocks: give a shorter one"
+            raise SceneError([self._scene.problem("duration_s", message)])
+        return longest
+
+    def _offer_down_the_chain(self) -> None:
+        """Tell every block what its producers offer, sources first: a block may pass it on.
+
+        It comes before effects are planned, so that a verdict may rest on it.
+        """
+        for name in sorted(self.components, key=lambda name: (self._place[name], name)):
+            self.components[name].context.producers = [
+                Producer(wire.source, wire.input, self._asked(wire.source, "offer", wire.output))
+                for wire in self._scene.wires
+                if wire.target == name
+            ]
+
+    def _plan_effects(self, wrap: WrapEffect | None) -> list[Planned]:
+        """Decide which effects exist in this run and build them."""
+        planned: list[Planned] = []
+        problems: list[Problem] = []
+        tolerance = self._scene.tolerance
+        for name, component in self.components.items():
+            component.context.duration_s = self.duration_s
+            known = len(problems)
+            with self._preparing(name, problems):
+                found = plan(component, tolerance, everything=self._everything)
+                built = {i: i.effect.build(component) for i in found if i.built}
+            if len(problems) > known:
+                continue
+            planned += found
+            if not self._everything:
+                component.context.tolerance = unspent(found, tolerance)
+            component.context.effects = {
+                item.effect.name: effect if wrap is None else wrap(item, effect)
+                for item, effect in built.items()
+            }
+        _raise_any(problems)
+        return planned
+
+    def _set_up(self) -> None:
+        problems: list[Problem] = []
+        for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
+            component = self.components[name]
+            component.context.consumers = [
+                Consumer(wire.target, wire.input, self._asked(wire.target, "request", wire.input))
+                for wire in self._scene.wires
+                if wire.source == name
+            ]
+            with self._preparing(name, problems):
+                component.setup()
+        _raise_any(problems)
+
+    @contextmanager
+    def _preparing(self, name: str, problems: list[Problem]) -> Iterator[None]:
+        """Make what a block raises before the run an error that names it."""
+        try:
+            yield
+        except (SceneError, BlockFailure, RunRefused):
+            raise
+        except _REFUSALS as error:
+            problems.append(self._scene.problem(f"blocks.{name}", reason_of(error)))
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            path = self._scene.blocks[name].cls.path()
+            raise SetupFailure(name, path, 0.0, None, told(error)) from error
+
+    def _asked(self, name: str, what: str, *arguments: Any) -> Any:
+        """Return what a method of a block returns before the run."""
+        problems: list[Problem] = []
+        answer = None
+        with self._preparing(name, problems):
+            answer = getattr(self.components[name], what)(*arguments)
+        _raise_any(problems)
+        return answer
+
+
+def _raise_any(problems: list[Problem]) -> None:
+    if problems:
+        raise SceneError(problems)
+
+
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, with its kind where its text alone says little."""
+    if isinstance(error, ArithmeticError):
+        return f"its numbers are too large or too small to be computed with ({error})"
+    if isinstance(error, MemoryError):
+        return f"needs more memory than there is ({error})" if str(error) else "needs more memory"
+    return str(error)

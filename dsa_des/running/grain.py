@@ -1,0 +1,67 @@
+"""At which grain each block of a scene runs: scan by scan, in windows, or in windows rewound."""
+
+from dataclasses import dataclass, field
+
+from dsa_des.errors import SceneError
+from dsa_des.running.loops import cannot_rewind, cut_loops
+from dsa_des.scene.graph import in_cycles, window_order
+from dsa_des.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Grain:
+    """How the blocks of a run take windows.
+
+    Parameters
+    ----------
+    windowed : set of str
+        Blocks that handle a whole window at its start; the others run at their own ticks in it.
+    rewinds : bool
+        Whether windows are run as if nothing came back, and undone if something did.
+    cut_edges : set of (source, target)
+        Over which something may come back.
+    unwound : dict
+        Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
+    queues : dict
+        Shared processors that serve a window at once, and the blocks that line up at each.
+    """
+
+    windowed: set[str]
+    rewinds: bool
+    cut_edges: set[tuple[str, str]]
+    unwound: dict[str, str]
+    queues: dict[str, list[str]] = field(default_factory=dict)
+
+    def order(self, scene: Scene) -> dict[str, int]:
+        """Return the place of each block and each queue in a window (`window_order`)."""
+        return window_order(scene.graph, self.windowed, self.cut_edges, self.queues)
+
+
+def grain_of(scene: Scene, window: int | None, check_rewinding: bool) -> Grain:
+    """Return at which grain the blocks of a scene run; see `Simulation` for the parameters.
+
+    Raises
+    ------
+    SceneError
+        If rewinding is to be checked where nothing can be rewound.
+    """
+    queued = {name for name, block in scene.blocks.items() if block.options.processor}
+    unwound = cannot_rewind(scene.classes, queued)
+    if window != 1 and not unwound and (check_rewinding or in_cycles(scene.graph)):
+        return Grain(set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound)
+    if check_rewinding:
+        raise _nothing_rewinds(scene, unwound)
+    if window == 1:
+        return Grain(set(), False, set(), unwound)
+    queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
+    return Grain(scene.look_ahead_blocks(), False, set(), unwound, queues)
+
+
+def _nothing_rewinds(scene: Scene, unwound: dict[str, str]) -> SceneError:
+    said = "check_rewinding: nothing is rewound in this scene"
+    if not unwound:
+        return SceneError([scene.problem("blocks", f"{said} with a window of one scan")])
+    return SceneError(
+        scene.problem(f"blocks.{name}.type", f"{said}: {scene.classes[name].path()} {why}")
+        for name, why in unwound.items()
+    )

@@ -1,0 +1,70 @@
+"""The files of the folders that packages ship: scenes, studies and parts of them, by name.
+
+A package registers a function under the entry-point group `GROUP`. It takes nothing and returns
+the folder of its scenes and studies.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from dsa_des.block.entry_points import registered
+from dsa_des.block.foreign import installed
+from dsa_des.block.strangers import Left, strangers_code
+from dsa_des.errors import UsageError
+
+#: The entry points of functions that return a folder of scenes and studies.
+GROUP = "dsa_des.examples"
+
+
+def folders() -> list[Path]:
+    """Return the folders of examples of all installed packages.
+
+    Raises
+    ------
+    UsageError
+        If one of them cannot be asked.
+    """
+    found = []
+    for point in registered(GROUP).values():
+        try:
+            with strangers_code(UsageError):
+                found.append(Path(installed(point)()))
+        except Left as error:
+            message = f"{GROUP}: {point.name} gives no folder: {error}"
+            raise UsageError(message) from error.__cause__
+    return [folder for folder in found if folder.is_dir()]
+
+
+def shipped_files() -> Iterator[tuple[PurePosixPath, Path]]:
+    """Yield every TOML file of the folders with its place there, without ``.toml``."""
+    for folder in folders():
+        for path in sorted(folder.rglob("*.toml")):
+            yield PurePosixPath(path.relative_to(folder).with_suffix("").as_posix()), path
+
+
+def files_named(name: str) -> list[Path]:
+    """Return the shipped files that a name may mean.
+
+    Parameters
+    ----------
+    name : str
+        ``first_light``, ``systems/oasys``, with ``.toml`` or without.
+
+    Returns
+    -------
+    list of Path
+        The one of that place, or all of that stem.
+
+    Raises
+    ------
+    UsageError
+        If a package that registered a folder cannot be asked.
+    """
+    wanted = PurePosixPath(name.removesuffix(".toml"))
+    if not wanted.name or wanted.is_absolute() or ".." in wanted.parts:
+        return []
+    files = list(shipped_files())
+    whole = [path for place, path in files if place == wanted]
+    if whole or len(wanted.parts) > 1:
+        return whole[:1]
+    return [path for place, path in files if place.name == wanted.name]

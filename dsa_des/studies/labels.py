@@ -1,0 +1,73 @@
+"""Labels of a study's figures: ``Radar scan rate (Hz)`` for ``blocks.radar.scan_rate_hz``."""
+
+import re
+
+from dsa_des.record.drawing import figure_text
+
+#: How units at the end of a name are written.
+_UNITS = {
+    "s": "s", "m": "m", "km": "km", "hz": "Hz", "deg": "°", "rad": "rad", "mps": "m/s", "m2": "m²",
+    "db": "dB", "dbsm": "dBsm", "dbm": "dBm", "ppm": "ppm", "w": "W", "k": "K", "ft": "ft",
+    "px": "px", "pixels": "pixels", "percent": "%", "mrad": "mrad", "mm": "mm",
+}  # fmt: skip
+#: Units of two words, such as ``mm_per_h``.
+_PER = re.compile(r"_([a-z]+2?)_per_([a-z]+)$")
+#: Words of two letters that are none but words.
+_WORDS = {"at", "by", "in", "is", "no", "of", "on", "or", "to", "up"}
+_CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
+
+
+def unit_of(name: str) -> str:
+    """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
+    return _split(name.partition(".")[0])[1]
+
+
+def readable(name: str) -> str:
+    """Return ``Declaration range, radar (m)`` for ``declaration_range_m.radar``."""
+    words, _, who = name.partition(".")
+    words, unit = _split(words)
+    what = _capital(_spaced(words)) + (f", {_spaced(who)}" if who else "")
+    return figure_text(f"{what} ({unit})" if unit else what, 60)
+
+
+def axis_label(key: str) -> str:
+    """Return ``Radar scan rate (Hz)`` for ``radar.scan_rate_hz``, ``Type of fusion`` for a swap."""
+    if key.startswith("swap."):
+        return figure_text(f"Type of {_spaced(key.removeprefix('swap.'))}", 60)
+    words, unit = _split(key.removeprefix("blocks."))
+    label = _capital(_spaced(words.replace(".", " ")))
+    return figure_text(f"{label} ({unit})" if unit else label, 60)
+
+
+def value_label(axis: str, value: object) -> str:
+    """Return ``radar scan rate 5 Hz`` for a value of an axis; a text is its own label."""
+    if not isinstance(value, int | float):
+        return figure_text(value)
+    words, unit = _split(axis)
+    name = _spaced(words.replace(".", " "))
+    return figure_text(f"{name} {value:g}{'' if unit in ('', '°') else ' '}{unit}", 40)
+
+
+def _split(name: str) -> tuple[str, str]:
+    """Return a name without its unit, and the unit as it is written."""
+    found = _PER.search(name)
+    if found:
+        above, below = (_UNITS.get(part, part) for part in found.groups())
+        return name[: found.start()], f"{above}/{below}"
+    rest, _, ending = name.rpartition("_")
+    return (rest, _UNITS[ending]) if rest and ending in _UNITS else (name, "")
+
+
+def _spaced(name: str) -> str:
+    words = name.replace("_", " ").split(" ")
+    return " ".join(word.upper() if _short(word) else word for word in words)
+
+
+def _short(word: str) -> bool:
+    """Return whether a word is an abbreviation: IR, RCS, SNR."""
+    two = len(word) == 2 and word.isalpha() and word not in _WORDS
+    return two or bool(_CONSONANTS.fullmatch(word))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

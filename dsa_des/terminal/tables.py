@@ -1,0 +1,205 @@
+"""Tables that keep their column names on a narrow terminal.
+
+A table that fits is printed as it is. One that does not loses its group column first, whose values
+become lines above their rows; then headings are folded where their words end, then long values;
+and where not even that is enough, each row is a list of ``heading: value``.
+"""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
+
+from dsa_des.text.safe_text import printable
+
+_GAP = 2
+#: Narrower than this no value is folded.
+_LEAST = 8
+#: What is not folded: a word with the signs behind it, a number with its point and its asterisk.
+_PIECES = re.compile(r"(?:\.\d|-\d| \*|[^\s_./\]-])*(?:(?!\.\d|-\d| \*)[\s_./\]-])*")
+
+Row = Sequence[str]
+
+
+def print_table(
+    console: Any,
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Row],
+    *,
+    group: int | None = None,
+    below: int | None = None,
+    right: Collection[int] = (),
+    notes: Mapping[str, str] | None = None,
+) -> None:
+    """Print a table, no wider than the console.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+    title : str
+    headings : sequence of str
+    rows : sequence of sequence of str
+        One text per heading; a column without any text is left out.
+    group : int, optional
+        Number of the column that may become lines above the rows that share its value.
+    below : int, optional
+        Number of the column that may stand in lines below its row; for a table without groups.
+    right : collection of int
+        Columns that are flush right; for a table without groups.
+    notes : mapping, optional
+        Value of the group column → what is said behind it in such a line.
+    """
+    names = [printable(heading) for heading in headings]
+    cells = [[printable(cell) for cell in row] for row in rows]
+    used = [k for k in range(len(names)) if not cells or any(row[k] for row in cells)]
+    names, cells = [names[k] for k in used], [[row[k] for k in used] for row in cells]
+    group = used.index(group) if group in used and cells else None
+    right = [used.index(k) for k in right if k in used]
+    _put_folded(console, printable(title), "italic")
+    if group is None or _total(_natural(names, cells)) <= console.width:
+        notes_below = [""] * len(cells)
+        if below in used and _total(_natural(names, cells)) > console.width:
+            at = used.index(below)
+            notes_below = [row[at] for row in cells]
+            names = [*names[:at], *names[at + 1 :]]
+            cells = [[*row[:at], *row[at + 1 :]] for row in cells]
+            right = [k - (k > at) for k in right if k != at]
+        _print_rows(console, names, cells, right, notes_below)
+        return
+    kept = [k for k in range(len(names)) if k != group]
+    together: dict[str, list[list[str]]] = {}
+    for row in cells:
+        together.setdefault(row[group], []).append([row[k] for k in kept])
+    short = [names[k] for k in kept]
+    for name, some in together.items():
+        note = (notes or {}).get(name, "")
+        _put(console)
+        _put_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
+        used = [k for k in range(len(short)) if any(row[k] for row in some)]
+        shown = [[row[k] for k in used] for row in some]
+        _print_rows(console, [short[k] for k in used], shown)
+
+
+def _print_rows(
+    console: Any,
+    names: list[str],
+    cells: list[list[str]],
+    right: Collection[int] = (),
+    below: Sequence[str] = (),
+) -> None:
+    layout = _layout(names, cells, console.width)
+    if not layout.widths:
+        _print_lists(console, names, cells)
+        return
+    _print_line(console, names, layout, right, "bold")
+    for row, note in zip_longest(cells, below, fillvalue=""):
+        _print_line(console, row, layout, right)
+        for line in fold(note, console.width - 4) if note else ():
+            _put(console, f"    {line}")
+
+
+def _print_line(
+    console: Any, texts: Sequence[str], layout: "_Layout", right: Collection[int], style: str = ""
+) -> None:
+    widths = layout.widths
+    folded = [fold(text, width) for text, width in zip(texts, widths, strict=True)]
+    for number in range(max(map(len, folded), default=0)):
+        parts = [
+            _padded(lines[number] if number < len(lines) else "", width, k in right)
+            for k, (lines, width) in enumerate(zip(folded, widths, strict=True))
+        ]
+        _put(console, (" " * layout.gap).join(parts).rstrip(), style)
+
+
+def _print_lists(console: Any, names: list[str], cells: list[list[str]]) -> None:
+    """Print each row as a list, its empty values left out."""
+    for number, row in enumerate(cells):
+        if number:
+            _put(console)
+        for name, cell in zip(names, row, strict=True):
+            if cell:
+                _put_folded(console, f"{name}: {cell}")
+
+
+def _put_folded(console: Any, text: str, style: str = "") -> None:
+    for line in fold(text, console.width):
+        _put(console, line, style)
+
+
+def _put(console: Any, text: str = "", style: str = "") -> None:
+    from rich.text import Text
+
+    console.print(Text(text, style=style), soft_wrap=True, highlight=False)
+
+
+def fold(text: str, width: int) -> list[str]:
+    """Return a text in lines of at most `width`, folded where its words end if they are short."""
+    if _length(text) <= width:
+        return [text]
+    lines = [""]
+    for piece in filter(None, _PIECES.findall(text)):
+        if _length(lines[-1] + piece.rstrip()) <= width:
+            lines[-1] += piece
+            continue
+        if lines[-1]:
+            lines.append("")
+        while _length(piece.rstrip()) > width:
+            cut = max(1, next((k for k in range(1, len(piece)) if _length(piece[: k + 1]) > width),
+                              len(piece)))  # fmt: skip
+            lines[-1] = piece[:cut]
+            lines.append("")
+            piece = piece[cut:]
+        lines[-1] = piece
+    return [line.rstrip() for line in lines if line.strip()] or [""]
+
+
+def _length(text: str) -> int:
+    from rich.cells import cell_len
+
+    return cell_len(text)
+
+
+def _padded(text: str, width: int, right: bool) -> str:
+    blanks = " " * (width - _length(text))
+    return blanks + text if right else text + blanks
+
+
+def _total(widths: Sequence[int], gap: int = _GAP) -> int:
+    return sum(widths) + gap * (len(widths) - 1)
+
+
+def _natural(names: list[str], cells: list[list[str]]) -> list[int]:
+    every = [names, *cells]
+    return [max(_length(row[k]) for row in every) for k in range(len(names))]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """The width of each column and of what is between them; no widths where nothing fits."""
+
+    widths: list[int]
+    gap: int
+
+
+def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
+    widths = _natural(names, cells)
+    of_cells = [max((_length(row[k]) for row in cells), default=0) for k in range(len(names))]
+    of_words = [
+        max((_length(piece.rstrip()) for piece in _PIECES.findall(name)), default=0)
+        for name in names
+    ]
+    least = [max(one, other) for one, other in zip(of_cells, of_words, strict=True)]
+    narrow = [max(min(one, _LEAST), other) for one, other in zip(of_cells, of_words, strict=True)]
+    for floors, gap in ((least, _GAP), (least, 1), (narrow, 1)):
+        while _total(widths, gap) > most:
+            spare = [width - floor for width, floor in zip(widths, floors, strict=True)]
+            if max(spare, default=0) <= 0:
+                break
+            # The widest of those that can give: headings get as many lines as they need.
+            at = max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))
+            widths[at] -= 1
+        if _total(widths, gap) <= most:
+            return _Layout(widths, gap)
+    return _Layout([], 1)

@@ -1,0 +1,45 @@
+"""The pairs of the benchmark: the two forms differ in what they are said to differ in."""
+
+import pytest
+
+from components.evidence.benchmark.pairs import PAIRS, measured
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.running.simulation import Simulation
+
+FORMS = {pair.name: pair.forms(pair.case, False) for pair in PAIRS}
+
+
+def run(scene, **options):
+    memory = MemorySink()
+    simulation = Simulation(scene, recorder=Recorder([memory]), **options)
+    simulation.run()
+    return simulation, memory.tables()
+
+
+def test_effects_that_are_not_called_for_are_gone_and_nothing_else_is():
+    scene, bare = FORMS["unused_effects"]
+    (with_them, tables), (without, same) = run(scene), run(bare)
+    declared = [item for item in with_them.plan if not item.built]
+    assert len(declared) > 20
+    assert [item.effect.name for item in without.plan] == [
+        item.effect.name for item in with_them.plan if item.built
+    ]
+    assert tables.keys() == same.keys()
+    assert all(tables[name].equals(same[name]) for name in tables)
+
+
+def test_the_three_sensors_share_one_processor_that_keeps_up():
+    shared, plain = FORMS["shared_processor"]
+    simulation, tables = run(shared)
+    assert not plain.processors
+    assert set(tables["processing"]["block"].to_pylist()) == {"eo", "ir", "radar"}
+    assert max(tables["processing"]["queue_length"].to_pylist()) <= 2
+    assert {"fusion", "tracker"} <= {n for n, node in simulation.nodes.items() if node.windowed}
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: pair.name)
+def test_a_pair_is_measured(pair):
+    row = measured(pair, quick=True, repeats=1)
+    low, high = row["times_quartiles"]
+    assert 0.0 < low <= row["times"] <= high
+    assert row["wanted"] == pair.wanted

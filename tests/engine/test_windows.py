@@ -1,0 +1,121 @@
+"""Windows of every kind keep one contract, and which kind a run goes through changes no byte."""
+
+import random
+
+import numpy as np
+import pytest
+
+from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.windows import ReplicaWindows
+from dsa_des.running.pacing import PacedWindows, Pacer
+from dsa_des.running.simulation import Simulation
+from dsa_des.running.timeline import Timeline
+from dsa_des.running.windows import EqualWindows, Window
+from dsa_des.scene.scene import load_scene
+from dsa_des.time.timeline import ReplicaTime
+
+LOOP = "configs/benchmark/manoeuvres.toml"
+
+
+def all_of(windows):
+    found = []
+    while (window := windows.next()) is not None:
+        assert windows.heard(window, None) == window.end
+        found.append(tuple(window[:2]))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("longest", "cuts", "expected"),
+    [
+        (4, (), [(0, 4), (4, 8), (8, 10)]),
+        (10, (), [(0, 10)]),
+        (99, (3, 7), [(0, 3), (3, 7), (7, 10)]),
+        (99, (0, 10, 12), [(0, 10)]),
+    ],
+)
+def test_equal_windows_cover_a_run_once(longest, cuts, expected):
+    assert all_of(EqualWindows(10, longest, cuts)) == expected
+    windows = EqualWindows(10, longest, cuts)
+    windows.limit(0)  # no window is shorter than a tick
+    assert all_of(windows) == [(k, k + 1) for k in range(10)]
+
+
+@pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
+@pytest.mark.parametrize("cuts", [(), (3, 15, 40, 71)])
+def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest, cuts):
+    time = ReplicaTime.end_to_end(4, 10)
+    found = all_of(ReplicaWindows(time, longest, cuts))
+    ticks = np.concatenate([np.arange(*window) for window in found])
+    ran = ticks[ticks % time.span_ticks < time.run_ticks]
+    starts = np.arange(4)[:, None] * time.span_ticks
+    assert ran.tolist() == (starts + np.arange(10)).ravel().tolist()
+    assert all(start % time.span_ticks < time.run_ticks for start, _ in found)
+    if not cuts:
+        assert len(found) == {1: 40, 3: 16, 10: 4, 25: 2, 1000: 1}[longest]
+
+
+class Wilful(Timeline):
+    """One run in windows of lengths that a die throws."""
+
+    def windows(self, longest_ticks, cuts, rewinder):
+        inner = super().windows(longest_ticks, cuts, rewinder)
+        self.made = WilfulWindows(inner)
+        return self.made
+
+
+class WilfulWindows:
+    def __init__(self, inner):
+        self.inner, self.dice, self.seen = inner, random.Random(5), []
+
+    def limit(self, longest_ticks):
+        self.inner.limit(longest_ticks)
+
+    def next(self):
+        self.inner.limit(self.dice.randrange(10**9, 20 * 10**9))
+        return self.inner.next()
+
+    def heard(self, window, failure):
+        assert failure is None and isinstance(window, Window)
+        self.seen.append(window)
+        return self.inner.heard(window, failure)
+
+
+@pytest.mark.parametrize("sets", [[], ["blocks.avoidance.pause_s=5"]])
+def test_windows_of_ones_own_need_no_other_simulation(sets):
+    scene = load_scene(LOOP, sets=["blocks.traffic.intruders=4", *sets], duration_s="30")
+    tables = []
+    for timeline in (None, Wilful(scene)):
+        sink = ColumnSink()
+        Simulation(scene, timeline=timeline, recorder=Recorder([sink])).run()
+        tables.append(sink.tables())
+    assert len(timeline.made.seen) > 2 and all(w.provisional for w in timeline.made.seen)
+    for name, columns in tables[0].items():
+        assert columns["tick"].tolist() == tables[1][name]["tick"].tolist(), name
+        for column, values in columns.items():
+            if isinstance(values, np.ndarray):
+                assert values.tobytes() == tables[1][name][column].tobytes(), (name, column)
+
+
+def test_a_pacer_waits_for_what_is_final_only():
+    """It starts with the first window; one that does not stand is waited for by none."""
+    waits = []
+
+    class Undecided(EqualWindows):
+        tries = 0
+
+        def heard(self, window, failure):
+            self.tries += 1
+            return super().heard(window, failure) if self.tries % 2 == 0 else None
+
+    now = [50.0]
+    pacer = Pacer(2.0, lambda: now[0], lambda s: (waits.append(s), now.__setitem__(0, now[0] + s)))
+    windows = PacedWindows(Undecided(40, 99), pacer, ticks_per_s=100)
+    now[0] = 70.0  # until the first window is asked for, no time goes by
+    ran = []
+    while (window := windows.next()) is not None:
+        ran.append(window.end)
+        windows.heard(window, None)
+    assert ran == [20, 20, 40, 40]  # 0.1 s of wall time at twice its speed
+    assert waits == pytest.approx([0.1, 0.1])
+    assert pacer.windows == 2

@@ -1,0 +1,119 @@
+"""A block whose author never heard of replicas gives, among replicas, what it gives by itself."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from components.radar.swerling import SwerlingRadar
+from components.radar.weather_effects import Rain
+from components.tracking.stub import TrackerStub
+from dsa_des.block.component import Component
+from dsa_des.block.ports import Input
+from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.scene.scene import load_scene
+
+FIRST_LIGHT = "configs/first_light.toml"
+WITH_ECHO = """wires = [
+    "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "gate -> ir",
+    "radar -> fusion", "eo -> fusion", "ir -> fusion", "fusion -> tracker -> echo",
+]"""
+SOUTH = [
+    "blocks.traffic.ownship.heading_deg=217",
+    "blocks.traffic.ownship.lat_deg=-33.9",
+    "blocks.traffic.intruders[0].north_m=-3000",
+    "blocks.traffic.intruders[0].east_m=-2300",
+    "blocks.traffic.intruders[0].heading_deg=37",
+]
+
+
+class CountingTracker(TrackerStub):
+    """Forgets every track but each third: state in an attribute, of a block that has none."""
+
+    seen = 0
+
+    def run(self, wake):
+        tracks = super().run(wake)
+        if tracks is None:
+            return None
+        numbers = self.seen + np.arange(1, len(tracks) + 1)
+        self.seen += len(tracks)
+        return tracks.take(np.flatnonzero(numbers % 3 == 0))
+
+
+class TiringRadar(SwerlingRadar):
+    """Sees every other scan only."""
+
+    scans = 0
+
+    def run(self, wake):
+        sent = super().run(wake)
+        if sent is None:
+            return None
+        numbers = self.scans + np.arange(len(sent))
+        self.scans += len(sent)
+        return sent.take(np.flatnonzero(numbers % 2 == 0))
+
+
+class MyRain(Rain):
+    """Says nothing of replicas, so what it builds serves one."""
+
+
+class WetRadar(SwerlingRadar):
+    """Says that it serves all, but one of its effects does not."""
+
+    lockstep = True
+    effects = tuple(MyRain() if type(e) is Rain else e for e in SwerlingRadar.effects)
+
+
+class Echo(Component):
+    """Declares nothing but that it takes windows: sends its tracks on, numbered from 1."""
+
+    inputs = {"tracks": Input(TrackerStub.outputs["tracks"].message, "trigger")}
+    outputs = {"tracks": TrackerStub.outputs["tracks"]}
+    windowed = True
+
+    def setup(self):
+        self.last_s = None
+
+    def run(self, wake):
+        tracks = wake["tracks"]
+        kept = []
+        for row, time_s in enumerate(wake.time_s):
+            if self.last_s is None or time_s - self.last_s >= 0.7:
+                self.last_s, _ = time_s, kept.append(row)
+        return tracks.take(np.array(kept)) if kept else None
+
+
+@pytest.mark.parametrize(
+    ("block", "kind", "sets"),
+    [
+        ("tracker", CountingTracker, []),
+        ("radar", TiringRadar, []),
+        ("radar", WetRadar, ["weather.rain_rate_mm_h=8"]),
+        ("echo", Echo, []),
+    ],
+)
+@pytest.mark.parametrize("window", [None, 90])
+def test_state_of_an_ordinary_block_stays_with_its_replica(
+    lock, tmp_path, block, kind, sets, window
+):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        f"""
+        extends = "{Path(FIRST_LIGHT).resolve()}"
+        {WITH_ECHO if kind is Echo else ""}
+        blocks.{block}.type = "{__name__}:{kind.__name__}"
+        """
+    )
+    scene = load_scene(path, sets=[*SOUTH, *sets], duration_s="12")
+    scenes = [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
+    simulation = lock.same_as_alone(scenes, window=window)
+    assert list(simulation.timeline.split) == [block]
+
+
+def test_a_subclass_says_for_itself_that_it_serves_all_replicas():
+    for base in (TrackerStub, Rain):
+        assert base.lockstep
+        assert not type("Silent", (base,), {}).lockstep
+        assert type("Outspoken", (base,), {"lockstep": True}).lockstep

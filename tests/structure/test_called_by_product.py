@@ -1,0 +1,53 @@
+"""Public functions and classes that no product code names: the docs say they are for users."""
+
+import ast
+import re
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def trees() -> dict[Path, ast.Module]:
+    paths = [p for room in ("dsa_des", "components") for p in sorted((ROOT / room).rglob("*.py"))]
+    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in paths}
+
+
+def words(tree: ast.Module) -> Counter[str]:
+    """Names, attributes and words of texts that are neither docstrings nor lists of exports."""
+    left_out = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            left_out |= {id(part) for part in ast.walk(node)}
+    found: Counter[str] = Counter()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            found[node.id] += 1
+        elif isinstance(node, ast.Attribute):
+            found[node.attr] += 1
+        elif isinstance(node, ast.Constant) and id(node) not in left_out:
+            found.update(re.findall(r"\w+", str(node.value)))
+    return found
+
+
+def uncalled(of: dict[Path, ast.Module], registered: str) -> set[str]:
+    used = sum((words(tree) for tree in of.values()), Counter(re.findall(r"\w+", registered)))
+    public = (ast.FunctionDef, ast.ClassDef)
+    return {
+        node.name
+        for tree in of.values()
+        for node in tree.body
+        if isinstance(node, public) and not node.name.startswith("_") and not used[node.name]
+    }
+
+
+def test_what_only_tests_call_is_said_to_be_for_users():
+    page = (ROOT / "docs" / "reference" / "physics.md").read_text(encoding="utf-8")
+    said = set(re.findall(r"\.(\w+)`", page))
+    found = uncalled(trees(), (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert found <= said
+
+
+def test_a_function_that_nothing_calls_is_found():
+    tree = ast.parse("__all__ = ['lonely']\ndef lonely(): ...\ndef used(): ...\nused()\n")
+    assert uncalled({Path("one.py"): tree}, "") == {"lonely"}

@@ -1,0 +1,96 @@
+"""A calibrated radar has the stated Pd at the stated range, by the model it was stated for."""
+
+import math
+
+import pytest
+from scipy.optimize import brentq
+from scipy.special import chndtr
+from wired import Row, chain, rows, run
+
+PFA = 1e-3
+OWN = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400, "heading_deg": 217, "roll_deg": -27}
+RADAR = {
+    "scan_rate_hz": 20, "power_w": 50.0, "antenna_gain_db": 28.0, "wavelength_m": 0.03,
+    "false_alarm_probability": PFA,
+}  # fmt: skip
+
+
+def pd_of(snr: float, swerling: int) -> float:
+    """Pd of one pulse in closed form (steady: Marcum's Q; I, II: Rayleigh; III, IV: chi-square)."""
+    threshold = -math.log(PFA)
+    if swerling in (0, 5):
+        return float(1.0 - chndtr(2.0 * threshold, 2, 2.0 * snr))
+    if swerling in (1, 2):
+        return math.exp(-threshold / (1.0 + snr))
+    half = 0.5 * snr
+    return math.exp(-threshold / (1.0 + half)) * (1.0 + threshold * half / (1.0 + half) ** 2)
+
+
+def needed_db(pd: float, swerling: int) -> float:
+    return 10.0 * math.log10(brentq(lambda snr: pd_of(snr, swerling) - pd, 1e-3, 1e6, xtol=1e-12))
+
+
+def at(range_m: float, rcs_dbsm: float, swerling: int) -> dict:
+    """A target to the south-west at a slant range; its bearing is close to the nose's."""
+    east_m, north_m, up_m = -0.6 * range_m, -0.64 * range_m, 0.48 * range_m
+    scale = range_m / math.hypot(east_m, north_m, up_m)
+    return {
+        "name": "one", "east_m": east_m * scale, "north_m": north_m * scale, "up_m": up_m * scale,
+        "rcs_dbsm": rcs_dbsm, "swerling": swerling,
+    }  # fmt: skip
+
+
+def seen(scene: dict) -> Row | None:
+    """The first detection in 20 scans; nothing moves, so all look the same."""
+    found = rows(run(scene))
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize("swerling", [0, 1, 2, 3, 4, 5])
+def test_pd_at_the_stated_range(swerling):
+    """The target fluctuates as the calibration says: Pd there is the stated one."""
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.83, "swerling": swerling}
+    radar = {**RADAR, "type": "radar.swerling", "calibrate": calibrate}
+    scene = chain({"radar": radar}, ownship=OWN, targets=[at(4200, 5.0, swerling)])
+    row = seen(scene)
+    assert row is not None
+    assert row["detection_probability"] == pytest.approx(0.83, abs=1e-6)
+    assert row["snr_db"] == pytest.approx(needed_db(0.83, swerling), abs=1e-5)
+
+
+@pytest.mark.parametrize("calibrated", [0, 1, 3])
+@pytest.mark.parametrize("target", [0, 1, 3])
+def test_another_target_has_its_own_pd_at_the_calibrated_snr(calibrated, target):
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.83, "swerling": calibrated}
+    radar = {**RADAR, "type": "radar.swerling", "calibrate": calibrate}
+    nearer = 10.0 ** (-4.0 / 40.0)  # 4 dB less RCS have the same SNR so much nearer
+    scene = chain({"radar": radar}, ownship=OWN, targets=[at(4200 * nearer, 1.0, target)])
+    row = seen(scene)
+    assert row is not None
+    assert row["snr_db"] == pytest.approx(needed_db(0.83, calibrated), abs=1e-5)
+    expected = pd_of(10.0 ** (row["snr_db"] / 10.0), target)
+    assert row["detection_probability"] == pytest.approx(expected, rel=1e-9)
+    reference = row["snr_db"] - needed_db(0.9, target)
+    assert row["confidence"] == pytest.approx(reference, abs=1e-5)
+
+
+@pytest.mark.parametrize("swerling", [0, 1, 3])
+@pytest.mark.parametrize(("range_m", "detected"), [(4195, True), (4205, False)])
+def test_a_threshold_radar_s_limit_is_the_calibrated_range(swerling, range_m, detected):
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.4, "swerling": swerling}
+    radar = {**RADAR, "type": "radar.threshold", "calibrate": calibrate}
+    scene = chain({"radar": radar}, ownship=OWN, targets=[at(range_m, 5.0, 1)])
+    row = seen(scene)
+    assert (row is not None) is detected
+    if row is not None:
+        margin = 40.0 * math.log10(4200 / range_m)
+        assert row["confidence"] == pytest.approx(margin, abs=1e-5)
+        assert row["snr_db"] == pytest.approx(needed_db(0.4, swerling) + margin, abs=1e-5)
+
+
+def test_without_a_calibration_the_threshold_is_that_of_pd_0_9():
+    radar = {**RADAR, "type": "radar.threshold", "bandwidth_hz": 1e4}
+    scene = chain({"radar": radar}, ownship=OWN, targets=[at(1000, 5.0, 0)])
+    row = seen(scene)
+    assert row is not None
+    assert row["snr_db"] - row["confidence"] == pytest.approx(needed_db(0.9, 1), abs=1e-5)

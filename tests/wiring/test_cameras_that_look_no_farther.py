@@ -1,0 +1,41 @@
+"""A camera leaves out what it could never see, and nothing else."""
+
+import crooked
+import pytest
+from wired import chain, rows, run, sensor
+
+import dsa_des
+
+#: Warm from behind only, or visible only: the other band would say another range.
+BODIES = {
+    "behind": ({"front_m2": 0.1, "side_m2": 0.0, "horizontal_m2": 0.0},
+               {"front_m2": 0.1, "back_m2": 80.0, "side_m2": 0.0, "horizontal_m2": 0.0}),
+    "visible": ({"front_m2": 5.0, "side_m2": 40.0, "horizontal_m2": 90.0},
+                {"front_m2": 0.1, "back_m2": 0.1, "side_m2": 0.0, "horizontal_m2": 0.0}),
+    "warm": ({"front_m2": 0.1, "side_m2": 0.0, "horizontal_m2": 0.0},
+             {"front_m2": 5.0, "back_m2": 5.0, "side_m2": 40.0, "horizontal_m2": 90.0}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("bodies", list(BODIES))
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [
+        ("optical.eo", "contrast"),
+        ("optical.ir", "contrast_ir"),
+        ("optical.projection", "contrast"),
+    ],
+)
+def test_what_is_just_detected_is_not_left_out(bodies, kind, key):
+    """At a threshold just below its signature a target is seen, with what is culled or without."""
+    eo, ir = BODIES[bodies]
+    for target in crooked.TARGETS:
+        craft = {**target, "eo": eo, "ir": ir, "contrast": 0.3, "contrast_ir": 0.3, key: 0.9}
+        everything = run(chain({"camera": sensor(kind)}, targets=[craft]))
+        (row,) = rows(everything, scan=0)
+        for share, seen in ((0.999, 1), (1.001, 0)):
+            camera = sensor(kind, threshold=share * (row["confidence"] - 1.0))
+            scene = chain({"camera": camera}, targets=[craft])
+            assert len(rows(run(scene), scan=0)) == seen
+            whole = dsa_des.run(scene, simulate_everything=True)
+            assert whole.detections.equals(run(scene).detections)

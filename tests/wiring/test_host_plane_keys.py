@@ -1,0 +1,147 @@
+"""Planes that a host moves are to sensors what the scene says of them."""
+
+import math
+from typing import Any
+
+import crooked
+import pytest
+from covering import covers
+from wired import SENSORS, chain
+
+import dsa_des
+from dsa_des.embed import Simulator
+
+AREAS = {"front_m2": 4.0, "side_m2": 0.0, "horizontal_m2": 0.0}
+WARM = {**AREAS, "back_m2": 4.0}
+BASE: dict[str, Any] = {
+    "name": "one", "rcs_dbsm": 2.0, "swerling": 1, "eo": AREAS, "ir": WARM, "contrast": 0.6,
+    "contrast_ir": 0.25, "paint_reflectance": 0.4, "engine": "turbofan",
+}  # fmt: skip
+OWN = crooked.OWNSHIP
+CLOCKED = {
+    "radar": {**SENSORS["radar.threshold"]},
+    "eye": {**SENSORS["optical.eo"]},
+    "lit": {**SENSORS["optical.eo"], "background": "ground", "sky": "overcast"},
+    "warm": {**SENSORS["optical.ir"]},
+    "hot": {**SENSORS["optical.ir"], "plume": True},
+}
+
+
+def look(craft: dict[str, Any], **sensors) -> dict[str, float]:
+    """Confidence of each sensor in one plane, the radar's in dB and the cameras' signature."""
+    scene = chain({**CLOCKED, **sensors}, fusion={"type": "fusion.pick_best"})
+    scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [craft]}
+    simulator = Simulator(dsa_des.load_scene(scene))
+    assert simulator.planes == (craft["name"],)
+    places = []
+    for flight in (OWN, crooked.DIVING):
+        lat, lon, alt = crooked.geodetic(crooked.position(flight))
+        turned = [math.radians(flight[f"{key}_deg"]) for key in ("yaw", "pitch", "roll")]
+        places += [(math.radians(lat), math.radians(lon), alt), turned]
+    result = simulator.simulate(*places, 0.0)
+    return result[craft["name"]].confidence
+
+
+def changed(**keys: Any) -> dict[str, float]:
+    """Factors of each sensor's signature, and what is added to the radar's SNR."""
+    before, after = look(BASE), look({**BASE, **keys})
+    found = {block: (after[block] - 1.0) / (before[block] - 1.0) for block in before}
+    return {**found, "radar": after["radar"] - before["radar"]}
+
+
+SAME = {"radar": 0.0, "eye": 1.0, "lit": 1.0, "warm": 1.0, "hot": 1.0}
+
+
+@covers("rcs_dbsm", "eo.front_m2", "ir.front_m2", "ir.back_m2", "contrast", "contrast_ir",
+        of=("traffic.host.planes",))  # fmt: skip
+@pytest.mark.parametrize(
+    ("keys", "factors"),
+    [
+        ({"rcs_dbsm": 9.0}, {"radar": 7.0}),
+        ({"eo": {**AREAS, "front_m2": 12.0}}, {"eye": 3.0, "lit": 3.0}),
+        ({"contrast": 0.9}, {"eye": 1.5, "lit": 1.5}),
+        ({"contrast_ir": 0.5}, {"warm": 2.0, "hot": 2.0}),
+        ({"ir": {**WARM, "front_m2": 8.0, "back_m2": 8.0}}, {"warm": 2.0, "hot": 2.0}),
+    ],
+)
+def test_each_sensor_sees_what_is_meant_for_it(keys, factors):
+    assert changed(**keys) == pytest.approx({**SAME, **factors}, abs=1e-9)
+
+
+@covers("eo.side_m2", "eo.horizontal_m2", "ir.side_m2", "ir.horizontal_m2",
+        "ir.front_m2", "ir.back_m2", "engine", "paint_reflectance",
+        of=("traffic.host.planes",))  # fmt: skip
+def test_bodies_engines_and_paint_by_the_attitude_that_the_host_gives():
+    vector = -crooked.aspect(crooked.DIVING)
+    nose, wing, floor = vector / math.sqrt(float(vector @ vector))
+    side, top = math.hypot(wing, floor), abs(floor)
+    for key, share in (("side_m2", side), ("horizontal_m2", top)):
+        more = {**AREAS, key: 10.0}
+        found = changed(eo=more, ir={**WARM, key: 10.0})
+        expected = (4.0 + 10.0 * share) / 4.0
+        assert found["eye"] == pytest.approx(expected) == found["warm"]
+    back = changed(ir={**WARM, "back_m2": 14.0})["warm"]
+    assert back == pytest.approx((4.0 + 10.0 * 0.5 * (1.0 + nose)) / 4.0)
+    plume = {"turbofan": 0.25, "turbojet": 1.0}
+    grown = changed(engine="turbojet")
+    areas = {engine: 4.0 + share * 4.0 * 0.5 * (1.0 + nose) for engine, share in plume.items()}
+    assert grown["hot"] == pytest.approx(areas["turbojet"] / areas["turbofan"])
+    assert grown["warm"] == 1.0
+    painted = changed(paint_reflectance=0.0)
+    assert painted["lit"] > 1.0 and painted["eye"] == 1.0
+
+
+@covers("rcs_table", "eo.silhouette_table", "ir.silhouette_table", of=("traffic.host.planes",))
+def test_tables(tmp_path):
+    nodes = [(azimuth, elevation) for azimuth in (0, 90, 180, 270) for elevation in (-90, 90)]
+    for name, column, value in (("r", "dbsm", 13), ("e", "area_m2", 8), ("i", "area_m2", 20)):
+        lines = [f"az_deg,el_deg,{column}", *(f"{az},{el},{value}" for az, el in nodes)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    file = {name: str(tmp_path / f"{name}.csv") for name in "rei"}
+    before = look(BASE)
+    after = look(
+        {**BASE, "rcs_table": file["r"], "eo": {**AREAS, "silhouette_table": file["e"]},
+         "ir": {**WARM, "silhouette_table": file["i"]}},
+        eye={**CLOCKED["eye"], "silhouette": "aspect_table"},
+        warm={**CLOCKED["warm"], "silhouette": "aspect_table"},
+    )  # fmt: skip
+    assert after["radar"] - before["radar"] == pytest.approx(11.0)
+    assert (after["eye"] - 1.0) / (before["eye"] - 1.0) == pytest.approx(2.0)
+    assert (after["warm"] - 1.0) / (before["warm"] - 1.0) == pytest.approx(5.0)
+
+
+@covers("swerling", "name", of=("traffic.host.planes",))
+def test_the_zero_of_a_probabilistic_radar_s_confidence_is_that_of_the_model():
+    """Pd 0.9 needs more SNR the more the target fluctuates; the plane goes by its name."""
+    radar = {key: CLOCKED["radar"][key] for key in CLOCKED["radar"] if key != "threshold_db"}
+    radar |= {"type": "radar.swerling", "power_w": 1e9}
+    zero = {
+        model: look({**BASE, "name": "two", "swerling": model}, radar=radar)["radar"]
+        for model in (0, 1, 3)
+    }
+    needed_db = 10.0 * math.log10(math.log(1e-6) / math.log(0.9) - 1.0)
+    snr_db = look(BASE)["radar"] - 250.0 + 70.0
+    assert zero[1] == pytest.approx(snr_db - needed_db, abs=1e-5)
+    assert zero[0] > zero[3] + 2.0 > zero[1] + 4.0
+
+
+def test_a_host_is_told_where_the_planes_are_in_its_own_body_axes():
+    """Range of the radar, angles of the cameras, by the states that the host gave."""
+    fine = {"azimuth_resolution_deg": 1e-7, "elevation_resolution_deg": 1e-7}
+    sensors = {"radar": CLOCKED["radar"], "eye": {**CLOCKED["eye"], **fine}}
+    scene = chain(sensors, fusion={"type": "fusion.pick_best"})
+    scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [BASE, {**BASE, "name": "b"}]}
+    simulator = Simulator(dsa_des.load_scene(scene))
+    states = []
+    for flight in (OWN, *crooked.TARGETS):
+        lat, lon, alt = crooked.geodetic(crooked.position(flight))
+        turned = [math.radians(flight[f"{key}_deg"]) for key in ("yaw", "pitch", "roll")]
+        states.append(((math.radians(lat), math.radians(lon), alt), turned))
+    (own, turned), *others = states
+    places, attitudes = zip(*others, strict=True)
+    result = simulator.simulate(own, turned, places, attitudes, 0.0)
+    for name, target in zip(("one", "b"), crooked.TARGETS, strict=True):
+        vector = crooked.body(target)
+        azimuth, elevation = crooked.angles(vector)
+        polar = azimuth, elevation, math.sqrt(float(vector @ vector))
+        assert result[name].polar == pytest.approx(polar, abs=1e-6)

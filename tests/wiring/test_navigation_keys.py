@@ -1,0 +1,118 @@
+"""What the ownship believes of itself moves its reports by the same, in the horizon's axes."""
+
+import math
+
+import crooked
+import numpy as np
+import pymap3d
+import pytest
+from covering import covers
+from wired import SENSORS, chain, rows, run, sensor
+
+OWN = crooked.geodetic(crooked.position(crooked.OWNSHIP))
+ATTITUDE = np.array([crooked.OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll")])
+
+
+def believed(kind: str = "radar.range_boundary", *, rate: float = 1, **navigation):
+    scene = chain({"sensor": sensor(kind, scan_rate_hz=rate)}, navigation=navigation)
+    return rows(run(scene), block="sensor")
+
+
+@covers("position_bias_m", of=("[navigation]",))
+@pytest.mark.parametrize("bias", [(300.0, 0, 0), (0, 300.0, 0), (0, 0, 300.0), (-50, 70, -90)])
+def test_the_believed_position_is_off_to_north_east_and_down(bias):
+    for row in believed(position_bias_m=list(bias)):
+        off = pymap3d.geodetic2ned(row["own_lat_deg"], row["own_lon_deg"], row["own_alt_m"], *OWN)
+        np.testing.assert_allclose(off, bias, atol=0.02)
+
+
+@covers("attitude_bias_deg", of=("[navigation]",))
+@pytest.mark.parametrize("kind", list(SENSORS))
+@pytest.mark.parametrize("bias", [(5.0, 0, 0), (0, 5.0, 0), (0, 0, 5.0)])
+def test_reports_in_ned_follow_from_the_believed_attitude(kind, bias):
+    found = believed(kind, attitude_bias_deg=list(bias))
+    assert len(found) == 2
+    rotation = crooked.rotation(*(ATTITUDE + np.array(bias)))
+    for row in found:
+        measured = crooked.direction(row["azimuth_rad"], row["elevation_rad"])
+        there = crooked.direction(row["ned_azimuth_rad"], row["ned_elevation_rad"])
+        np.testing.assert_allclose(there, rotation.T @ measured, atol=1e-9)
+        (target,) = (t for t in crooked.TARGETS if t["name"] == row["target"])
+        true = crooked.ned(target)
+        apart = math.acos(float(there @ true) / float(np.linalg.norm(true)))
+        assert math.radians(0.3) < apart < math.radians(5.05)
+        # Where the ownship is, it knows.
+        assert row["own_lat_deg"] == pytest.approx(OWN[0], abs=1e-12)
+        assert row["own_alt_m"] == pytest.approx(OWN[2], abs=1e-6)
+
+
+@covers("position_noise_m", of=("[navigation]",))
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_the_noise_of_a_position_is_of_its_own_axis(axis):
+    sigma = [0.0, 0.0, 0.0]
+    sigma[axis] = 8.0
+    off = []
+    for row in believed(rate=200, position_noise_m=sigma):
+        own = crooked.geodetic(crooked.position(crooked.OWNSHIP, row["time_s"]))
+        place = row["own_lat_deg"], row["own_lon_deg"], row["own_alt_m"]
+        off.append(pymap3d.geodetic2ned(*place, *own))
+    spread = np.std(off, axis=0)
+    assert spread[axis] == pytest.approx(8.0, rel=0.2)
+    assert np.delete(spread, axis).max() < 0.02
+    assert abs(np.mean(off, axis=0)[axis]) < 2.0
+
+
+def attitude_of(pair: list) -> tuple[float, float, float]:
+    """Return the believed yaw, pitch and roll that two lines of sight in both frames tell."""
+    body = [crooked.direction(r["azimuth_rad"], r["elevation_rad"]) for r in pair]
+    level = [crooked.direction(r["ned_azimuth_rad"], r["ned_elevation_rad"]) for r in pair]
+    frames = [np.column_stack([a, b, np.cross(a, b)]) for a, b in (body, level)]
+    matrix = frames[0] @ np.linalg.inv(frames[1])  # NED to body
+    yaw = math.atan2(matrix[0, 1], matrix[0, 0])
+    pitch = -math.asin(matrix[0, 2])
+    roll = math.atan2(matrix[1, 2], matrix[2, 2])
+    return yaw, pitch, roll
+
+
+@covers("attitude_noise_deg", of=("[navigation]",))
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_the_noise_of_an_attitude_is_of_its_own_angle(axis):
+    """The believed attitude is found back from two lines of sight, as yaw, pitch and roll."""
+    sigma = [0.0, 0.0, 0.0]
+    sigma[axis] = 2.0
+    by_scan: dict[int, list] = {}
+    for row in believed(rate=100, attitude_noise_deg=sigma):
+        by_scan.setdefault(row["scan"], []).append(row)
+    off = []
+    for pair in by_scan.values():
+        yaw, pitch, roll = attitude_of(pair)
+        wrong = np.degrees([yaw, pitch, roll]) - ATTITUDE
+        off.append((wrong + 180.0) % 360.0 - 180.0)
+    spread = np.std(off, axis=0)
+    assert spread[axis] == pytest.approx(2.0, rel=0.25)
+    assert np.delete(spread, axis).max() < 1e-6
+    assert abs(np.mean(off, axis=0)[axis]) < 0.7
+
+
+def test_what_is_measured_does_not_depend_on_what_is_believed():
+    columns = ("azimuth_rad", "elevation_rad", "range_m", "true_azimuth_rad", "confidence")
+    plain = [[row[c] for c in columns] for row in believed(rate=10)]
+    biased = believed(rate=10, position_bias_m=[500, 500, 500], attitude_bias_deg=[9, 9, 9])
+    assert [[row[c] for c in columns] for row in biased] == plain
+
+
+def test_the_noises_of_position_and_attitude_have_nothing_to_do_with_each_other():
+    """Six series of 150 draws: any two correlate by less than a third."""
+    by_scan: dict[int, list] = {}
+    noise = {"position_noise_m": [8, 8, 8], "attitude_noise_deg": [2, 2, 2]}
+    for row in believed(rate=150, **noise):
+        by_scan.setdefault(row["scan"], []).append(row)
+    errors = []
+    for pair in by_scan.values():
+        own = crooked.geodetic(crooked.position(crooked.OWNSHIP, pair[0]["time_s"]))
+        place = pair[0]["own_lat_deg"], pair[0]["own_lon_deg"], pair[0]["own_alt_m"]
+        yaw, pitch, roll = attitude_of(pair)
+        wrong = (np.degrees([yaw, pitch, roll]) - ATTITUDE + 180.0) % 360.0 - 180.0
+        errors.append([*pymap3d.geodetic2ned(*place, *own), *wrong])
+    correlation = np.corrcoef(np.array(errors).T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.33
