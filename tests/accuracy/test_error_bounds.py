@@ -147,14 +147,22 @@ def test_infinite_range_is_not_proven() -> None:
 
 
 def test_the_known_sizes_of_flat_earth_and_curvature() -> None:
-    """0.19 deg from the sphere's radius at the equator, 0.0045 deg per km of vertical's turn."""
+    """The turn by the sphere's radius at the equator, and half the angle of the Earth.
+
+    Scales that differ by k in two directions turn a line by asin((k - 1)/(k + 1)); at the equator
+    k is the ratio of WGS 84's radii along and across the meridian, 1 / (1 - e²).
+    """
+    k = 1.0 / (1.0 - 6.69437999014e-3)
+    turn_deg = math.degrees(math.asin((k - 1.0) / (k + 1.0)))
     equator = Envelope(1.0, (0, 0), (0, 0), (0, 0))
     assert math.degrees(error_bound("flat_earth", equator).direction_rad) == pytest.approx(
-        0.193, abs=0.001
+        turn_deg, rel=0.01
     )
     for range_m in (1e3, 5e3):
         bound = error_bound("local_radii", Envelope(range_m, (0, 0), (0, 0), (0, 0)))
-        assert math.degrees(bound.direction_rad) == pytest.approx(0.0045e-3 * range_m, rel=0.02)
+        assert math.degrees(bound.direction_rad) == pytest.approx(
+            math.degrees(range_m / (2 * 6371e3)), rel=0.02
+        )
 
 
 def test_attitude_bound_holds_and_is_reached_astern() -> None:

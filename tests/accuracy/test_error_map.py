@@ -13,6 +13,13 @@ from components.line_of_sight.error_map import ALTITUDE_M, ErrorMap, draw_error_
 LAT = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 89.99])
 RANGE = np.array([1e3, 2e3, 4e3, 8e3, 16e3, 32e3])
 
+# WGS 84 at the equator: a degree of latitude is shorter there than of a sphere of 6371 km, one of
+# longitude longer. A scale that differs by k in two directions turns a line by asin((k-1)/(k+1)).
+NORTH_M = 6378137.0 * (1.0 - 6.69437999014e-3) + ALTITUDE_M
+EAST_M = 6378137.0 + ALTITUDE_M
+SCALES = 6371e3 / NORTH_M, 6371e3 / EAST_M
+TURN_DEG = np.degrees(np.arcsin((SCALES[0] / SCALES[1] - 1.0) / (SCALES[0] / SCALES[1] + 1.0)))
+
 
 @cache
 def maps() -> dict[str, ErrorMap]:
@@ -42,9 +49,9 @@ def test_meridians_converge_with_the_tangent_of_latitude() -> None:
 
 def test_flat_earths_scale_errs_alike_at_any_short_range_and_adds_to_local_radii() -> None:
     found = maps()["flat_earth"]
-    assert np.degrees(found.azimuth_rad[0]) == pytest.approx(0.19, abs=0.01)
-    assert found.range_error_m[0] / RANGE == pytest.approx(0.0055, abs=0.0001)
-    # All else that errs is what errs in local radii: the scale adds 0.19 degrees at most.
+    assert np.degrees(found.azimuth_rad[0]) == pytest.approx(TURN_DEG, rel=0.01)
+    assert found.range_error_m[0] / RANGE == pytest.approx(SCALES[0] - 1.0, rel=1e-3)
+    # All else that errs is what errs in local radii: the scale adds 0.192 degrees at most.
     added = np.degrees(np.abs(found.azimuth_rad - maps()["local_radii"].azimuth_rad))
     assert added[:-1].max() < 0.195
 
@@ -78,7 +85,8 @@ def test_rows_are_flat_records_for_json() -> None:
     rows = maps()["flat_earth"].rows()
     assert len(rows) == LAT.size * RANGE.size
     assert json.loads(json.dumps(rows))[0]["rung"] == "flat_earth"
-    assert rows[0]["direction_error_deg"] == pytest.approx(0.19, abs=0.01)
+    # The largest turn, and half the angle of the Earth over the first range of 1 km.
+    assert rows[0]["direction_error_deg"] == pytest.approx(TURN_DEG, rel=0.01)
 
 
 def test_both_maps_are_drawn(tmp_path: Path) -> None:

@@ -71,7 +71,8 @@ def test_nobody_in_reach_leaves_nothing_to_judge() -> None:
     far = [ScriptedTrajectory("far", lat_deg=1, lon_deg=0, alt_m=500)]
     assert traffic_envelope(own, far, ScriptedFleet(far), 60.0, 1000.0).range_m == 0.0
     seen = traffic_envelope(own, far, ScriptedFleet(far), 60.0, math.inf)
-    assert seen.range_m == pytest.approx(110_500, rel=0.01)
+    # A degree of latitude at the equator: WGS 84's radius there, 500 m up.
+    assert seen.range_m == pytest.approx(math.radians(1.0) * (6335439.0 + 500.0), rel=1e-3)
 
 
 def test_rolling_through_upside_down_counts_as_the_angle_it_passes() -> None:

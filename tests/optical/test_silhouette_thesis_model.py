@@ -68,4 +68,5 @@ def test_shows_side_of_a_target_that_climbs_straight_at_us():
     five = np.radians(5.0)
     assert visible_area(np.pi, five, 0.0, -five, **side) == pytest.approx(0.0, abs=1e-15)
     shown = visible_area(np.pi, five, 0.0, -five, **side, model="thesis")
-    assert shown == pytest.approx(0.17, abs=0.005)
+    # Eq. 12 for a side of 1 m²: sin of twice the climb.
+    assert shown == pytest.approx(np.sin(2 * five), rel=1e-12)

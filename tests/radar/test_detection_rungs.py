@@ -61,7 +61,10 @@ def test_shnidman_error_and_range(model, pulses, pfa):
     assert np.all(np.diff(rough) >= 0.0)
     assert rough[0] == pytest.approx(0.1, abs=1e-4)
     assert rough[-1] == pytest.approx(0.99, abs=1e-4)
+    # What this gives, rounded up. In SNR, that is up to 1.2 dB, with a published case below.
     assert np.max(np.abs(rough - detection_probability(snr, **radar))) < 0.053
+    assert np.all(detection_probability(snr * 10**-0.12, **radar) <= rough)
+    assert np.all(rough <= detection_probability(snr * 10**0.12, **radar))
     with pytest.raises(ValueError, match=r"snr is .*: it must lie in"):
         detection_probability(high * 1.01, method="shnidman", **radar)
 

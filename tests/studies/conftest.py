@@ -39,7 +39,7 @@ type = "tracking.stub"
 """
 
 FRAGILE = '''
-import os, signal
+import os, signal, time
 import numpy as np
 from pydantic import Field
 from components.sensor import Look, Sensor, SensorParameters
@@ -51,7 +51,7 @@ class FragileParameters(SensorParameters):
 
 
 class Fragile(Sensor):
-    """Detects nine in ten targets inside its reach; may raise, or kill its own process."""
+    """Detects nine in ten targets inside its reach; may raise, wait or kill its process."""
 
     Parameters = FragileParameters
     measures_range = True
@@ -63,6 +63,8 @@ class Fragile(Sensor):
             raise SystemExit(0)
         if self.p.flaw.startswith("die unless ") and not os.path.exists(self.p.flaw[11:]):
             os.kill(os.getpid(), signal.SIGKILL)
+        while self.p.flaw.startswith("wait for ") and not os.path.exists(self.p.flaw[9:]):
+            time.sleep(0.01)
         if self.p.flaw == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if self.p.flaw.startswith("die once "):

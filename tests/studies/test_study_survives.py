@@ -57,15 +57,27 @@ def flawed(flaw: str) -> None:
 
 
 def test_a_killed_study_continues_to_the_same_bytes(small: Path) -> None:
+    """The second half of the runs waits for a file, so that the kill comes before they are done."""
+    released = small / "released"
+    text = Path("study.toml").read_text()
+    text = text.replace("blocks.radar.scan_rate_hz = [1, 5]",
+                        f'blocks.ir.flaw = ["none", "wait for {released}"]')  # fmt: skip
+    Path("study.toml").write_text(text)
+    released.touch()
     whole = undisturbed()
+    released.unlink()
     process = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--quiet")
     parts = Path("killed/parts")
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 120
     while len(list(parts.glob("*.parquet"))) < 2 and time.monotonic() < deadline:
         time.sleep(0.01)
+    assert process.poll() is None  # at work until it is killed
     process.send_signal(signal.SIGKILL)
     process.communicate()
+    assert process.returncode == -signal.SIGKILL
     before = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
+    assert 2 <= len(before) < len([name for name in whole if name.startswith("parts/")])
+    released.touch()
     (parts / ".dsa_des-0123456789ab").write_bytes(b"half a par")  # as a kill leaves it
     (parts / ".part-000-000005.parquet.1").write_bytes(b"half a par")  # of an earlier version
     again = dsa_des("study", "study.toml", "--workers", "2", "--out", "killed", "--resume")

@@ -2,19 +2,19 @@
 
 import pytest
 
-from components.evidence.thesis import area_error, eo_ranges, flight_tests, overtaking
-from components.evidence.thesis.row import AGREES, Row
+from components.evidence.thesis import eo_ranges
+from components.evidence.thesis.row import Row
 
 
 def half_a_digit(row: Row) -> float:
     return 0.5 * 10.0 ** -len((row.printed or "").partition(".")[2])
 
 
-@pytest.mark.parametrize("module", [area_error, eo_ranges, flight_tests, overtaking])
-def test_more_than_the_last_digit_is_said(module) -> None:
-    for row in module.make().rows:
-        if row.status == AGREES and abs(row.difference or 0.0) > half_a_digit(row):
-            assert "allow" in row.why, row.quantity
+@pytest.mark.parametrize("item", ["eq-34", "table-4.4", "table-4.2", "fig-4.14", "sec-4.1.3"])
+def test_more_than_the_last_digit_is_said(results, item) -> None:
+    for row in results[item].rows:
+        if row.near and abs(row.difference or 0.0) > half_a_digit(row):
+            assert "allow" in row.source, row.quantity
 
 
 def test_a_climb_that_follows_from_a_cell_says_so() -> None:

@@ -6,7 +6,6 @@ minutes.
 """
 
 import argparse
-import math
 import sys
 from collections.abc import Sequence
 from itertools import groupby
@@ -21,10 +20,9 @@ DOCS = Path(__file__).parents[3] / "docs"
 _PAGE = """# What accuracy costs
 
 For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each), the exact closed forms are worth their time; cruder ones save fractions of a microsecond, dearer ones bring nothing:
-1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_saves} µs per target-scan and errs by up to {flat_max} mrad, a tenth of the radar's degree but {flat_pixels} pixels; with the radar alone it will do. Rotate the attitude exactly: angle by angle saves {attitude_saves} µs and errs by up to {small_angle} mrad in the flown encounter.
-2. **Radar**: take the exact Pd: for one pulse the table costs the same and Gram-Charlier {gram_times} times as much. A threshold or a range boundary saves up to {boundary_saves} µs and sees first at least {threshold_km} to {boundary_km} km nearer; how much more is not measured, as the exact radar sees the intruder from where the scene begins.
-3. **Camera**: take the union of the bodies ({union_us} µs). Their sum ({exact_us} µs) is nearly as good in level flight ({exact_gained} detections too many) but sees {flown_km} km too early in the flown encounter; boundary and line are {eo_boundary_km} and {eo_line_km} km off. A mesh costs {mesh_times} times the union and is no better.
-4. **Fusion**: a window of 0.1 s is worth its {window_extra} µs: it raises the fused share from {share} to {window_share} and adds {window_range} m to the range error (95th percentile).
+{head}
+
+All numbers above are of one scene, the [flown encounter](#a-flown-encounter).
 
 Costs are CPU times of the block per target-scan, on one core; errors are those of single
 target-scans against the ladder's reference, whose own error is measured too. Scenes are run with
@@ -94,6 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     images: Path = options.docs / "images"
     images.mkdir(parents=True, exist_ok=True)
 
+    from components.evidence.accuracy.cost_head import head_lines, radar_sees_from
     from components.evidence.accuracy.error_map_page import error_map_section
     from dsa_des.commands.cost import comparison, ladders_to_climb
     from dsa_des.costs.chain import draw_chain, run_chain
@@ -118,10 +117,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chain = run_chain(variants, first, compare)
     label = compare.difference.label
     draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows, label)
-    _, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
+    flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
     draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
     page = _PAGE.format(
-        **_numbers(first, second),
+        head=head_lines(second, radar_sees_from(flown.scene)),
         error_map=error_map_section(images),
         first_light=_tables(first),
         chain=_chain(chain),
@@ -131,47 +130,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
-
-
-def _numbers(costs: Sequence[Any], flown: Sequence[Any]) -> dict[str, str]:
-    """Return the numbers of the page's first lines, of the thesis's scene and the encounter."""
-    there = {(cost.block, cost.rung): cost for cost in flown}
-    of = {(cost.block, cost.rung): cost for cost in costs}
-
-    def us(block: str, rung: str) -> float:
-        return float(of[block, rung].cpu_us_per_target_scan)
-
-    def km(block: str, rung: str) -> str:
-        return f"{abs(of[block, rung].effect['first_detection_range_change_m']) / 1000:.1f}"
-
-    def saved(block: str, one: str, other: str) -> str:
-        return f"{us(block, other) - us(block, one):.2f}"
-
-    flat = of["transform", "flat_earth"].error.maximum
-    exact = of["eo", "exact"]
-    instant, window = of["fusion", "exact_instant"], of["fusion", "window"]
-    return {
-        "flat_saves": saved("transform", "flat_earth", "ellipsoid"),
-        "attitude_saves": saved("transform", "small_angle", "exact"),
-        "flat_max": f"{flat:.1f}",
-        "flat_pixels": f"{flat / math.radians(0.0358) / 1e3:.1f}",
-        "gram_times": f"{us('radar', 'gram_charlier') / us('radar', 'exact'):.0f}",
-        "boundary_saves": saved("radar", "range_boundary", "exact"),
-        "threshold_km": km("radar", "threshold"),
-        "boundary_km": km("radar", "range_boundary"),
-        "small_angle": f"{there['transform', 'small_angle'].error.maximum:.0f}",
-        "flown_km": f"{there['eo', 'exact'].effect['first_detection_range_change_m'] / 1000:.1f}",
-        "exact_us": f"{us('eo', 'exact'):.2f}",
-        "union_us": f"{us('eo', 'union'):.2f}",
-        "exact_gained": str(exact.effect["detections_gained"]),
-        "eo_boundary_km": km("eo", "range_boundary"),
-        "eo_line_km": km("eo", "projection"),
-        "mesh_times": f"{us('eo', 'mesh') / us('eo', 'union'):.0f}",
-        "share": f"{window.effect['fused_share'] - window.effect['fused_share_change']:.0%}",
-        "window_share": f"{window.effect['fused_share']:.0%}",
-        "window_extra": saved("fusion", "exact_instant", "window"),
-        "window_range": f"{window.error.p95 - instant.error.p95:.1f}",
-    }
 
 
 def _tables(costs: Sequence[Any]) -> str:

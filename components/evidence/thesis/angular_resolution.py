@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, ray, reported_places
 from components.evidence.thesis.plotting import RADAR, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 
@@ -25,10 +27,14 @@ def make() -> Made:
     for step in RESOLUTIONS_DEG:
         reported = np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 9))
         error = np.degrees(seen[step]["azimuth_rad"] - seen[step]["true_azimuth_rad"])
-        printed = "2.5" if step == 2.5 else "1"
+        grid = configured(
+            "the azimuth grid of scene fig_4_19", "angular_resolution:RESOLUTIONS_DEG"
+        )
         rows += [
             Row(f"spacing of the reported azimuths at {step:g}°", float(np.diff(reported).min()),
-                "deg", "The scene fig_4_19; rounded to the sensor's grid (§3.5.1).", printed, 1e-6),
+                "deg", "Rounded to the sensor's grid (§3.5.1).",
+                printed("fig-4.19", "coarse_deg" if step == 2.5 else "fine_deg"), 1e-6,
+                basis=grid),
             Row(f"largest azimuth error at {step:g}°", float(np.abs(error).max()), "deg",
                 "At most half a step of the grid."),
         ]  # fmt: skip

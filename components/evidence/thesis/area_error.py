@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from components.evidence.thesis.basis import predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import aircraft, eo_camera
 from components.evidence.thesis.row import Row
 from components.optical.signature import detection_range
@@ -25,33 +27,41 @@ def make() -> Made:
     def error_m(area_m2: float, share: float) -> float:
         return 1000.0 * (range_km(area_m2 * (1.0 + share)) - range_km(area_m2))
 
-    beech, transport = aircraft("king_air").eo, aircraft("boeing_787").eo
-    head_on, abeam = beech.front_m2, beech.front_m2 + beech.side_m2
-    large = transport.front_m2
-    why = "Range goes with the square root of the area, at sensors/afrl_eo.toml's pixels."
-    everywhere = "it is 600 m near a detection range of 6 km only (errata 26)"
+    head_on, large = aircraft("king_air").eo.front_m2, aircraft("boeing_787").eo.front_m2
+    root = "Range goes with the square root of the area."
+    camera_words = "Table 2.5's pixels and Table 4.4's areas; P of Table 4.4"
+    inputs = (
+        "sensors/afrl_eo.toml:azimuth_deg",
+        "aircraft/king_air.toml:eo.front_m2",
+        "aircraft/boeing_787.toml:eo.front_m2",
+    )
+    ranges = predicted(camera_words, *inputs)
+    shape = predicted("eq. 15 alone: range goes with the square root of the area")
+    everywhere = "it is 600 m at a detection range of 6.29 km only (errata 26)"
     relative = "the range goes with the square root of the area, whatever the range (errata 26)"
     denominator = "1 to 3 m² mean 1.8 to 3.1 km, nearer than any detection of Table 4.4 (errata 26)"
     rows = [
         Row(f"error in range for +20 % area, {name}", error_m(area, 0.2), "m",
-            why[:-1] + '; "approximately" 600 m allow 50 m.', "600", 50.0, everywhere)
+            f'{root} "Approximately" 600 m, "for all detection ranges": 50 m are allowed for.',
+            printed("eq-34", "error_m"), 50.0, everywhere, ranges)
         for name, area in (
-            (f"detection at {range_km(head_on):.2f} km", head_on),
-            (f"detection at {range_km(abeam):.2f} km", abeam),
-            (f"detection at {range_km(large):.2f} km", large),
+            (f"nearest detection of Table 4.4, {range_km(head_on):.2f} km", head_on),
+            (f"farthest, {range_km(large):.2f} km", large),
         )
     ]  # fmt: skip
     rows += [
-        Row("error in range for +20 % area, smallest", 100.0 * (np.sqrt(1.2) - 1.0), "%", why, "6",
-            None, relative),
+        Row("detection range at which +20 % area are 600 m", 0.6 / (np.sqrt(1.2) - 1.0), "km",
+            f"{root} Any range agrees somewhere; this is where."),
+        Row("error in range for +20 % area, smallest", 100.0 * (np.sqrt(1.2) - 1.0), "%", "",
+            printed("eq-34", "low_share"), None, relative, shape),
         Row("error in range for -20 % area, largest magnitude", 100.0 * (1.0 - np.sqrt(0.8)), "%",
-            why, "20", None, relative),
+            "", printed("eq-34", "high_share"), None, relative, shape),
         Row("denominator of eq. 34 at the threshold, smallest of Table 4.4",
             1e6 * range_km(head_on) ** 2 * pixel, "m²", "R²·σ_h·σ_v at the detection range: a·x.",
-            "1", None, denominator),
+            printed("eq-34", "low"), None, denominator, ranges),
         Row("denominator of eq. 34 at the threshold, largest of Table 4.4",
             1e6 * range_km(large) ** 2 * pixel, "m²", "R²·σ_h·σ_v at the detection range: a·x.",
-            "3", None, denominator),
+            printed("eq-34", "high"), None, denominator, ranges),
     ]  # fmt: skip
     at_km = np.linspace(1.0, 10.0, 181)
     more, less = 1000.0 * at_km * (np.sqrt(1.2) - 1.0), 1000.0 * at_km * (1.0 - np.sqrt(0.8))

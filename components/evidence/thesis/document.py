@@ -5,6 +5,7 @@ from pathlib import Path
 from components.evidence.thesis.made import Made
 from components.evidence.thesis.registry import Item
 from components.evidence.thesis.row import Row
+from components.evidence.thesis.tally import tally
 
 _TEXTS = Path(__file__).parent
 
@@ -27,9 +28,7 @@ def markdown(results: list[tuple[Item, Made]], images: str) -> str:
         Folder of the figures, as seen from the page.
     """
     rows = [row for _, made in results for row in made.rows]
-    statuses = [row.status.partition(",")[0] for row in rows]
-    counts = ", ".join(f"{statuses.count(name)} *{name}*" for name in dict.fromkeys(statuses))
-    parts = [_text("page_head.md"), f"{len(rows)} rows: {counts}.\n", _text("page_errata.md")]
+    parts = [_text("page_head.md").format(tally=tally(rows, "*")), _text("page_errata.md")]
     for item, made in results:
         parts.append(_section(item, made, images))
     return "\n".join(parts)
@@ -37,9 +36,11 @@ def markdown(results: list[tuple[Item, Made]], images: str) -> str:
 
 def _section(item: Item, made: Made, images: str) -> str:
     lines = [f"## {item.title} ({_label(item)})", ""]
-    lines += ["| quantity | printed | ours | difference | unit | status | why |"]
-    lines += ["| --- | ---: | ---: | ---: | --- | --- | --- |"]
-    lines += [_line(row) for row in made.rows]
+    derived = any(row.derived for row in made.rows)
+    extra = (" derived |", " ---: |") if derived else ("", "")
+    lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
+    lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
+    lines += [line(row, derived) for row in made.rows]
     lines.append("")
     if made.note:
         lines += [made.note, ""]
@@ -48,10 +49,11 @@ def _section(item: Item, made: Made, images: str) -> str:
     return "\n".join(lines)
 
 
-def _line(row: Row) -> str:
+def line(row: Row, derived: bool) -> str:
+    """Return a row as a line of its table, with or without the column of derived numbers."""
     difference = "" if row.difference is None else short(row.difference, sign=True)
-    cells = (row.quantity, row.printed or "", short(row.ours), difference, row.unit, row.status,
-             row.why)  # fmt: skip
+    cells = (row.quantity, row.printed or "", *((row.derived,) if derived else ()),
+             short(row.ours), difference, row.unit, row.said, row.source)  # fmt: skip
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from components.evidence.thesis.basis import calibrated, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, SKY, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import aircraft, eo_camera
 from components.evidence.thesis.row import Row
 from components.optical.signature import detection_range
@@ -21,28 +23,47 @@ CLIMB_DEG = 1.4
 
 @dataclass(frozen=True)
 class EoCase:
-    """One line of Table 4.4; the Boeing 787 stands for the Convair (errata 23)."""
+    """One line of Table 4.4; the Boeing 787 stands for the Convair (errata 23).
+
+    The simulated cell is lost in the first line, and none in the others.
+    """
 
     geometry: str
     intruder: str
     file: str
     heading_deg: float
     climb_deg: float
-    literature_km: str
-    thesis_km: str | None
+    lost: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of its cells in `printed`."""
+        geometry = self.geometry.lower().replace("ascending head-on", "ascending")
+        return f"{geometry} {self.intruder.lower()}"
+
+    @property
+    def literature_km(self) -> str:
+        """The flight tests' range, as printed."""
+        return printed("table-4.4", f"literature {self.name}")
+
+    @property
+    def thesis_km(self) -> str | None:
+        """The thesis's simulated range, as printed."""
+        return None if self.lost else printed("table-4.4", self.name)
 
 
 CASES = (
-    EoCase("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, "4.8", None),
-    EoCase("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG, "5.4", "9.5"),
-    EoCase("Level abeam", "King Air", "king_air", 90.0, 0.0, "6.7", "6.2"),
-    EoCase("Level head-on", "King Air", "king_air", 180.0, 0.0, "6.7", "3.3"),
-    EoCase("Level head-on", "Convair", "boeing_787", 180.0, 0.0, "7.7", "9.1"),
+    EoCase("Ascending head-on", "King Air", "king_air", 180.0, CLIMB_DEG, lost=True),
+    EoCase("Ascending head-on", "Convair", "boeing_787", 180.0, CLIMB_DEG),
+    EoCase("Level abeam", "King Air", "king_air", 90.0, 0.0),
+    EoCase("Level head-on", "King Air", "king_air", 180.0, 0.0),
+    EoCase("Level head-on", "Convair", "boeing_787", 180.0, 0.0),
 )
 _CLIMBING = (
     "the exact projection shows the wings of an aircraft that climbs at us, where eq. 9-13 show "
     "its side (errata 9)"
 )
+_FOUR_ON_THREE = "Four cells, three constants set from them (P, front, climb): one is free."
 _LITERATURE = "no single contrast P gives all the flight tests' ranges (errata 23)"
 
 
@@ -58,22 +79,34 @@ def make() -> Made:
     exact = [range_km(case, camera, "exact") for case in CASES]
     for case, thesis_rung, ours in zip(CASES, printed_rungs, exact, strict=True):
         name = f"{case.geometry}, {case.intruder}"
-        why = f"sensors/afrl_eo.toml: {settings}"
+        p_of = f"aircraft/{case.file}.toml:contrast"
+        front = f"aircraft/{case.file}.toml:eo.front_m2"
+        one_p = predicted(f"one contrast, P = 1, and Table 3.1's areas; {settings}",
+                          p_of, front, "sensors/afrl_eo.toml:static_weight")  # fmt: skip
         if case.climb_deg:
-            climb = f"its climb, {CLIMB_DEG}°, is not printed: it follows from the Convair's cell."
-            follows = f"{why}; {climb}"
+            climb = f"The climb, {CLIMB_DEG}°, is not printed: it follows from the Convair's cell."
+            climbing = (
+                None
+                if case.lost
+                else calibrated("the climb, which is not printed", "eo_ranges:CLIMB_DEG", p_of)
+            )
             rows += [
-                Row(f"{name}, thesis's eq. 9-13", thesis_rung, "km", follows, case.thesis_km),
-                Row(f"{name}, exact projection", ours, "km", follows, case.thesis_km, None,
-                    _CLIMBING),
+                Row(f"{name}, thesis's eq. 9-13", thesis_rung, "km", climb, case.thesis_km,
+                    basis=climbing),
+                Row(f"{name}, exact projection", ours, "km", climb, case.thesis_km, None,
+                    _CLIMBING, climbing),
             ]  # fmt: skip
         else:
-            cut = f"{why}; the table cuts its last digit off, so 0.1 km are allowed for."
+            king = case.file == "king_air"
+            what = "P = 1 and the front of 12 m², neither printed" if king else "P = 1, not printed"
+            cells = calibrated(what, p_of, front) if king else calibrated(what, p_of)
+            cut = f"{_FOUR_ON_THREE} The table cuts its last digit off: 0.1 km are allowed for."
             rows.append(
-                Row(f"{name}, thesis's eq. 9-13", thesis_rung, "km", cut, case.thesis_km, 0.1)
-            )
-        rows.append(Row(f"{name}, against the literature", ours, "km", f"{why}, in every case.",
-                        case.literature_km, None, _LITERATURE))  # fmt: skip
+                Row(f"{name}, thesis's eq. 9-13", thesis_rung, "km", cut, case.thesis_km, 0.1,
+                    basis=cells)
+            )  # fmt: skip
+        rows.append(Row(f"{name}, against the literature", ours, "km", "",
+                        case.literature_km, None, _LITERATURE, one_p))  # fmt: skip
     for case, ours in zip(CASES, exact, strict=True):
         needed = (float(case.literature_km) / ours) ** 2
         name = f"contrast P that gives the literature, {case.geometry}, {case.intruder}"

@@ -5,17 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from components.display.styles import styles_of
+from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
 from components.evidence.thesis.plotting import GREY, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 
-#: Sensor → printed half width of its field of view in degrees, and where that is.
+#: Sensor → where the half width of its field of view is printed.
 EDGES = {
-    "radar": ("110", "Table 2.2"),
-    "eo": ("110", "Table 2.5, 220° across"),
-    "ir": ("50", "Table 2.6, 100° across"),
+    "radar": "Table 2.2",
+    "eo": "Table 2.5, 220° across",
+    "ir": "Table 2.6, 100° across",
 }
 STEP_DEG = 100.0 / 4000.0 * 180.0 / np.pi
 
@@ -25,12 +27,14 @@ def make() -> Made:
     done = run(scene("thesis/fig_4_17"))
     seen = {name: done.rows("detections", block=name) for name in EDGES}
     rows = []
-    for name, (printed, source) in EDGES.items():
+    for name, source in EDGES.items():
+        edge = configured(f"the field of view of {name}, {source}",
+                          f"thesis/fig_4_17.toml:blocks.{name}.azimuth_deg")  # fmt: skip
         azimuth = np.degrees(seen[name]["true_azimuth_rad"])
         for side, ours in (("right", azimuth.max()), ("left", -azimuth.min())):
             rows.append(Row(f"outermost detection to the {side}, {name}", float(ours), "deg",
-                            f"{source}; the intruder moves {STEP_DEG:.2f}° per scan.", printed,
-                            STEP_DEG))  # fmt: skip
+                            f"The intruder moves {STEP_DEG:.2f}° per scan.",
+                            printed("fig-4.17", name), STEP_DEG, basis=edge))  # fmt: skip
     rows += [
         Row(f"detections of the {name} in one circle", len(seen[name]["time_s"]), "",
             "One scan per second, the circle takes 251 s.")
@@ -43,7 +47,7 @@ def make() -> Made:
                 draw_map(one, done, fields_of_view=(name,))
                 style = styles_of([name], done.simulation.components)[name]
                 mark(one, done, seen[name], markersize=3.5, color=style.colour)
-                one.set_title(f"{name}: ±{EDGES[name][0]}°", loc="left")
+                one.set_title(f"{name}: ±{printed('fig-4.17', name)}°", loc="left")
                 one.set(xlim=(-6.4, 6.4), ylim=(-4.4, 6.4))
             grey = {"color": GREY, "linestyle": "none", "fillstyle": "none", "markersize": 3.5}
             axes[0].plot([], [], "o", **grey, label="detected (in the sensor's colour)")

@@ -7,8 +7,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from components.aircraft.rcs_table import dbsm_to_m2
+from components.evidence.thesis.basis import Basis, calibrated, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.radar_range import CLASSES, LARGE_DIFFERS, ROUNDED, pd_at, rounding
 from components.evidence.thesis.row import Row
@@ -23,35 +25,39 @@ def make() -> Made:
 
     def probabilities(bandwidth_hz: float) -> list[float]:
         chosen = with_bandwidth(budget, bandwidth_hz)
-        return [pd_at(sensor, chosen, dbsm, km) for dbsm, km, _ in CLASSES.values()]
+        return [pd_at(sensor, chosen, dbsm, km) for dbsm, km in CLASSES.values()]
 
-    printed = [float(text) for _, _, text in CLASSES.values()]
+    pds = [float(printed("sec-4.1.3", f"pd_{name}")) for name in CLASSES]
 
     def misfit(log_bandwidth: float) -> float:
         ours = probabilities(math.exp(log_bandwidth))
-        return math.fsum((a - b) ** 2 for a, b in zip(ours, printed, strict=True))
+        return math.fsum((a - b) ** 2 for a, b in zip(ours, pds, strict=True))
 
     best = minimize_scalar(misfit, bounds=(math.log(100.0), math.log(2000.0)), method="bounded",
                            options={"xatol": 1e-10})  # fmt: skip
     fitted_hz = math.exp(float(best.x))
     configured = probabilities(budget.bandwidth_hz)
     fitted = probabilities(fitted_hz)
-    rows = []
-    for (name, (dbsm, km, text)), ours in zip(CLASSES.items(), configured, strict=True):
-        why = (
-            "The bandwidth follows from this value (sensors/oasys.toml)."
-            if name == "small"
-            else "Swerling I with the bandwidth of the small class."
-        )
+    rows, off = [], []
+    for (name, (dbsm, km)), ours in zip(CLASSES.items(), configured, strict=True):
+        basis = _basis(name)
         because = LARGE_DIFFERS if name == "large" else ""
         quantity = f"Pd of the {name} class at {km:.2f} km"
         allowed = rounding(sensor, dbsm, km)
-        rows.append(Row(quantity, ours, "", f"{why} {ROUNDED}", text, allowed, because))
-    for (name, (_, km, text)), ours in zip(CLASSES.items(), fitted, strict=True):
+        rows.append(Row(quantity, ours, "", ROUNDED, printed("sec-4.1.3", f"pd_{name}"), allowed,
+                        because, basis))  # fmt: skip
+        off.append(
+            Row(f"how far Pd of the {name} class is off 0.9 (§5.1.3)", 100.0 * abs(ours - 0.9), "%",
+                "Percentage points, as there.", printed("sec-4.1.3", f"off_{name}"), None, because,
+                basis, again=quantity)
+        )  # fmt: skip
+    rows += off
+    to_all = calibrated(f"one bandwidth, {fitted_hz:.0f} Hz, fitted to all three values")
+    for (name, (_, km)), ours in zip(CLASSES.items(), fitted, strict=True):
         rows.append(Row(f"the same by one least-squares bandwidth, {name} at {km:.2f} km", ours, "",
-                        f"One bandwidth, {fitted_hz:.0f} Hz, fitted to all three values; the "
-                        "residuals are reported and not used.", text, None,
-                        "the three printed values contradict one another (errata 17)",
+                        "The residuals are reported and not used.",
+                        printed("sec-4.1.3", f"pd_{name}"), None,
+                        "the three printed values contradict one another (errata 17)", to_all,
                         ))  # fmt: skip
     rows += [
         Row("bandwidth from the small class", budget.bandwidth_hz, "Hz",
@@ -64,7 +70,7 @@ def make() -> Made:
     def draw(path: Path) -> None:
         place = np.arange(3.0)
         with panels(path) as (axes,):
-            axes.bar(place - 0.27, printed, 0.25, color=GREY, label="thesis")
+            axes.bar(place - 0.27, pds, 0.25, color=GREY, label="thesis")
             axes.bar(
                 place,
                 configured,
@@ -76,9 +82,7 @@ def make() -> Made:
                      label=f"least squares, {fitted_hz:.0f} Hz")  # fmt: skip
             for bars in axes.containers:
                 axes.bar_label(bars, fmt="%.4f", fontsize=8)
-            names = [
-                f"{name}, {dbsm} dBsm\nat {km:.2f} km" for name, (dbsm, km, _) in CLASSES.items()
-            ]
+            names = [f"{name}, {dbsm} dBsm\nat {km:.2f} km" for name, (dbsm, km) in CLASSES.items()]
             axes.set_xticks(place, names)
             axes.set_xlabel("RCS class and its average detection range in the flight tests")
             axes.set_ylabel("probability of detection Pd [1]")
@@ -87,8 +91,8 @@ def make() -> Made:
 
     data = {
         "class": list(CLASSES),
-        "range_km": [km for _, km, _ in CLASSES.values()],
-        "printed": printed,
+        "range_km": [km for _, km in CLASSES.values()],
+        "printed": pds,
         "ours": configured,
         "least_squares": fitted,
     }
@@ -98,14 +102,26 @@ def make() -> Made:
 
 def _what_large_would_need(pfa: float, budget: LinkBudget) -> list[Row]:
     """Return at which range, or with which RCS, the large class would have the printed Pd."""
-    dbsm, km, text = CLASSES["large"]
-    needed = required_snr(float(text), false_alarm_probability=pfa)
+    dbsm, km = CLASSES["large"]
+    needed = required_snr(float(printed("sec-4.1.3", "pd_large")), false_alarm_probability=pfa)
     range_m = float(budget.range_for_snr(needed, dbsm_to_m2(dbsm)))
     there = float(budget.snr(1000.0 * km, 1.0))
     why = "Where our curve has 0.8668 (errata 17)."
+    said = f"Pd of the large class at {km:.2f} km"
     return [
         Row("range at which the large class has Pd 0.8668", range_m / 1000.0, "km", why,
-            f"{km:.2f}", None, LARGE_DIFFERS),
+            printed("sec-4.1.3", "range_large"), None, LARGE_DIFFERS, _basis("large"), again=said),
         Row("RCS that has Pd 0.8668 at 9.75 km", 10.0 * math.log10(needed / there), "dBsm", why,
-            f"{dbsm}", None, LARGE_DIFFERS),
+            printed("sec-4.1.3", "rcs_large"), None, LARGE_DIFFERS, _basis("large"), again=said),
     ]  # fmt: skip
+
+
+def _basis(name: str) -> Basis:
+    """Return where Pd of a class comes from: the bandwidth was set from the small class."""
+    if name == "small":
+        return calibrated("the radar's bandwidth", "sensors/oasys.toml:calibrate.pd")
+    return predicted(
+        f"the bandwidth of the small class, the RCS and range of the {name} one, Swerling I",
+        "sensors/oasys.toml:calibrate",
+        "radar_range:CLASSES",
+    )

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from components.evidence.thesis.basis import configured, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import read_csv
 from components.evidence.thesis.radar_range import CLASSES
 from components.evidence.thesis.row import Row
@@ -14,8 +16,8 @@ from components.evidence.thesis.scene_run import Recording, monte_carlo, scene
 from dsa_des.arrays.types import FloatArray
 
 REPLICAS = 100
-#: Average as printed in §4.1.3; the medium one from the unrounded nautical miles (errata 17).
-AVERAGES = {"small": "6.91", "medium": "7.31", "large": "9.75"}
+#: Classes of Table 4.1; §4.1.3 prints an average for each.
+CLASS_NAMES = ("small", "medium", "large")
 
 
 def make() -> Made:
@@ -23,26 +25,33 @@ def make() -> Made:
     flown = measured_ranges()
     simulated = simulated_ranges(monte_carlo(scene("thesis/table_4_2"), REPLICAS))
     rows = []
-    for name, printed in AVERAGES.items():
+    flights = predicted(
+        "the radar calibrated to the small class's Pd and 100 flights at 150 m/s closing",
+        "thesis/table_4_2.toml:blocks.radar.calibrate",
+        "thesis/table_4_2.toml:blocks.traffic",
+    )
+    for name in CLASS_NAMES:
         rows.append(
             Row(f"average of Table 4.2, {name}", float(flown[name].mean()), "km",
-                "The file table_4_2.csv holds the printed cells; the thesis averaged nautical "
-                "miles before it rounded (errata 17): the last digits of cells and average are "
-                "allowed for.", printed, 0.01)
+                "The thesis averaged nautical miles before it rounded (errata 17): the last "
+                "digits of cells and average are allowed for.", printed("table-4.2", name), 0.01,
+                basis=configured("the thesis's own cells, averaged",
+                                 "thesis/table_4_2.csv:range_km"))
         )  # fmt: skip
-    for name, printed in AVERAGES.items():
+    for name in CLASS_NAMES:
+        text = printed("table-4.2", name)
         first, held = simulated[name]
         rows += [
             Row(f"simulated average of the first detection, {name}", float(first.mean()), "km",
-                f"{REPLICAS} flights at 150 m/s closing; 15 km is the radar's reach.", printed,
+                "15 km is the radar's reach, where every flight is looked at first.", text,
                 None, "at Pfa 0.05 per look a first detection comes early, and the thesis does not "
-                "say when a flight test counted as a detection"),
+                "say when a flight test counted as a detection", flights),
             Row(f"simulated average from which every scan detects, {name}", float(held.mean()),
-                "km", "The other extreme: no scan misses from there on.", printed, None,
+                "km", "The other extreme: no scan misses from there on.", text, None,
                 "it is the other extreme: Pd is 0.9 near the printed average, so single "
-                "scans still miss there"),
+                "scans still miss there", flights),
         ]  # fmt: skip
-    classes = list(AVERAGES)
+    classes = list(CLASS_NAMES)
 
     def draw(path: Path) -> None:
         bins = np.arange(0.0, 15.5, 0.5)
@@ -81,14 +90,14 @@ def measured_ranges() -> Mapping[str, FloatArray]:
     cells = read_csv("table_4_2.csv")
     return {
         name: np.array([float(cell["range_km"]) for cell in cells if cell["rcs_class"] == name])
-        for name in AVERAGES
+        for name in CLASS_NAMES
     }
 
 
 def simulated_ranges(runs: list[Recording]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return, by class and for each run, the first range detected and that after the last miss."""
     found: dict[str, tuple[FloatArray, FloatArray]] = {}
-    for name in AVERAGES:
+    for name in CLASS_NAMES:
         first, held = [], []
         for replica in runs:
             seen = replica.rows("detections", block="radar", target=name)

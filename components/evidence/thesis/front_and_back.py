@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREEN, ORANGE, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.optical.silhouette_exact import front_and_back_area
 
@@ -27,8 +29,12 @@ def make() -> Made:
         "(errata 12)."
     )
     rows = [
-        Row("area shown at relative heading 0° (the back)", together[0], "m²", why, "1"),
-        Row("area shown at relative heading 180° (the front)", together[180], "m²", why, "1.5"),
+        Row("area shown at relative heading 0° (the back)", together[0], "m²", why,
+            printed("fig-3.11", "back"),
+            basis=configured("the back sphere's area, a", "front_and_back:BACK_M2")),
+        Row("area shown at relative heading 180° (the front)", together[180], "m²", why,
+            printed("fig-3.11", "front"),
+            basis=configured("the front sphere's area, b", "front_and_back:FRONT_M2")),
         Row("area shown abeam, half of each", together[90], "m²", why),
         Row("largest difference of the sum from back plus front share",
             float(np.abs(together - back - front).max()), "m²", "Eq. 20 and eq. 21 are the same."),

@@ -41,12 +41,13 @@ def refined() -> Made:
     rows = _at_three(ranges)
     for name, (old, new) in PRINTED_ERRORS.items():
         ratio = ranges[name][90] / before[name][90]
-        printed = f"{(100 + new) / (100 + old):.2f}"
+        derived = f"{(100 + new) / (100 + old):.2f}"
         rows.append(
             Row(f"abeam range, refined over first, {CLASSES[name][0]}", float(ratio), "",
-                f"Printed: from {old} % and {new} % too far against the same curve.", printed,
-                0.02, "halving the side explains part only; the printed errors need another common "
-                "factor of about 0.8, as if P or a had been lowered as well (errata 23c)")
+                f"Derived from errors of {old} % and {new} %, both taken as too far against the "
+                "same curve. Halving the side explains part only; those errors need another common "
+                "factor of about 0.8, as if P or a had been lowered as well (errata 23c).",
+                derived=derived)
         )  # fmt: skip
     fighter = ranges["small_fighter"][90] / before["small_fighter"][90]
     why = "Its errors are printed without a sign: no ratio follows from them."

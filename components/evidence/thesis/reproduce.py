@@ -9,6 +9,7 @@ from components.evidence.thesis.document import markdown, short
 from components.evidence.thesis.files import write_csv, write_rows
 from components.evidence.thesis.made import Made
 from components.evidence.thesis.registry import ITEMS, Item, chosen
+from components.evidence.thesis.tally import tally
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
@@ -112,7 +113,7 @@ def _show(results: Results, target: Path) -> None:
     for name in ("printed", "ours", "difference"):
         shown.add_column(name, justify="right", no_wrap=True)
     shown.add_column("unit", no_wrap=True)
-    shown.add_column("status")
+    shown.add_column("verdict")
     for item, made in results:
         for row in made.rows:
             shown.add_row(
@@ -122,11 +123,10 @@ def _show(results: Results, target: Path) -> None:
                 short(row.ours),
                 "" if row.difference is None else short(row.difference, sign=True),
                 row.unit,
-                row.status,
+                row.said,
             )
     console.print(shown)
-    statuses = [row.status.partition(",")[0] for _, made in results for row in made.rows]
-    counts = ", ".join(f"{statuses.count(name)} {name}" for name in dict.fromkeys(statuses))
     console.print()
-    console.print(f"{len(statuses)} rows: {counts}", highlight=False)
+    rows = [row for _, made in results for row in made.rows]
+    console.print(tally(rows), highlight=False, soft_wrap=True)
     console.print(f"{target}: figures, data, rows.csv, thesis.md", highlight=False, soft_wrap=True)

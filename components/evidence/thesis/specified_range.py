@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from components.aircraft.rcs_table import dbsm_to_m2
+from components.evidence.thesis.basis import calibrated, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREEN, GREY, ORANGE, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.radar_range import NAUTICAL_MILE_KM, pd_at
 from components.evidence.thesis.row import Row
@@ -31,23 +33,33 @@ def make() -> Made:
     seen = run(scene("thesis/sec_4_1_1")).rows("detections", block="radar")
     first_km = float(seen["true_range_m"][0]) / 1000.0
     contradict = "the flight tests saw farther than the specification (errata 6)"
+    flown = predicted("the radar calibrated to the flight tests", "sensors/oasys.toml:calibrate")
     rows = [
-        Row("3.5 statute miles", STATUTE_KM, "km", "1 statute mile is 1.609344 km.", "6.48", None,
-            "6.48 km are 3.5 nautical miles (errata 7)"),
+        Row("3.5 statute miles", STATUTE_KM, "km", "", printed("sec-4.1.1", "range_km"), None,
+            "6.48 km are 3.5 nautical miles (errata 7)",
+            predicted("1 statute mile = 1.609344 km")),
         Row("first detection of 5 m² by a threshold radar set to 6.48 km", first_km, "km",
             "The scene sec_4_1_1: 50 m/s and 1 Hz, so the first scan inside is up to 0.05 km "
-            "nearer.", "6.48", 0.05),
+            "nearer.", printed("sec-4.1.1", "range_km"), 0.05, basis=calibrated(
+                "the threshold of the radar of scene sec_4_1_1",
+                "thesis/sec_4_1_1.toml:blocks.radar.calibrate.range_km")),
         Row("Pd of 5 m² at 6.48 km, nautical miles", pd_at(nautical, nautical.link_budget(),
-            RCS_DBSM, 6.48), "", "Calibrated so.", "0.9", 0.005),
+            RCS_DBSM, 6.48), "", "", printed("sec-4.1.1", "pd"), 0.005, basis=calibrated(
+                "the bandwidth, here to 3.5 nautical miles", "specified_range:NAUTICAL_KM")),
         Row("Pd of 5 m² at 5.63 km, specification", pd_at(specification,
             specification.link_budget(), RCS_DBSM, STATUTE_KM), "",
-            "sensors/oasys_specification.toml, calibrated to Table 2.2's 5.6 km.", "0.9", 0.005),
+            "Calibrated to Table 2.2's 5.6 km.", printed("sec-4.1.1", "pd"), 0.005,
+            basis=calibrated("the bandwidth of the specification",
+                             "sensors/oasys_specification.toml:calibrate.pd")),
         Row("range of Pd 0.9 for 5 m², specification", _range_km(specification), "km",
-            "sensors/oasys_specification.toml is calibrated so.", "5.6"),
+            "", printed("sec-4.1.1", "specified_km"), basis=calibrated(
+                "the bandwidth of the specification",
+                "sensors/oasys_specification.toml:calibrate.range_km")),
         Row("range of Pd 0.9 for 5 m², flight test", _range_km(flight), "km",
-            "sensors/oasys.toml, used for every other figure.", "5.6", None, contradict),
+            "It serves every other figure.", printed("sec-4.1.1", "specified_km"), None,
+            contradict, flown),
         Row("Pd of 5 m² at 6.48 km, flight test", pd_at(flight, flight.link_budget(), RCS_DBSM,
-            6.48), "", "sensors/oasys.toml.", "0.9", 0.005, contradict),
+            6.48), "", "", printed("sec-4.1.1", "pd"), 0.005, contradict, flown),
     ]  # fmt: skip
     rows += [
         Row(f"bandwidth, {name}", sensor.link_budget().bandwidth_hz, "Hz",

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from components.display.flights import Flights
+from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Columns, Picture
 from components.evidence.thesis.plotting import EO, RADAR, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import Recording, flights_of, monte_carlo, scene
 from components.geometry.ellipsoid import line_of_sight_ned
@@ -44,10 +46,12 @@ def make() -> tuple[list[Row], Picture, Columns]:
     errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
     eo, radar = errors["eo"], errors["radar"]
     rows = [
-        Row("Monte Carlo runs of TECVOL", len(runs), "", "Seeds 0 to 99 of systems/tecvol.toml.",
-            "100", 0.0),
+        Row("Monte Carlo runs of TECVOL", len(runs), "", "", printed("table-2.4", "runs"), 0.0,
+            basis=configured("seeds 0 to 99 of systems/tecvol.toml", "tecvol:REPLICAS")),
         Row("farthest EO detection of TECVOL", float(eo.range_km.max()), "km",
-            "A range boundary; the intruder closes by 75 m per scan.", "3", 0.075),
+            "The intruder closes by 75 m per scan, which is allowed for.",
+            printed("table-2.4", "eo_km"), 0.075, basis=configured(
+                "the camera's range boundary", "systems/tecvol.toml:blocks.eo.range_km")),
     ]  # fmt: skip
     why = (
         "All detections of 100 runs: half a step of the grid, navigation bias 0.1° and noise "

@@ -24,7 +24,8 @@ def make() -> Made:
     why = "The scene fig_4_20; both sensors scan once per second."
     rows = [
         Row("combinations of detection that occur", sum(count > 0 for count in counts.values()), "",
-            why, "4", 0.0),
+            f"{why} The thesis lists four, and the scene is laid out so that they occur.",
+            derived="4, listed"),
         *(Row(f"scans with: {name}", count, "", why) for name, count in counts.items()),
         Row("azimuth from which both detect", float(both.min()), "deg",
             "The EO camera's field of view begins at -15°."),

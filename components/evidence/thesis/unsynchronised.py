@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from components.evidence.thesis.basis import predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
 from components.evidence.thesis.plotting import FUSION, IR, RADAR, legend_below, panels
+from components.evidence.thesis.printed import printed
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import run, scene
 
@@ -23,7 +25,11 @@ def make() -> Made:
     why = "Scans k/2 s and k/5 s meet every second: at every second IR scan (errata 25)."
     rows = [
         Row("share of IR detections fused with the radar's", together / (alone + together), "",
-            why, "0.5", 0.0),
+            why, printed("fig-4.22", "share"), 0.0,
+            basis=predicted(
+                "the printed scan rates, 5 and 2 Hz, both from time 0 (assumption)",
+                "thesis/fig_4_22.toml:blocks.radar.scan_rate_hz",
+                "thesis/fig_4_22.toml:blocks.ir.scan_rate_hz")),
         Row("IR detections", alone + together, "", "30 s at 2 Hz, none missed."),
         Row("radar detections", len(fused["radar"]["time_s"]) + together, "",
             "30 s at 5 Hz, none missed."),
