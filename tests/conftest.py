@@ -1,6 +1,8 @@
 """What all tests share."""
 
 import os
+import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,25 @@ settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCh
 settings.load_profile("busy")
 # What runs tests in parallel sets the width of its own terminal, which our tables would obey.
 os.environ.pop("COLUMNS", None)
+
+
+def keep_bytecode_elsewhere() -> None:
+    """Keep what Python compiles in a folder of this user's, where the tree is to stay free of it.
+
+    Tests start hundreds of processes, each of which would compile the package anew.
+    """
+    folder = Path(tempfile.gettempdir()) / f"dsa_des_bytecode_{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if folder.is_symlink() or folder.stat().st_uid != os.getuid():
+        return
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(folder)
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = str(folder)
+
+
+if sys.dont_write_bytecode and hasattr(os, "getuid"):
+    keep_bytecode_elsewhere()
 
 ROOT = Path(__file__).parent.parent
 
