@@ -43,8 +43,8 @@ _INSTALL = re.compile(r"^python3 -m venv \S+ && \S+/pip install -e \S+ && (?:\.v
 SHORTER = (
     (re.compile(r"^dsa-des study \S+\.toml"), "--set replicas=2 --workers 1"),
     (re.compile(r"^dsa-des compare .*--swap"), "--replicas 2 --workers 1"),
-    (re.compile(r"^dsa-des cost (?!--)"), "--duration 2"),
-    (re.compile(r"^dsa-des run .*--(?:set|swap)"), "--duration 10"),
+    (re.compile(r"^dsa-des cost (?!--)"), "--duration 2 --repeats 1"),
+    (re.compile(r"^dsa-des run .*--(?:set|swap)"), "--duration 10 --no-figures"),
     (re.compile(r"^dsa-des run configs/closed"), "--duration 10"),
 )
 
