@@ -197,13 +197,14 @@ def windowed_queues(
     graph: nx.DiGraph,
     classes: Mapping[str, type[Component]],
     queues: Mapping[str, Collection[str]],
+    able: Collection[str],
 ) -> set[str]:
-    """Return the queues that can be worked through a window at a time.
+    """Return those of the queues in `able` that can be worked through a window at a time.
 
     Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
     the queue, through whichever blocks or other queues.
     """
-    able = set(queues)
+    able = set(able)
     while True:
         looped = in_cycles(with_queues(graph, {name: queues[name] for name in able}))
         others = {block for name in set(queues) - able for block in queues[name]}

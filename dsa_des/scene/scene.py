@@ -119,8 +119,8 @@ class Scene(Changeable):
 
     def windowed_queues(self) -> set[str]:
         """Return the shared processors that serve a look-ahead window at once."""
-        able = {n: b for n, b in self.queues.items() if self.processors[n].when_busy != "skip"}
-        return windowed_queues(self.graph, self.classes, able) if self.processors else set()
+        able = [name for name, p in self.processors.items() if p.when_busy != "skip"]
+        return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

@@ -116,3 +116,21 @@ def test_two_processors_that_wait_for_each_other_go_message_by_message(lab):
     tables = "\n[processors.one]\nservice_s = 0.11\n\n[processors.two]\nservice_s = 0.07\n"
     path.write_text(path.read_text() + tables)
     assert_windows_do_not_matter(lab, path, windowed=False)
+
+
+def test_a_processor_behind_one_that_skips_goes_message_by_message(lab):
+    path = lab.write(
+        {
+            "a": 'Pulse; scan_rate_hz = 20; processor = "hasty"',
+            "b": 'Relay; processor = "one"',
+            "c": "Relay",
+        },
+        ['"a -> b"', '"b -> c"'],
+        duration_s=3,
+    )
+    tables = (
+        '\n[processors.hasty]\nservice_s = 0.07\nwhen_busy = "skip"\n'
+        '\n[processors.one]\nservice_s = 0.2\nwhen_busy = "drop_oldest"\n'
+    )
+    path.write_text(path.read_text() + tables)
+    assert_windows_do_not_matter(lab, path, windowed=False)

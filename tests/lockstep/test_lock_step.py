@@ -94,7 +94,7 @@ def test_random_traffic_is_drawn_from_each_seed():
     ("sets", "what"),
     [
         (["wires[4]={from='radar', to='fusion', drop_probability=0.1}"], "loses"),
-        (["processors.gpu.service_s=0.01", "blocks.eo.processor=gpu"], "scan by scan"),
+        (["processors.gpu.service_s=0.01", "blocks.eo.processor=gpu"], "shared processors"),
     ],
 )
 def test_what_cannot_run_together_says_so(sets, what):
