@@ -14,7 +14,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 NEVER = -1.0
 
 
-def modified_tau_s(motion: Horizontal, distance_m: float) -> FloatArray:
+def modified_tau_s(motion: Horizontal, distance_m: float | FloatArray) -> FloatArray:
     """Return modified tau, (D² − r²)/(r ṙ), where the aircraft close in, else `NEVER`, s."""
     closing = motion.closing_m2_s < 0.0
     rate = np.where(closing, motion.closing_m2_s, 1.0)

@@ -1,4 +1,4 @@
-"""Intervals of violation against root finding at 40 digits; horizontal and vertical sizes differ."""
+"""Intervals of violation against root finding at 40 digits; all sizes are unequal."""
 
 import math
 
