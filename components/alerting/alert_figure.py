@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.alerting.configuration import Configuration
+from components.alert_configuration.configuration import Configuration
+from components.alerting.bands_over_time import BandsOverTime, direction_bands
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.well_clear.volume import NAUTICAL_MILE_M
@@ -13,6 +14,8 @@ from dsa_des.record.drawing import drawing, figure_text, tight
 
 #: Colour of each level from 0; levels beyond the last share its colour.
 _COLOURS = ("#7f7f7f", "#e6b800", "#e07b00", "#c1121f")
+#: Colour of each region's bands; NONE is left blank.
+_REGIONS = {"FAR": "#f2d66b", "MID": "#e07b00", "NEAR": "#c1121f", "RECOVERY": "#5aa469"}
 _STYLES = ("-", "--", "-.", ":")
 _MOST_NAMED = 8
 
@@ -35,11 +38,13 @@ def draw_alerts(
     alerts : Alerts
         Of the encounter.
     """
-    with drawing(9.0, 6.0, path) as figure:
-        grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
+    with drawing(9.0, 7.5, path) as figure:
+        grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
         over_time = figure.add_subplot(grid[0, 0])
         _levels(over_time, configuration, encounter, alerts)
         _times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
+        bands = direction_bands(configuration, encounter, alerts)
+        _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
         _from_above(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
         figure.suptitle(figure_text(title))
         tight(figure)
@@ -76,11 +81,39 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
             linewidth=2.4 - 0.5 * min(number, 3),
             label=f"level {number + 1}",
         )
-    axes.set_xlabel(f"time since {encounter.time_s[0]:.10g} s, s")
     axes.set_ylabel("time to violation, s")
     axes.set_title("time to the volume of each level")
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="upper right")
+
+
+def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
+    """Draw the bands of direction over time, and the direction that is flown."""
+    time_s = found.time_s - encounter.time_s[0]
+    width_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    named: set[str] = set()
+    for at_s, bands in zip(time_s.tolist(), found.bands, strict=True):
+        for band in bands:
+            colour = _REGIONS.get(band.region)
+            if colour is None:
+                continue
+            axes.bar(
+                at_s,
+                np.degrees(band.high - band.low),
+                width_s,
+                np.degrees(band.low),
+                color=colour,
+                align="edge",
+                label=None if band.region in named else band.region,
+            )
+            named.add(band.region)
+    axes.plot(time_s, np.degrees(found.own_value), "k.", markersize=2, label="flown")
+    axes.set_ylim(0.0, 360.0)
+    axes.set_yticks((0, 90, 180, 270, 360))
+    axes.set_ylabel("direction, deg")
+    axes.set_xlabel(f"time since {encounter.time_s[0]:.10g} s, s")
+    axes.set_title("bands of direction over ground")
+    axes.legend(loc="upper left")
 
 
 def _from_above(

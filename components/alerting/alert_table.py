@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from components.alerting.configuration import Configuration
+from components.alert_configuration.configuration import Configuration
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.alerting.separation import separation
 from components.traffic.units import LENGTH_M, SPEED_MPS
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Decimals of numbers, unless said otherwise.
 DECIMALS = 6
@@ -82,15 +82,15 @@ def _rows(
     configuration: Configuration,
     encounter: Encounter,
     alerts: Alerts,
-    row: FloatArray,
-    column: FloatArray,
+    row: IntArray,
+    column: IntArray,
     decimals: int,
 ) -> list[str]:
     cells = row, column
     first = configuration.corrective_level(configuration.alerters[0])
     distance_m = np.nan if first is None else first.volume.horizontal_m
     found = separation(
-        tuple(part[cells] for part in encounter.relative),  # type: ignore[arg-type]
+        tuple(part[cells] for part in encounter.relative),
         configuration["lookahead_time"],
         np.full(len(row), distance_m),
     )._asdict()

@@ -1,11 +1,12 @@
 """A recorded encounter as relative states at the ownship's times."""
 
+from collections.abc import Callable
 from os import PathLike
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.alerting.configuration import Configuration
+from components.alert_configuration.configuration import Configuration
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
 from components.traffic.daa_file import EXTRA_HEADERS, read_daa_samples
 from components.traffic.traffic_file import Problems
@@ -33,6 +34,8 @@ class Encounter(NamedTuple):
         Place of each target's alerter in the configuration, from 0.
     bounds : Bounds or None
         How far the relative states may be wrong, where the file says so.
+    own_state : (4, times)
+        Altitude, and velocity east, north, up of the ownship, m and m/s.
     own_plane : (2, times)
         East and north of the ownship in the plane of its first sample, m, for figures.
     target_plane : (2, times, targets)
@@ -46,6 +49,7 @@ class Encounter(NamedTuple):
     relative: Relative
     alerter: IntArray
     bounds: Bounds | None
+    own_state: FloatArray
     own_plane: FloatArray
     target_plane: FloatArray
 
@@ -82,11 +86,20 @@ def read_encounter(path: str | PathLike[str], configuration: Configuration) -> E
     late_s = np.where(present, own["time"][:, np.newaxis] - targets["time"], 0.0)
     flat = "sx" in own
     state = _flat_states if flat else _projected_states
-    relative, own_plane, target_plane = state(own, targets, late_s)
+    relative, own_state, own_plane, target_plane = state(own, targets, late_s)
     which = _alerters(configuration, own, targets, present, problems)
     bounds = _bounds(configuration, own, targets, relative) if "s_ew_std" in own else None
     return Encounter(
-        names[0], names[1:], own["time"], present, relative, which, bounds, own_plane, target_plane
+        names[0],
+        names[1:],
+        own["time"],
+        present,
+        relative,
+        which,
+        bounds,
+        own_state,
+        own_plane,
+        target_plane,
     )
 
 
@@ -108,7 +121,7 @@ def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:
 
 def _flat_states(
     own: Samples, targets: Samples, late_s: FloatArray
-) -> tuple[Relative, FloatArray, FloatArray]:
+) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
     """Return the states of a file in east, north and up."""
     velocity = [(own[key][:, np.newaxis], targets[key]) for key in ("ve", "vn", "vu")]
     at = [
@@ -117,7 +130,8 @@ def _flat_states(
     ]
     relative = tuple(mine - other for mine, other in [*at, *velocity])
     return (
-        relative,  # type: ignore[return-value]
+        relative,
+        np.stack([own[key] for key in ("sz", "ve", "vn", "vu")]),
         np.stack([own["sx"], own["sy"]]),
         np.stack([at[0][1], at[1][1]]),
     )
@@ -125,7 +139,7 @@ def _flat_states(
 
 def _projected_states(
     own: Samples, targets: Samples, late_s: FloatArray
-) -> tuple[Relative, FloatArray, FloatArray]:
+) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
     """Return the states of a file in latitude and longitude, in the plane below the ownship."""
     own_lat, own_lon = (np.radians(own[key])[:, np.newaxis] for key in ("lat", "lon"))
     lat, lon = (np.radians(targets[key]) for key in ("lat", "lon"))
@@ -146,6 +160,7 @@ def _projected_states(
     first = own_lat[:1], own_lon[:1]
     return (
         relative,
+        np.stack([own["alt"], mine[0][:, 0], mine[1][:, 0], own["vu"]]),
         np.stack(east_north_m(own_lat, own_lon, *first))[:, :, 0],
         np.stack(east_north_m(lat, lon, *first)),
     )
@@ -182,10 +197,10 @@ def _bounds(
 ) -> Bounds:
     """Return how far relative states may be wrong: standard deviations times z-scores."""
 
-    def both(find: "object", *keys: str) -> FloatArray:
+    def both(find: Callable[..., Any], *keys: str) -> FloatArray:
         mine = [own[key][:, np.newaxis] for key in keys]
         theirs = [targets[key] for key in keys]
-        return np.asarray(find(*mine) + find(*theirs))  # type: ignore[operator]
+        return np.asarray(find(*mine) + find(*theirs))
 
     position = configuration["h_pos_z_score"] * both(_largest, "s_ew_std", "s_ns_std", "s_en_std")
     east, north = relative[0], relative[1]

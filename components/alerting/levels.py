@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from components.alerting.configuration import Alerter, Configuration, Level
+from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.alerting.memory import AlertMemory, MemoryRule
 from components.well_clear.nearly import surely_less
 from components.well_clear.uncertainty import Bounds, uncertain_violation_span
@@ -147,7 +147,7 @@ def _fill(
         alerter.levels,
         states,
         configuration["lookahead_time"],
-        of_cells,  # type: ignore[arg-type]
+        of_cells,
     )
     count = len(alerter.levels)
     violation_s[cells, :count] = found

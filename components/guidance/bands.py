@@ -1,12 +1,14 @@
 """Bands of guidance: values that lead to each region's volume, and those that lead out again."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from components.alerting.configuration import REGIONS, Alerter, Configuration, Level
+from components.alert_configuration.configuration import REGIONS, Alerter, Configuration, Level
 from components.guidance.intervals import Band, Interval, clear_intervals, painted
 from components.guidance.kinds import Kind, kind_of
 from components.guidance.situation import Detector, Required, State
@@ -99,7 +101,8 @@ def guidance(
         if not intervals:
             saturated = REGIONS.index(region) >= corrective
             break
-    recovery, found = None, []
+    recovery: Recovery | None = None
+    found: list[Interval] = []
     if saturated and configuration[f"recovery_{kind_name}"]:
         recovery, found = _recover(configuration, kind, own, intruders)
     if kind.instantaneous and recovery is None and _inside(configuration, own, intruders):
@@ -189,11 +192,14 @@ def _recover(
         cylinder = Detector(cylinder_m=sizes)
         return clear([Required(cylinder, lookahead_s, lookahead_s)] * len(concerned or []))
 
-    def at(time_s: float, sizes: tuple[float, float]) -> list[Interval]:
+    def at(sizes: tuple[float, float], time_s: float) -> list[Interval]:
         before = Detector(cylinder_m=sizes)
         return clear(
             [Required(d, lookahead_s, lookahead_s, time_s, before) for _, d, _ in concerned or []]
         )
+
+    def leads_out(sizes: tuple[float, float], time_s: float) -> bool:
+        return bool(at(sizes, time_s))
 
     nmac = configuration["horizontal_nmac"], configuration["vertical_nmac"]
     sizes = configuration["min_horizontal_recovery"], configuration["min_vertical_recovery"]
@@ -202,8 +208,8 @@ def _recover(
         return Recovery(-math.inf, nmac, shrinks), []
     while True:
         if with_cylinder(sizes):
-            time_s = _earliest(lambda t, s=sizes: bool(at(t, s)), configuration)
-            found = at(time_s, sizes)
+            time_s = _earliest(partial(leads_out, sizes), configuration)
+            found = at(sizes, time_s)
             if found:
                 return Recovery(time_s, sizes, shrinks), found
         if not configuration["ca_bands"] or sizes == nmac:
@@ -213,13 +219,13 @@ def _recover(
         shrinks += 1
 
 
-def _earliest(clear_at: "object", configuration: Configuration) -> float:
+def _earliest(clear_at: Callable[[float], bool], configuration: Configuration) -> float:
     """Return the earliest time from which on the volume is clear, with the time of stability."""
     lookahead_s = configuration["lookahead_time"]
     red, green = 0.0, lookahead_s + 1.0
     probe = lookahead_s
     while green - red > _SEARCHED_S:
-        if clear_at(probe):  # type: ignore[operator]
+        if clear_at(probe):
             green = probe
         else:
             red = probe

@@ -9,7 +9,7 @@ from components.guidance.altitudes import Altitudes
 from components.guidance.situation import Detector, Required, State
 from components.guidance.step_bands import clear_steps, meets_within
 from components.guidance.steps import Steps, climb_steps, direction_steps, speed_steps
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray
 
 KINDS = ("hdir", "hs", "vs", "alt")
 FULL_TURN = 2.0 * math.pi
@@ -29,7 +29,7 @@ class Kind(Protocol):
         Whether a manoeuvre takes no time.
     """
 
-    values: FloatArray
+    values: AnyArray
     own_value: float
     least: float
     most: float
@@ -51,7 +51,7 @@ class _StepKind:
     ) -> None:
         self._steps = steps
         self.own_value = own_value
-        self.values = own_value + steps.number * step
+        self.values: AnyArray = own_value + steps.number * step
         self.least, self.most = limits
         self.cyclic = False
         self.instantaneous = steps.step_time_s == 0.0
@@ -69,7 +69,7 @@ class _AltitudeKind:
     def __init__(self, own: State, values: Any) -> None:
         self._altitudes = Altitudes(own, values)
         self.own_value = float(own.up_m)
-        self.values = self._altitudes.values
+        self.values: AnyArray = self._altitudes.values
         self.least, self.most = values["min_alt"], values["max_alt"]
         self.cyclic = False
         self.instantaneous = self._altitudes.instantaneous

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from components.alerting.configuration import REGIONS
+from components.alert_configuration.configuration import REGIONS
 from components.guidance.intervals import Band, same_place
 
 _TURN = 2.0 * math.pi

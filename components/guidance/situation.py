@@ -31,7 +31,7 @@ class State(NamedTuple):
 
     def less(self, other: "State") -> Relative:
         """Return these states less others."""
-        return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))  # type: ignore[return-value]
+        return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))
 
     def row(self, number: int) -> "State":
         """Return the state of one aircraft."""

@@ -1,5 +1,6 @@
 """When straight flights violate a volume: now, and over an interval in closed form."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from components.well_clear.volume import Volume
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: Position east, north, up (m) and velocity (m/s) of the ownship less the intruder's.
-Relative = tuple[Any, Any, Any, Any, Any, Any]
+Relative = Sequence[Any]
 
 
 def violates(volume: Volume, relative: Relative) -> BoolArray:

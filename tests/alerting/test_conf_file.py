@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from components.alerting.conf_file import read_conf
+from components.alert_configuration.conf_file import read_conf
 from components.traffic.traffic_file import TrafficFileError
 from tests.alerting.conf_text import CONF
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from components.alerting.conf_file import read_conf
+from components.alert_configuration.conf_file import read_conf
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
 from components.guidance.bands import Intruder, guidance
 from components.guidance.resolution import resolution

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.alerting.conf_file import default_values
+from components.alert_configuration.conf_file import default_values
 from components.guidance.altitudes import Altitudes
 from components.guidance.intervals import Band, Interval, clear_intervals, painted, same_place
 from components.guidance.kinds import kind_of

@@ -4,10 +4,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from components.alerting.conf_alerters import AlerterKeys
-from components.alerting.conf_keys import KEYS, ONLY_OFF, SIGNED, UNITS
-from components.alerting.conf_values import BadValue, parse_value
-from components.alerting.configuration import Configuration
+from components.alert_configuration.conf_alerters import AlerterKeys
+from components.alert_configuration.conf_keys import KEYS, ONLY_OFF, SIGNED, UNITS
+from components.alert_configuration.conf_values import BadValue, parse_value
+from components.alert_configuration.configuration import Configuration
 from components.traffic.text_rows import read_lines
 from components.traffic.traffic_file import MOST_OF_A_CELL, Problems
 from dsa_des.text.safe_text import shortened

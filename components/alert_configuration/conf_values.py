@@ -4,8 +4,8 @@ import math
 import re
 from typing import Any
 
-from components.alerting.conf_keys import UNITS
-from components.alerting.configuration import REGIONS
+from components.alert_configuration.conf_keys import UNITS
+from components.alert_configuration.configuration import REGIONS
 from components.traffic.units import NO_UNIT, clean_token
 from dsa_des.errors import nearest
 from dsa_des.text.safe_text import shortened

@@ -3,15 +3,15 @@
 import re
 from typing import Any
 
-from components.alerting.conf_keys import (
+from components.alert_configuration.conf_keys import (
     CLASS_PREFIX,
     CLASSES,
     KEYS,
     LEVEL_KEYS,
     VOLUME_KEYS,
 )
-from components.alerting.conf_values import BadValue, parse_value
-from components.alerting.configuration import Alerter, Level
+from components.alert_configuration.conf_values import BadValue, parse_value
+from components.alert_configuration.configuration import Alerter, Level
 from components.traffic.traffic_file import MOST_OF_A_CELL, Problems, did_you_mean
 from components.well_clear.volume import Volume
 from dsa_des.text.safe_text import shortened
