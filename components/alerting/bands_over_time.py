@@ -7,7 +7,7 @@ import numpy as np
 from components.alert_configuration.configuration import Configuration
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
-from components.guidance.bands import Intruder, guidance
+from components.guidance.bands import GuidedIntruder, guidance
 from components.guidance.intervals import Band
 from components.guidance.situation import State
 from dsa_des.arrays.types import FloatArray
@@ -63,7 +63,7 @@ def direction_bands(
             state = State(*(mine - part for mine, part in zip(own, relative, strict=True)))
             alerter = configuration.alerters[int(encounter.alerter[row, number])]
             level = int(alerts.level[row, number]) if configuration["hysteresis_time"] > 0 else 0
-            intruders.append(Intruder(state, alerter, level))
+            intruders.append(GuidedIntruder(state, alerter, level))
         made = guidance("hdir", configuration, own, intruders)
         found.append(made.bands)
         values.append(made.own_value)

@@ -11,7 +11,7 @@ from components.well_clear.violation import Relative
 from dsa_des.arrays.types import FloatArray
 
 
-class Separation(NamedTuple):
+class PairSeparation(NamedTuple):
     """Present and projected distances of pairs of aircraft, each (n,).
 
     Parameters
@@ -42,7 +42,9 @@ class Separation(NamedTuple):
     modified_tau_s: FloatArray
 
 
-def separation(relative: Relative, lookahead_s: float, tau_distance_m: FloatArray) -> Separation:
+def separation(
+    relative: Relative, lookahead_s: float, tau_distance_m: FloatArray
+) -> PairSeparation:
     """Return present and projected distances in straight flight.
 
     Parameters
@@ -73,7 +75,7 @@ def separation(relative: Relative, lookahead_s: float, tau_distance_m: FloatArra
         modified_tau_s(motion, distance),
         np.nan,
     )
-    return Separation(
+    return PairSeparation(
         range_m,
         np.abs(up),
         np.sqrt(motion.speed_sq_m2_s2),

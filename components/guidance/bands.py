@@ -56,7 +56,7 @@ class Guidance(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Intruder:
+class GuidedIntruder:
     """One intruder as guidance sees it.
 
     Parameters
@@ -74,7 +74,7 @@ class Intruder:
 
 
 def guidance(
-    kind_name: str, configuration: Configuration, own: State, intruders: list[Intruder]
+    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruder]
 ) -> Guidance:
     """Return the bands of one kind at one instant, without memory.
 
@@ -83,7 +83,7 @@ def guidance(
     kind_name : {"hdir", "hs", "vs", "alt"}
     configuration : Configuration
     own : State
-    intruders : list of Intruder
+    intruders : list of GuidedIntruder
     """
     kind = kind_of(kind_name, own, configuration)
     corrective = REGIONS.index(configuration["corrective_region"])
@@ -135,9 +135,9 @@ def _concerned(
     configuration: Configuration,
     kind: Kind,
     own: State,
-    intruders: list[Intruder],
+    intruders: list[GuidedIntruder],
     region: str,
-) -> list[tuple[Intruder, Detector, float]] | None:
+) -> list[tuple[GuidedIntruder, Detector, float]] | None:
     """Return who counts for a region, with detector and horizon; None if no level has it."""
     lookahead_s = configuration["lookahead_time"]
     found, known = [], False
@@ -159,12 +159,12 @@ def _concerned(
     return found if known else None
 
 
-def _corrective(configuration: Configuration, intruder: Intruder) -> Detector | None:
+def _corrective(configuration: Configuration, intruder: GuidedIntruder) -> Detector | None:
     level = configuration.corrective_level(intruder.alerter)
     return None if level is None else Detector(level.volume)
 
 
-def _inside(configuration: Configuration, own: State, intruders: list[Intruder]) -> bool:
+def _inside(configuration: Configuration, own: State, intruders: list[GuidedIntruder]) -> bool:
     """Tell whether the corrective volume of an intruder is violated now."""
     for intruder in intruders:
         detector = _corrective(configuration, intruder)
@@ -176,7 +176,7 @@ def _inside(configuration: Configuration, own: State, intruders: list[Intruder])
 
 
 def _recover(
-    configuration: Configuration, kind: Kind, own: State, intruders: list[Intruder]
+    configuration: Configuration, kind: Kind, own: State, intruders: list[GuidedIntruder]
 ) -> tuple[Recovery, list[Interval]]:
     """Return the earliest recovery, and the values that lead to it."""
     concerned = _concerned(configuration, kind, own, intruders, configuration["corrective_region"])

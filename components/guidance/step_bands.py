@@ -81,16 +81,3 @@ def _lost_on_the_way(steps: Steps, relative: Relative, required: Required) -> Bo
     for side in (steps.number >= 0, steps.number <= 0):
         lost |= side & (count >= np.min(count[met & side], initial=np.iinfo(np.int64).max))
     return lost
-
-
-def without_lone(clear: BoolArray) -> BoolArray:
-    """Return clear steps less those with no clear neighbour: they make no band."""
-    before = np.concatenate([[False], clear[:-1]])
-    after = np.concatenate([clear[1:], [False]])
-    return np.asarray(clear & (before | after))
-
-
-def runs(clear: BoolArray) -> list[tuple[int, int]]:
-    """Return first and last place of each run of clear steps."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], clear.astype(int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -9,7 +9,7 @@ import pytest
 
 from components.alert_configuration.conf_file import read_conf
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
-from components.guidance.bands import Intruder, guidance
+from components.guidance.bands import GuidedIntruder, guidance
 from components.guidance.resolution import resolution
 from components.guidance.situation import State
 from components.traffic.daa_file import read_daa_samples
@@ -56,7 +56,9 @@ def test_bands_recovery_and_resolutions(kind, manner):
             continue
         row = int(np.argmin(np.abs(times - float(wanted["time_s"]))))
         own, other = states(samples, row)
-        found = guidance(kind, configuration, own, [Intruder(other, configuration.alerters[0])])
+        found = guidance(
+            kind, configuration, own, [GuidedIntruder(other, configuration.alerters[0])]
+        )
         lines = [b for b in bands if (b["time_s"], b["kind"]) == (wanted["time_s"], kind)]
         assert [b.region for b in found.bands] == [b["region"] for b in lines]
         for band, line in zip(found.bands, lines, strict=True):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.metrics.encounter import NMAC_M, WELL_CLEAR_M
 from components.metrics.separation import Separation, closest, first_inside, separations
 from components.metrics.track_quality import _ramp_quantiles
+from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Text
 from dsa_des.replicas.replicas import Recorded, Replica, run_replicas
@@ -18,6 +18,9 @@ from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import METRICS, Group, wanted_by
 from dsa_des.studies.study import MetricSpec
 
+WELL_CLEAR_M, NMAC_M = (
+    (PRESETS[name].horizontal_m, PRESETS[name].vertical_m) for name in ("astm_f3442", "nmac")
+)
 KINDS = {"block": str, "target": str, "sensors": str}
 
 
