@@ -7,6 +7,8 @@ import numpy as np
 from dsa_des.arrays.types import BoolArray, IntArray
 
 _NONE = -1
+# The time of what has not been yet.
+_LONG_AGO_S = -np.inf
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,9 @@ class AlertMemory:
 
     def _clear(self) -> None:
         count, rule = self._count, self._rule
-        self._last_s = np.full(count, np.nan)
+        self._last_s = np.full(count, _LONG_AGO_S)
         self._output = np.full(count, _NONE, dtype=np.int64)
-        self._risen_s = np.full(count, np.nan)
+        self._risen_s = np.full(count, _LONG_AGO_S)
         self._queue = np.full((count, max(rule.n, 1)), _NONE, dtype=np.int64)
 
     def step(self, now_s: float, present: BoolArray, due: BoolArray, early: BoolArray) -> IntArray:
@@ -76,12 +78,11 @@ class AlertMemory:
             self._clear()
         self._own_time_s = now_s
         raw = self._raw(now_s, due, early)
-        with np.errstate(invalid="ignore"):
-            gap_s = now_s - self._last_s
-            known = (gap_s > 0.0) & (gap_s <= rule.hysteresis_s)
+        gap_s = now_s - self._last_s
+        known = (gap_s > 0.0) & (gap_s <= rule.hysteresis_s)
         fresh = present & ~known
         self._output[fresh] = _NONE
-        self._risen_s[fresh] = np.nan
+        self._risen_s[fresh] = _LONG_AGO_S
         counted = raw
         if rule.m > 0:
             self._queue[fresh] = _NONE
@@ -89,9 +90,8 @@ class AlertMemory:
             pushed = np.concatenate([self._queue[:, 1:], raw[:, np.newaxis]], axis=1)
             self._queue = np.where(present[:, np.newaxis], pushed, self._queue)
             counted = np.sort(self._queue, axis=1)[:, -rule.m]
-        with np.errstate(invalid="ignore"):
-            since_s = now_s - self._risen_s
-            young = (since_s >= 0.0) & (since_s < rule.persistence_s)
+        since_s = now_s - self._risen_s
+        young = (since_s >= 0.0) & (since_s < rule.persistence_s)
         held = (self._output > 0) & (counted < self._output) & young
         rises = ~held & (counted > 0) & (counted > self._output) & present
         self._risen_s[rises] = now_s
@@ -103,8 +103,7 @@ class AlertMemory:
     def _raw(self, now_s: float, due: BoolArray, early: BoolArray) -> IntArray:
         """Return the highest level that is due; the one that is on may be so early."""
         levels = np.arange(1, due.shape[1] + 1)
-        with np.errstate(invalid="ignore"):
-            before = self._last_s < now_s
+        before = self._last_s < now_s
         on = (self._output[:, np.newaxis] == levels) & before[:, np.newaxis]
         is_due = np.where(on, early, due)
-        return np.asarray(np.max(np.where(is_due, levels, 0), axis=1, initial=0))
+        return np.asarray((is_due * levels).max(axis=1, initial=0))
