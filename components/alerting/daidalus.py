@@ -23,6 +23,7 @@ from dsa_des.block.message import offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
+_RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 # Poses of the ownship that are remembered beyond the last scan: for sights that come late.
 _KEPT_POSES = 10_000
 
@@ -86,6 +87,7 @@ class DaidalusAlerting(Component):
         self._configuration: Configuration = configuration
         self._roster: Any = None
         self._own_tick: IntArray = np.empty(0, dtype=np.int64)
+        self._own_place: FloatArray = np.empty((0, 3))
         self._attitude: FloatArray = np.empty((0, 3))
 
     def run(self, wake: Wake) -> AlertLevels | None:
@@ -107,9 +109,11 @@ class DaidalusAlerting(Component):
             self._roster = states.roster
             self._fit = StraightFit(self.p.fit_s, len(states.roster))
             self._memory = AlertMemory(memory_rule(self._configuration), len(states.roster))
+        place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
+        self._own_tick = np.concatenate([self._own_tick, states.tick])
+        self._own_place = np.concatenate([self._own_place, np.stack(place, axis=1)])
         if self._source:
             angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
-            self._own_tick = np.concatenate([self._own_tick, states.tick])
             self._attitude = np.concatenate([self._attitude, np.stack(angles, axis=1)])
             return
         own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
@@ -148,7 +152,9 @@ class DaidalusAlerting(Component):
         ]
         self._fit.forget_before(times[-1])
         keep = max(int(np.searchsorted(self._own_tick, ticks[0], side="right")) - _KEPT_POSES, 0)
-        self._own_tick, self._attitude = self._own_tick[keep:], self._attitude[keep:]
+        own = self._own_states(ticks)
+        self._own_tick, self._own_place = self._own_tick[keep:], self._own_place[keep:]
+        self._attitude = self._attitude[keep:]
         known = np.stack([one for one, _ in fitted])
         # Positions count from the ownship: its own less theirs is the other way round.
         relative = [-np.ravel([state[i] for _, state in fitted]) for i in range(6)]
@@ -174,5 +180,24 @@ class DaidalusAlerting(Component):
             found.time_to_closest_s[place],
             found.miss_horizontal_m[place],
             found.miss_vertical_m[place],
+            {name: part[place] for name, part in zip(_RELATIVE, relative, strict=True)},
+            own,
             self._roster,
         )
+
+    def _own_states(self, ticks: IntArray) -> dict[str, FloatArray]:
+        """Return the ownship's altitude and its mean velocity over the last seconds."""
+        per_s = self.context.ticks_per_s
+        span = round(self.p.fit_s * per_s)
+        last = np.searchsorted(self._own_tick, ticks, side="right") - 1
+        first = np.searchsorted(self._own_tick, ticks - span, side="left")
+        now, then = self._own_place[last], self._own_place[first]
+        time_s = (self._own_tick[last] - self._own_tick[first]) / per_s
+        time_s = np.where(time_s > 0.0, time_s, np.nan)
+        east, north = east_north_m(then[:, 0], then[:, 1], now[:, 0], now[:, 1])
+        return {
+            "alt_m": now[:, 2],
+            "east_mps": -east / time_s,
+            "north_mps": -north / time_s,
+            "climb_mps": (now[:, 2] - then[:, 2]) / time_s,
+        }

@@ -5,7 +5,7 @@ from typing import Any
 
 from components.aircraft.aircraft import Roster
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry, static
+from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
 MOST_LEVELS = 4
@@ -31,6 +31,11 @@ class AlertLevels(Message):
         met within the lookahead.
     time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
         The projected closest approach, in straight flight.
+    relative : dict of (entries,)
+        What the levels rest on, ownship less target: ``east_m``, ``north_m``, ``up_m`` and
+        ``east_mps``, ``north_mps``, ``climb_mps``.
+    own_motion : dict of (rows,)
+        The ownship's ``alt_m``, ``east_mps``, ``north_mps``, ``climb_mps``; NaN where unknown yet.
     roster : Roster
     """
 
@@ -43,4 +48,6 @@ class AlertLevels(Message):
     time_to_closest_s: FloatArray = per_entry(column="float64")
     closest_horizontal_m: FloatArray = per_entry(column="float64")
     closest_vertical_m: FloatArray = per_entry(column="float64")
+    relative: dict[str, FloatArray] = per_entry()
+    own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
