@@ -99,7 +99,7 @@ class TurnOut(Component):
         own_values = {name: float(values[place]) for name, values in alerts.own_motion.items()}
         if not all(map(math.isfinite, own_values.values())):
             return None
-        alt, *velocity = (np.float64(own_values[name]) for name in _OWN)
+        alt, *velocity = (np.asarray(own_values[name]) for name in _OWN)
         own = State(np.zeros(()), np.zeros(()), alt, *velocity)
         parts = [alerts.relative[name][entries] for name in _RELATIVE]
         intruders = [

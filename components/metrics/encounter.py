@@ -25,6 +25,7 @@ from components.metrics.separation import (
 from components.sensor.cut_off import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
@@ -44,8 +45,8 @@ class EncounterParameters(DeclarationParameters):
     )
 
 
-class WellClearParameters(EncounterParameters):
-    """Parameters of loss of well clear."""
+class SizeParameters(Parameters):
+    """What counts as a loss of well clear, and as a near mid-air collision."""
 
     horizontal_m: float = Field(
         default=_WELL_CLEAR.horizontal_m,
@@ -72,6 +73,54 @@ class WellClearParameters(EncounterParameters):
         description="Difference in height of a near mid-air collision, m.",
     )
 
+    @property
+    def sizes_m(self) -> tuple[tuple[float, float], ...]:
+        """Radius and half height of both cylinders, m."""
+        return (
+            (self.horizontal_m, self.vertical_m),
+            (self.nmac_horizontal_m, self.nmac_vertical_m),
+        )
+
+
+class WellClearParameters(EncounterParameters, SizeParameters):
+    """Parameters of loss of well clear."""
+
+
+def read_flights(
+    group: Group,
+    step_s: float,
+    target: str | None,
+    read: Callable[[list[RelativeFlight]], tuple[float, ...]],
+    width: int,
+) -> FloatArray:
+    """Return what `read` makes of every replica's flights, shape (width, replicas).
+
+    Flights are computed once for all replicas that share them.
+
+    Parameters
+    ----------
+    group : Group
+    step_s : float
+        Spacing of the times at which distances are taken.
+    target : str or None
+        Which one counts; None for all.
+    read : callable
+    width : int
+        How many values it returns.
+    """
+    known: dict[tuple[Any, ...], tuple[float, ...]] = {}
+    values = np.empty((width, len(group)))
+    mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
+    moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
+    scenes = group.scenes if moved else [group.scene] * len(group)
+    for number, scene in enumerate(scenes):
+        key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
+        if key not in known:
+            found = separations(scene, step_s)
+            known[key] = read([s for s in found if target in (None, s.name)])
+        values[:, number] = known[key]
+    return values
+
 
 class _Encounter(TargetMetric):
     Parameters = EncounterParameters
@@ -85,23 +134,8 @@ class _Encounter(TargetMetric):
     def of_flights(
         self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
     ) -> FloatArray:
-        """Return what `read` makes of every replica's flights, shape (width, replicas).
-
-        Flights are computed once for all replicas that share them.
-        """
-        known: dict[tuple[Any, ...], tuple[float, ...]] = {}
-        values = np.empty((width, len(group)))
-        mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
-        moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
-        scenes = group.scenes if moved else [group.scene] * len(group)
-        for number, scene in enumerate(scenes):
-            key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
-            if key not in known:
-                found = separations(scene, self.p.step_s)
-                wanted = [s for s in found if self.p.target in (None, s.name)]
-                known[key] = read(wanted)
-            values[:, number] = known[key]
-        return values
+        """Return what `read` makes of every replica's flights, shape (width, replicas)."""
+        return read_flights(group, self.p.step_s, self.p.target, read, width)
 
 
 class ClosestApproach(_Encounter):
@@ -152,14 +186,6 @@ class WellClear(_Encounter):
 
     Parameters = WellClearParameters
 
-    @property
-    def _sizes_m(self) -> tuple[tuple[float, float], ...]:
-        """Radius and half height of both cylinders."""
-        return (
-            (self.p.horizontal_m, self.p.vertical_m),
-            (self.p.nmac_horizontal_m, self.p.nmac_vertical_m),
-        )
-
     @staticmethod
     def _said(horizontal_m: float, vertical_m: float, standard: Volume) -> str:
         """Return what a result's description says of its cylinder."""
@@ -172,8 +198,8 @@ class WellClear(_Encounter):
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         found = [
-            Result("well_clear_lost", EVENT, self._said(*self._sizes_m[0], _WELL_CLEAR)),
-            Result("nmac", EVENT, self._said(*self._sizes_m[1], _NMAC)),
+            Result("well_clear_lost", EVENT, self._said(*self.p.sizes_m[0], _WELL_CLEAR)),
+            Result("nmac", EVENT, self._said(*self.p.sizes_m[1], _NMAC)),
             Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
         found += [
@@ -187,7 +213,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, partial(_losses, self._sizes_m), 3)
+        lost_s, collision_s, begun_s = self.of_flights(group, partial(losses_s, self.p.sizes_m), 3)
         lost_at_start = in_scan(lost_s, begun_s)
         found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
@@ -211,7 +237,7 @@ def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
     return best[0], best[1], float(_ENDS.index(best[2]))
 
 
-def _losses(
+def losses_s(
     sizes_m: tuple[tuple[float, float], ...], flights: list[RelativeFlight]
 ) -> tuple[float, ...]:
     """Return when well clear is first lost, when a collision first threatens, and the start, s."""
