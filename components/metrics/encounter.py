@@ -187,8 +187,9 @@ class WellClear(_Encounter):
     Parameters = WellClearParameters
 
     @staticmethod
-    def _said(horizontal_m: float, vertical_m: float, standard: Volume) -> str:
+    def _said(sizes_m: tuple[float, float], standard: Volume) -> str:
         """Return what a result's description says of its cylinder."""
+        horizontal_m, vertical_m = sizes_m
         name = " (ASTM F3442)" if standard is _WELL_CLEAR else ""
         if (horizontal_m, vertical_m) == (standard.horizontal_m, standard.vertical_m):
             feet = horizontal_m / FOOT_M, vertical_m / FOOT_M
@@ -198,8 +199,8 @@ class WellClear(_Encounter):
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         found = [
-            Result("well_clear_lost", EVENT, self._said(*self.p.sizes_m[0], _WELL_CLEAR)),
-            Result("nmac", EVENT, self._said(*self.p.sizes_m[1], _NMAC)),
+            Result("well_clear_lost", EVENT, self._said(self.p.sizes_m[0], _WELL_CLEAR)),
+            Result("nmac", EVENT, self._said(self.p.sizes_m[1], _NMAC)),
             Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
         found += [
