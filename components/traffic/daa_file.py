@@ -91,8 +91,9 @@ def read_daa(
     path : path-like
         The file. Which of the two kinds it is shows in its columns, not in its name.
     reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        Where on Earth the origin of an `.xyz` file (sx sy sz: east, north, up) is put. The
-        tangent frame there is kept exactly, so distances between aircraft are those of the file.
+        Where on Earth the origin of an `.xyz` file is put. Its sx and sy are east and north in
+        the tangent plane there, its sz is the altitude above the reference: aircraft at one sz
+        are level with each other, however far apart.
 
     Returns
     -------
@@ -263,7 +264,7 @@ def _geodetic(
     velocity = enu_velocity(samples)
     if "sx" not in samples:
         return {**samples, **velocity}
-    lat, lon, alt = enu_to_geodetic(
+    lat, lon, _ = enu_to_geodetic(
         samples["sx"],
         samples["sy"],
         samples["sz"],
@@ -283,4 +284,6 @@ def _geodetic(
             key: x * axis[0] + y * axis[1] + z * axis[2]
             for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
         }
+    # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
+    alt = samples["sz"] + reference[2]
     return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity}
