@@ -72,6 +72,22 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "age_s": ("s", "", "time since the target's last update"),
         "updated_by": ("", "", "sensors of that update, joined by +"),
     },
+    "alerts": {
+        "target": ("", "", "name of the target"),
+        "level": ("", "", "alert level, 0 without an alert"),
+        **{
+            f"time_to_level_{level}_s": (
+                "s",
+                "",
+                f"time to the volume of level {level} in straight flight, 0 inside; null where it "
+                "is not met within the lookahead",
+            )
+            for level in range(1, 5)
+        },
+        "time_to_closest_s": ("s", "", "time to the horizontal closest approach, 0 if past"),
+        "closest_horizontal_m": ("m", "", "projected horizontal distance there"),
+        "closest_vertical_m": ("m", "", "projected least difference in height"),
+    },
     "manoeuvres": {
         "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
         "rate_rad_s": ("rad/s", "", "rate of that turn"),

@@ -1,11 +1,12 @@
 """The outcome of an encounter, and the warning time before it (``closest_approach``,
 ``well_clear``).
 
-Loss of well clear is that of ASTM F3442 for small unmanned aircraft, 2000 ft horizontally and
-250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
+Loss of well clear is by default that of ASTM F3442 for small unmanned aircraft, 2000 ft
+horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,18 +23,18 @@ from components.metrics.separation import (
     traffic_block,
 )
 from components.sensor.cut_off import END, START, in_scan, said
+from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
-FOOT_M = 0.3048
 #: Where a closest approach may be cut off, see `components.traffic.censored.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
 _NOWHERE = (float("inf"), float("nan"), "")
 _BEFORE = ("detection", "declaration")
 _CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
-WELL_CLEAR_M = (2000 * FOOT_M, 250 * FOOT_M)
-NMAC_M = (500 * FOOT_M, 100 * FOOT_M)
+_WELL_CLEAR, _NMAC = PRESETS["astm_f3442"], PRESETS["nmac"]
 
 
 class EncounterParameters(DeclarationParameters):
@@ -42,6 +43,83 @@ class EncounterParameters(DeclarationParameters):
     step_s: float = Field(
         default=0.1, gt=0, le=10, description="Spacing of the times at which distances are taken."
     )
+
+
+class SizeParameters(Parameters):
+    """What counts as a loss of well clear, and as a near mid-air collision."""
+
+    horizontal_m: float = Field(
+        default=_WELL_CLEAR.horizontal_m,
+        gt=0,
+        le=1e6,
+        description="Horizontal distance below which well clear is lost, m.",
+    )
+    vertical_m: float = Field(
+        default=_WELL_CLEAR.vertical_m,
+        gt=0,
+        le=1e6,
+        description="Difference in height below which well clear is lost, m.",
+    )
+    nmac_horizontal_m: float = Field(
+        default=_NMAC.horizontal_m,
+        gt=0,
+        le=1e6,
+        description="Horizontal distance of a near mid-air collision, m.",
+    )
+    nmac_vertical_m: float = Field(
+        default=_NMAC.vertical_m,
+        gt=0,
+        le=1e6,
+        description="Difference in height of a near mid-air collision, m.",
+    )
+
+    @property
+    def sizes_m(self) -> tuple[tuple[float, float], ...]:
+        """Radius and half height of both cylinders, m."""
+        return (
+            (self.horizontal_m, self.vertical_m),
+            (self.nmac_horizontal_m, self.nmac_vertical_m),
+        )
+
+
+class WellClearParameters(EncounterParameters, SizeParameters):
+    """Parameters of loss of well clear."""
+
+
+def read_flights(
+    group: Group,
+    step_s: float,
+    target: str | None,
+    read: Callable[[list[RelativeFlight]], tuple[float, ...]],
+    width: int,
+) -> FloatArray:
+    """Return what `read` makes of every replica's flights, shape (width, replicas).
+
+    Flights are computed once for all replicas that share them.
+
+    Parameters
+    ----------
+    group : Group
+    step_s : float
+        Spacing of the times at which distances are taken.
+    target : str or None
+        Which one counts; None for all.
+    read : callable
+    width : int
+        How many values it returns.
+    """
+    known: dict[tuple[Any, ...], tuple[float, ...]] = {}
+    values = np.empty((width, len(group)))
+    mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
+    moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
+    scenes = group.scenes if moved else [group.scene] * len(group)
+    for number, scene in enumerate(scenes):
+        key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
+        if key not in known:
+            found = separations(scene, step_s)
+            known[key] = read([s for s in found if target in (None, s.name)])
+        values[:, number] = known[key]
+    return values
 
 
 class _Encounter(TargetMetric):
@@ -56,23 +134,8 @@ class _Encounter(TargetMetric):
     def of_flights(
         self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
     ) -> FloatArray:
-        """Return what `read` makes of every replica's flights, shape (width, replicas).
-
-        Flights are computed once for all replicas that share them.
-        """
-        known: dict[tuple[Any, ...], tuple[float, ...]] = {}
-        values = np.empty((width, len(group)))
-        mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
-        moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
-        scenes = group.scenes if moved else [group.scene] * len(group)
-        for number, scene in enumerate(scenes):
-            key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
-            if key not in known:
-                found = separations(scene, self.p.step_s)
-                wanted = [s for s in found if self.p.target in (None, s.name)]
-                known[key] = read(wanted)
-            values[:, number] = known[key]
-        return values
+        """Return what `read` makes of every replica's flights, shape (width, replicas)."""
+        return read_flights(group, self.p.step_s, self.p.target, read, width)
 
 
 class ClosestApproach(_Encounter):
@@ -121,11 +184,23 @@ class ClosestApproach(_Encounter):
 class WellClear(_Encounter):
     """Loss of well clear and near mid-air collision, and the warning before the loss."""
 
+    Parameters = WellClearParameters
+
+    @staticmethod
+    def _said(sizes_m: tuple[float, float], standard: Volume) -> str:
+        """Return what a result's description says of its cylinder."""
+        horizontal_m, vertical_m = sizes_m
+        name = " (ASTM F3442)" if standard is _WELL_CLEAR else ""
+        if (horizontal_m, vertical_m) == (standard.horizontal_m, standard.vertical_m):
+            feet = horizontal_m / FOOT_M, vertical_m / FOOT_M
+            return f"within {feet[0]:.0f} ft and {feet[1]:.0f} ft{name}"
+        return f"within {horizontal_m:g} m and {vertical_m:g} m"
+
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         found = [
-            Result("well_clear_lost", EVENT, "within 2000 ft and 250 ft (ASTM F3442)"),
-            Result("nmac", EVENT, "within 500 ft and 100 ft"),
+            Result("well_clear_lost", EVENT, self._said(self.p.sizes_m[0], _WELL_CLEAR)),
+            Result("nmac", EVENT, self._said(self.p.sizes_m[1], _NMAC)),
             Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
         found += [
@@ -139,7 +214,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, _losses, 3)
+        lost_s, collision_s, begun_s = self.of_flights(group, partial(losses_s, self.p.sizes_m), 3)
         lost_at_start = in_scan(lost_s, begun_s)
         found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
@@ -163,10 +238,12 @@ def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
     return best[0], best[1], float(_ENDS.index(best[2]))
 
 
-def _losses(flights: list[RelativeFlight]) -> tuple[float, ...]:
+def losses_s(
+    sizes_m: tuple[tuple[float, float], ...], flights: list[RelativeFlight]
+) -> tuple[float, ...]:
     """Return when well clear is first lost, when a collision first threatens, and the start, s."""
     if not flights:
         return (float("nan"),) * 3
-    first = np.array([first_inside(flight, WELL_CLEAR_M, NMAC_M) for flight in flights])
+    first = np.array([first_inside(flight, *sizes_m) for flight in flights])
     lost_s, collision_s = np.fmin.reduce(first).tolist()
     return lost_s, collision_s, 0.0

@@ -20,6 +20,7 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.source import TrafficSource
+from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
 from dsa_des.scene.block import Block
@@ -192,7 +193,7 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     found = [float("nan")] * len(limits_m)
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
-            inside = (piece.horizontal_m < horizontal_m) & (piece.vertical_m < vertical_m)
+            inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
             if isnan(found[number]) and inside.any():
                 found[number] = float(piece.time_s[np.argmax(inside)])
         if not any(map(isnan, found)):

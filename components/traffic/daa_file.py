@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from components.traffic.traffic_file import (
 )
 from components.traffic.units import ALL_TOKENS, clean_token
 
-__all__ = ["TrafficFile", "TrafficFileError", "read_daa"]
+__all__ = ["TrafficFile", "TrafficFileError", "read_daa", "read_daa_samples"]
 
 HEADERS = {
     "name": ("name", "id", "aircraft", "acid", "callsign", "ident"),
@@ -44,6 +45,16 @@ HEADERS = {
     "vy": ("vy",),
     "vz": ("vz",),
 }
+# What alerting reads besides: which alerter an intruder belongs to, and standard deviations; those
+# of "en" are signed square roots of the covariances of east and north.
+EXTRA_HEADERS = {
+    "alerter": ("alerter",),
+    **{
+        name: (name,)
+        for kind in ("s", "v")
+        for name in (*(f"{kind}_{axes}_std" for axes in ("ew", "ns", "en")), f"{kind}z_std")
+    },
+}
 # What DAIDALUS itself assumes where a file has no row of units.
 DEFAULT_UNITS = {
     "time": "s",
@@ -59,6 +70,9 @@ DEFAULT_UNITS = {
     "vx": "knot",
     "vy": "knot",
     "vz": "fpm",
+    "alerter": "",
+    **{f"{name}_std": "m" for name in ("s_ew", "s_ns", "s_en", "sz")},
+    **{f"{name}_std": "m/s" for name in ("v_ew", "v_ns", "v_en", "vz")},
 }
 _VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
 
@@ -77,8 +91,9 @@ def read_daa(
     path : path-like
         The file. Which of the two kinds it is shows in its columns, not in its name.
     reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        Where on Earth the origin of an `.xyz` file (sx sy sz: east, north, up) is put. The
-        tangent frame there is kept exactly, so distances between aircraft are those of the file.
+        Where on Earth the origin of an `.xyz` file is put. Its sx and sy are east and north in
+        the tangent plane there, its sz is the altitude above the reference: aircraft at one sz
+        are level with each other, however far apart.
 
     Returns
     -------
@@ -98,15 +113,58 @@ def read_daa(
     of units is read with those of DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the
     notes. Altitudes are taken as heights above the ellipsoid.
     """
+    table, columns = _table(path, ())
+    notes = table.notes
+    reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
+    if "sx" in columns:
+        notes.append(
+            f"positions are offsets from a reference point, put at latitude {reference[0]:g}, "
+            f"longitude {reference[1]:g}, altitude {reference[2]:g} m"
+        )
+    return table.finish(None, lambda samples: _geodetic(samples, reference))
+
+
+def read_daa_samples(
+    path: str | PathLike[str], extra: Sequence[str] = ()
+) -> dict[str, dict[str, FloatArray]]:
+    """Read the samples of a `.daa` or `.xyz` file as they stand there.
+
+    Parameters
+    ----------
+    path : path-like
+    extra : sequence of str
+        Quantities of `EXTRA_HEADERS` that are wanted too where the file has them.
+
+    Returns
+    -------
+    dict
+        Columns by aircraft, the first one of the file first: time in s as in the file; lat, lon
+        in degrees and alt in m, or sx, sy, sz in m; ve, vn, vu in m/s where velocities are given.
+
+    Raises
+    ------
+    TrafficFileError
+        With all problems of the file.
+    """
+    table, _ = _table(path, extra)
+    return {
+        name: {**samples, **enu_velocity(samples)} for name, samples in table.samples(None).items()
+    }
+
+
+def _table(
+    path: str | PathLike[str], extra: Sequence[str]
+) -> tuple[SampleTable, dict[str, Column]]:
+    """Read a file's rows into a table of samples, not checked yet against each other."""
     problems = Problems(str(path))
     lines = read_lines(Path(path), problems)
     header_line, header_text = lines[0]
     headers = tokens(header_text)
-    places = _find_columns(problems, headers, header_line)
+    places = _find_columns(problems, headers, header_line, extra)
     notes: list[str] = []
     units, body = _find_units(problems, headers, places, lines[1:], notes)
     columns = {}
-    for quantity in _wanted(places):
+    for quantity in [*_wanted(places), *(q for q in extra if q in places)]:
         index = places[quantity]
         line, token = units[quantity]
         factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
@@ -129,20 +187,17 @@ def read_daa(
             )
         else:
             table.add_row(number, row)
-    reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
-    if "sx" in columns:
-        notes.append(
-            f"positions are offsets from a reference point, put at latitude {reference[0]:g}, "
-            f"longitude {reference[1]:g}, altitude {reference[2]:g} m"
-        )
-    return table.finish(None, lambda samples: _geodetic(samples, reference))
+    return table, columns
 
 
-def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str, int]:
+def _find_columns(
+    problems: Problems, headers: list[str], line: int, extra: Sequence[str]
+) -> dict[str, int]:
     """Find which column holds what; a missing required one ends the reading."""
     plain = [header.lower() for header in headers]
     places: dict[str, int] = {}
-    for quantity, names in HEADERS.items():
+    accepted = {**HEADERS, **{quantity: EXTRA_HEADERS[quantity] for quantity in extra}}
+    for quantity, names in accepted.items():
         for name in names:
             if name in plain and quantity not in places:
                 places[quantity] = plain.index(name)
@@ -209,7 +264,7 @@ def _geodetic(
     velocity = enu_velocity(samples)
     if "sx" not in samples:
         return {**samples, **velocity}
-    lat, lon, alt = enu_to_geodetic(
+    lat, lon, _ = enu_to_geodetic(
         samples["sx"],
         samples["sy"],
         samples["sz"],
@@ -229,4 +284,6 @@ def _geodetic(
             key: x * axis[0] + y * axis[1] + z * axis[2]
             for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
         }
+    # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
+    alt = samples["sz"] + reference[2]
     return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity}

@@ -36,6 +36,11 @@ UNITS = {
     "yaw": ANGLE_DEG,
     "pitch": ANGLE_DEG,
     "roll": ANGLE_DEG,
+    "alerter": NO_UNIT,
+    **{f"s_{axes}_std": LENGTH_M for axes in ("ew", "ns", "en")},
+    **{f"v_{axes}_std": SPEED_MPS for axes in ("ew", "ns", "en")},
+    "sz_std": LENGTH_M,
+    "vz_std": SPEED_MPS,
 }
 _LIMITS = {
     "lat": (-90.0, 90.0, "lie in [-90, 90] degrees"),
@@ -156,6 +161,41 @@ class SampleTable:
         TrafficFileError
             With all problems of the file.
         """
+        samples = self.samples(ownship)
+        own = next(iter(samples))
+        start = min(float(columns["time"][0]) for columns in samples.values())
+        made = {}
+        for name, columns in samples.items():
+            columns["time"] = elapsed_times(columns["time"], start)
+            geodetic = to_geodetic(columns)
+            made[name] = self._trajectory(name, geodetic)
+            if (speed_mps := made[name].max_speed_mps) > _FASTEST_MPS:
+                self._problems.add(
+                    f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
+                    f"most {_FASTEST_MPS:g} m/s can be meant"
+                )
+        self._problems.raise_if_any()
+        intruders = [trajectory for name, trajectory in made.items() if name != own]
+        return TrafficFile(made[own], intruders, start, self.notes)
+
+    def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
+        """Check each aircraft's samples and return them as columns, in the order of time.
+
+        Parameters
+        ----------
+        ownship : str or None
+            Its name; None is the first aircraft in the file.
+
+        Returns
+        -------
+        dict
+            Columns by aircraft, the ownship first; times are those of the file.
+
+        Raises
+        ------
+        TrafficFileError
+            With all problems of the file.
+        """
         names = list(self._aircraft)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
@@ -174,20 +214,7 @@ class SampleTable:
         samples = {name: self._sorted(name, rows) for name, rows in self._aircraft.items()}
         self._refuse_long_silence()
         self._problems.raise_if_any()
-        start = min(float(columns["time"][0]) for columns in samples.values())
-        made = {}
-        for name, columns in samples.items():
-            columns["time"] = elapsed_times(columns["time"], start)
-            geodetic = to_geodetic(columns)
-            made[name] = self._trajectory(name, geodetic)
-            if (speed_mps := made[name].max_speed_mps) > _FASTEST_MPS:
-                self._problems.add(
-                    f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
-                    f"most {_FASTEST_MPS:g} m/s can be meant"
-                )
-        self._problems.raise_if_any()
-        intruders = [trajectory for name, trajectory in made.items() if name != own]
-        return TrafficFile(made[own], intruders, start, self.notes)
+        return {own: samples.pop(own), **samples}
 
     def _number(self, line: int, quantity: str, column: Column, cell: str) -> float | None:
         try:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.metrics.encounter import NMAC_M, WELL_CLEAR_M
 from components.metrics.separation import Separation, closest, first_inside, separations
 from components.metrics.track_quality import _ramp_quantiles
+from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Text
 from dsa_des.replicas.replicas import Recorded, Replica, run_replicas
@@ -18,6 +18,9 @@ from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import METRICS, Group, wanted_by
 from dsa_des.studies.study import MetricSpec
 
+WELL_CLEAR_M, NMAC_M = (
+    (PRESETS[name].horizontal_m, PRESETS[name].vertical_m) for name in ("astm_f3442", "nmac")
+)
 KINDS = {"block": str, "target": str, "sensors": str}
 
 
@@ -187,9 +190,19 @@ def test_distances_do_not_depend_on_the_pieces_they_come_in(
         assert found() == whole
 
 
+def with_alerts(folder: Path) -> str:
+    """The small scene with a block that alerts of the truth."""
+    text = (folder / "small.toml").read_text(encoding="utf-8")
+    conf = Path(__file__).parents[2] / "configs" / "alerting" / "do365b.conf"
+    text = text.replace("wires = [", 'wires = [ "traffic -> alarm",', 1)
+    text += f'\n[blocks.alarm]\ntype = "alerting.daidalus"\nscan_rate_hz = 4\nconf = "{conf}"\n'
+    (folder / "alarm.toml").write_text(text, encoding="utf-8")
+    return "alarm.toml"
+
+
 @pytest.mark.parametrize("name", sorted(registered(METRICS)))
 def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) -> None:
-    scene = load_scene("small.toml")
+    scene = load_scene(with_alerts(small) if name == "alert_times" else "small.toml")
     metric = MetricSpec(name).build(scene)
     wanted = wanted_by([metric])
     replicas = [

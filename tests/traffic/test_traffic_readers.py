@@ -81,19 +81,23 @@ def test_track_and_components_are_the_same_velocity(tmp_path):
         assert a == pytest.approx(b, abs=1e-12)
 
 
-def test_xyz_distances_are_those_of_the_file(tmp_path):
-    """Offsets keep their Euclidean distances wherever on Earth the reference point is put."""
+def test_xyz_heights_are_altitudes_and_distances_those_of_the_file(tmp_path):
+    """Wherever on Earth the reference point is put; the Earth falls away by d² / 2R."""
     rng = np.random.default_rng(5)
-    own, other = rng.uniform(-20, 20, (2, 6, 3)) * [1, 1, 200] + [0, 0, 6000]
+    own, other = rng.uniform(-3, 3, (2, 6, 3)) * [1, 1, 1000] + [0, 0, 6000]
     rows = ["NAME sx sy sz time", "[none] [nmi] [nmi] [ft] [s]"]
     for t in range(6):
         rows.append(f"Own {' '.join(map(repr, map(float, own[t])))} {t}")
         rows.append(f"Int {' '.join(map(repr, map(float, other[t])))} {t}")
     path = write(tmp_path, "\n".join(rows), "e.xyz")
-    expected = np.linalg.norm((own - other) * [1852, 1852, 0.3048], axis=1)
+    apart = (own - other) * [1852, 1852, 0.3048]
+    expected = np.linalg.norm(apart, axis=1)
     for lat, lon in ((0, 0), (45, -75), (89.99, 179.999), (-90, 0)):
-        file = read_daa(path, reference_lat_deg=lat, reference_lon_deg=lon)
-        assert slant_range(file, np.arange(6.0)) == pytest.approx(expected, abs=1e-7)
+        file = read_daa(path, reference_lat_deg=lat, reference_lon_deg=lon, reference_alt_m=70)
+        alt = [aircraft.at(np.arange(6.0)).alt_m for aircraft in file.aircraft]
+        assert alt[0] == pytest.approx(own[:, 2] * 0.3048 + 70, abs=1e-9)
+        assert alt[0] - alt[1] == pytest.approx(apart[:, 2], abs=1e-9)
+        assert slant_range(file, np.arange(6.0)) == pytest.approx(expected, abs=6.0)
     assert "reference point" in file.notes[0]
 
 

@@ -5,6 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
+from covering import covers
 from wired import HEARS_ALL, chain, measured
 
 FOOT_M = 0.3048
@@ -47,6 +48,28 @@ def test_a_near_collision_is_one_by_horizontal_distance(vertical_m):
 )  # fmt: skip
 def test_each_limit_is_that_of_its_own_distance(horizontal_m, vertical_m, lost, nmac):
     found = measured(encounter(abeam(horizontal_m, vertical_m)), "well_clear")
+    assert (found["well_clear_lost"], found["nmac"]) == (lost, nmac)
+
+
+@covers(
+    "horizontal_m", "vertical_m", "nmac_horizontal_m", "nmac_vertical_m",
+    of=("[metric well_clear]",),
+)  # fmt: skip
+@pytest.mark.parametrize(
+    ("sizes", "lost", "nmac"),
+    [
+        ({}, 0, 0),
+        ({"horizontal_m": 830}, 1, 0),
+        ({"horizontal_m": 810, "vertical_m": 300}, 0, 0),
+        ({"horizontal_m": 830, "vertical_m": 35}, 0, 0),
+        ({"nmac_horizontal_m": 830}, 0, 0),
+        ({"nmac_horizontal_m": 830, "nmac_vertical_m": 45}, 0, 1),
+        ({"nmac_horizontal_m": 810, "nmac_vertical_m": 45}, 0, 0),
+    ],
+)
+def test_sizes_may_be_chosen(sizes, lost, nmac):
+    """A target 820 m abeam and 40 m higher."""
+    found = measured(encounter(abeam(820.0, 40.0)), {"metric": "well_clear", **sizes})
     assert (found["well_clear_lost"], found["nmac"]) == (lost, nmac)
 
 

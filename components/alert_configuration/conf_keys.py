@@ -1,0 +1,119 @@
+"""The keys of a `.conf` file that belong to no alerter: kind of value and default."""
+
+import math
+from collections.abc import Mapping
+
+from components.traffic.units import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
+
+GRAVITY_MPS2 = 9.80665
+
+#: Units by kind of value, each with its factor to SI units (radians for angles).
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "time": TIME_S,
+    "length": LENGTH_M,
+    "speed": SPEED_MPS,
+    "angle": {unit: math.radians(factor) for unit, factor in ANGLE_DEG.items()},
+    "turn rate": {"deg/s": math.radians(1.0), "rad/s": 1.0},
+    "acceleration": {"m/s^2": 1.0, "g": GRAVITY_MPS2, "ft/s^2": 0.3048},
+}
+
+#: Kind, default and its unit of each key.
+KEYS: Mapping[str, tuple[str, object, str]] = {
+    "lookahead_time": ("time", 180.0, "s"),
+    "left_hdir": ("angle", 180.0, "deg"),
+    "right_hdir": ("angle", 180.0, "deg"),
+    "min_hs": ("speed", 10.0, "knot"),
+    "max_hs": ("speed", 700.0, "knot"),
+    "min_airspeed": ("speed", 10.0, "knot"),
+    "min_vs": ("speed", -6000.0, "fpm"),
+    "max_vs": ("speed", 6000.0, "fpm"),
+    "min_alt": ("length", 100.0, "ft"),
+    "max_alt": ("length", 50000.0, "ft"),
+    "below_relative_hs": ("speed", 0.0, "knot"),
+    "above_relative_hs": ("speed", 0.0, "knot"),
+    "below_relative_vs": ("speed", 0.0, "fpm"),
+    "above_relative_vs": ("speed", 0.0, "fpm"),
+    "below_relative_alt": ("length", 0.0, "ft"),
+    "above_relative_alt": ("length", 0.0, "ft"),
+    "step_hdir": ("angle", 1.0, "deg"),
+    "step_hs": ("speed", 5.0, "knot"),
+    "step_vs": ("speed", 100.0, "fpm"),
+    "step_alt": ("length", 100.0, "ft"),
+    "turn_rate": ("turn rate", 3.0, "deg/s"),
+    "bank_angle": ("angle", 0.0, "deg"),
+    "horizontal_accel": ("acceleration", 2.0, "m/s^2"),
+    "vertical_accel": ("acceleration", 0.25, "g"),
+    "vertical_rate": ("speed", 500.0, "fpm"),
+    "min_horizontal_recovery": ("length", 0.0, "nmi"),
+    "min_vertical_recovery": ("length", 0.0, "ft"),
+    "recovery_hdir": ("yes or no", True, ""),
+    "recovery_hs": ("yes or no", True, ""),
+    "recovery_vs": ("yes or no", True, ""),
+    "recovery_alt": ("yes or no", True, ""),
+    "recovery_stability_time": ("time", 3.0, "s"),
+    "ca_bands": ("yes or no", False, ""),
+    "ca_factor": ("number", 0.1, ""),
+    "horizontal_nmac": ("length", 500.0, "ft"),
+    "vertical_nmac": ("length", 100.0, "ft"),
+    "hysteresis_time": ("time", 0.0, "s"),
+    "persistence_time": ("time", 0.0, "s"),
+    "bands_persistence": ("yes or no", False, ""),
+    "persistence_preferred_hdir": ("angle", 0.0, "deg"),
+    "persistence_preferred_hs": ("speed", 0.0, "knot"),
+    "persistence_preferred_vs": ("speed", 0.0, "fpm"),
+    "persistence_preferred_alt": ("length", 0.0, "ft"),
+    "alerting_m": ("count", 0, ""),
+    "alerting_n": ("count", 0, ""),
+    "h_pos_z_score": ("number", 0.0, ""),
+    "h_vel_z_score_min": ("number", 0.0, ""),
+    "h_vel_z_score_max": ("number", 0.0, ""),
+    "h_vel_z_distance": ("length", 0.0, "nmi"),
+    "v_pos_z_score": ("number", 0.0, ""),
+    "v_vel_z_score": ("number", 0.0, ""),
+    "corrective_region": ("region", "NEAR", ""),
+    "ownship_centric_alerting": ("yes or no", True, ""),
+    "bands_add_time_to_maneuver": ("yes or no", False, ""),
+    "conflict_crit": ("yes or no", False, ""),
+    "recovery_crit": ("yes or no", False, ""),
+    "hdir_bands_below_min_as": ("count", 0, ""),
+    "contour_thr": ("angle", 180.0, "deg"),
+    "dta_logic": ("count", 0, ""),
+    "dta_latitude": ("angle", 0.0, "deg"),
+    "dta_longitude": ("angle", 0.0, "deg"),
+    "dta_radius": ("length", 0.0, "nmi"),
+    "dta_height": ("length", 0.0, "ft"),
+    "dta_alerter": ("count", 0, ""),
+}
+
+#: Keys that only their default may be given for, since what they switch on is not there.
+ONLY_OFF = ("conflict_crit", "recovery_crit", "hdir_bands_below_min_as", "dta_logic")
+#: Keys that may be negative.
+SIGNED = ("min_vs", "max_vs", "min_alt", "max_alt", "dta_latitude", "dta_longitude", "dta_logic")
+
+#: Keys of one level, after ``<alerter>_alert_<level>_``; `early_alerting_time` and spreads may be
+#: left out.
+LEVEL_KEYS: Mapping[str, str] = {
+    "region": "region",
+    "detector": "name",
+    "alerting_time": "time",
+    "early_alerting_time": "time",
+    "spread_hdir": "angle",
+    "spread_hs": "speed",
+    "spread_vs": "speed",
+    "spread_alt": "length",
+}
+#: Keys of one volume, after ``<alerter>_<detector>_``.
+VOLUME_KEYS: Mapping[str, str] = {
+    "WCV_DTHR": "length",
+    "WCV_ZTHR": "length",
+    "WCV_TTHR": "time",
+    "WCV_TCOA": "time",
+}
+#: Time variable by class of volume.
+CLASSES: Mapping[str, str] = {
+    "WCV_TAUMOD": "modified_tau",
+    "WCV_TCPA": "time_to_closest",
+    "WCV_TEP": "time_to_entry",
+    "WCV_TAUMOD_SUM": "modified_tau",
+}
+CLASS_PREFIX = "gov.nasa.larcfm.ACCoRD."

@@ -1,0 +1,76 @@
+"""What an alerting configuration holds: alerters with their levels, and values by key."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from components.well_clear.volume import Volume
+
+#: Regions of guidance from mild to severe.
+REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of an alerter.
+
+    Parameters
+    ----------
+    volume : Volume
+    region : str
+        What its bands are painted as, one of `REGIONS`.
+    alerting_time_s, early_alerting_time_s : float
+        How long before the volume is entered the level is due; the early one holds while it is on.
+    uncertain : bool
+        Whether the bounds on the states count (volumes of class WCV_TAUMOD_SUM).
+    """
+
+    volume: Volume
+    region: str
+    alerting_time_s: float
+    early_alerting_time_s: float
+    uncertain: bool = False
+
+
+@dataclass(frozen=True)
+class Alerter:
+    """Levels 1, 2, ... for one class of intruders."""
+
+    name: str
+    levels: tuple[Level, ...]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A whole configuration.
+
+    Parameters
+    ----------
+    alerters : tuple of Alerter
+        The first is that of intruders whose alerter is not said.
+    values : mapping
+        Every other key of the file format, in SI units and radians.
+    units : mapping
+        The unit in which the file gives each key that has one.
+    """
+
+    alerters: tuple[Alerter, ...]
+    values: Mapping[str, Any]
+    units: Mapping[str, str]
+
+    def __getitem__(self, key: str) -> Any:
+        """Return the value of a key, in SI units."""
+        return self.values[key]
+
+    @property
+    def most_levels(self) -> int:
+        """Most levels of an alerter."""
+        return max(len(alerter.levels) for alerter in self.alerters)
+
+    def corrective_level(self, alerter: Alerter) -> Level | None:
+        """Return the first level whose region is at least the corrective one."""
+        least = REGIONS.index(self["corrective_region"])
+        for level in alerter.levels:
+            if REGIONS.index(level.region) >= least:
+                return level
+        return None

@@ -1,0 +1,165 @@
+"""The figure of an encounter's alerts: levels and times over time, and the flights from above."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.alert_configuration.configuration import Configuration
+from components.alerting.bands_over_time import BandsOverTime, direction_bands
+from components.alerting.encounter import Encounter
+from components.alerting.levels import Alerts
+from components.well_clear.volume import NAUTICAL_MILE_M
+from dsa_des.record.drawing import drawing, figure_text, tight
+
+#: Colour of each level from 0; levels beyond the last share its colour.
+_COLOURS = ("#7f7f7f", "#e6b800", "#e07b00", "#c1121f")
+#: Colour of each region's bands; NONE is left blank.
+_REGIONS = {"FAR": "#f2d66b", "MID": "#e07b00", "NEAR": "#c1121f", "RECOVERY": "#5aa469"}
+_STYLES = ("-", "--", "-.", ":")
+_MOST_NAMED = 8
+
+
+def draw_alerts(
+    path: Path,
+    title: str,
+    configuration: Configuration,
+    encounter: Encounter,
+    alerts: Alerts,
+) -> None:
+    """Draw the alerts of one encounter into a PNG file.
+
+    Parameters
+    ----------
+    path : Path
+    title : str
+    configuration : Configuration
+    encounter : Encounter
+    alerts : Alerts
+        Of the encounter.
+    """
+    with drawing(9.0, 7.5, path) as figure:
+        grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
+        over_time = figure.add_subplot(grid[0, 0])
+        _levels(over_time, configuration, encounter, alerts)
+        _times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
+        bands = direction_bands(configuration, encounter, alerts)
+        _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
+        _from_above(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
+        figure.suptitle(figure_text(title))
+        tight(figure)
+
+
+def _since(encounter: Encounter) -> Any:
+    return encounter.time_s - encounter.time_s[0]
+
+
+def _levels(axes: Any, configuration: Configuration, encounter: Encounter, alerts: Alerts) -> None:
+    """Draw each target's alert level as steps."""
+    for number, target in enumerate(encounter.targets):
+        level = np.where(encounter.present[:, number], alerts.level[:, number], np.nan)
+        name = figure_text(target) if number < _MOST_NAMED else None
+        axes.step(_since(encounter), level, where="post", linewidth=1.3, label=name)
+    axes.set_yticks(range(configuration.most_levels + 1))
+    axes.set_ylim(-0.2, configuration.most_levels + 0.2)
+    axes.set_ylabel("alert level")
+    axes.set_title("alert level")
+    axes.legend(loc="upper left")
+
+
+def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
+    """Draw the time to the volume of each level, of the target that is nearest to it."""
+    least = np.min(
+        np.where(encounter.present[:, :, np.newaxis], alerts.violation_s, np.inf), axis=1
+    )
+    for number in range(least.shape[1]):
+        axes.plot(
+            _since(encounter),
+            np.where(np.isfinite(least[:, number]), least[:, number], np.nan),
+            color=_colour(number + 1),
+            linestyle=_STYLES[number % len(_STYLES)],
+            linewidth=2.4 - 0.5 * min(number, 3),
+            label=f"level {number + 1}",
+        )
+    axes.set_ylabel("time to violation, s")
+    axes.set_title("time to the volume of each level")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="upper right")
+
+
+def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
+    """Draw the bands of direction over time, and the direction that is flown."""
+    time_s = found.time_s - encounter.time_s[0]
+    width_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    named: set[str] = set()
+    for at_s, bands in zip(time_s.tolist(), found.bands, strict=True):
+        for band in bands:
+            colour = _REGIONS.get(band.region)
+            if colour is None:
+                continue
+            axes.bar(
+                at_s,
+                np.degrees(band.high - band.low),
+                width_s,
+                np.degrees(band.low),
+                color=colour,
+                align="edge",
+                label=None if band.region in named else band.region,
+            )
+            named.add(band.region)
+    axes.plot(time_s, np.degrees(found.own_value), "k.", markersize=2, label="flown")
+    axes.set_ylim(0.0, 360.0)
+    axes.set_yticks((0, 90, 180, 270, 360))
+    axes.set_ylabel("direction, deg")
+    axes.set_xlabel(f"time since {encounter.time_s[0]:.10g} s, s")
+    axes.set_title("bands of direction over ground")
+    axes.legend(loc="upper left")
+
+
+def _from_above(
+    axes: Any, configuration: Configuration, encounter: Encounter, alerts: Alerts
+) -> None:
+    """Draw the flights in the plane of the first sample, the ownship coloured by its alerts."""
+    own = encounter.own_plane / NAUTICAL_MILE_M
+    highest = np.max(np.where(encounter.present, alerts.level, 0), axis=1, initial=0)
+    axes.plot(*own, color="black", linewidth=0.8, label=figure_text(encounter.ownship))
+    for level in range(1, int(highest.max(initial=0)) + 1):
+        at = highest == level
+        if at.any():
+            axes.plot(*own[:, at], ".", color=_colour(level), markersize=4, label=f"level {level}")
+    for number, target in enumerate(encounter.targets):
+        there = encounter.present[:, number]
+        plane = np.where(there, encounter.target_plane[:, :, number], np.nan) / NAUTICAL_MILE_M
+        name = figure_text(target) if number < _MOST_NAMED else None
+        axes.plot(*plane, linewidth=1.2, label=name)
+        if there.any():
+            axes.plot(*plane[:, np.argmax(there)], "o", color="black", markersize=3)
+    axes.plot(*own[:, 0], "o", color="black", markersize=3)
+    _volume(axes, configuration, encounter)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("east, nmi")
+    axes.set_ylabel("north, nmi")
+    axes.set_title("flights, and the volume where they are closest")
+    axes.legend(loc="best")
+
+
+def _volume(axes: Any, configuration: Configuration, encounter: Encounter) -> None:
+    """Draw the radius of the corrective volume around the ownship at the closest approach."""
+    if not encounter.present.any():
+        return
+    range_m = np.hypot(encounter.relative[0], encounter.relative[1])
+    row, column = np.unravel_index(
+        int(np.argmin(np.where(encounter.present, range_m, np.inf))), range_m.shape
+    )
+    alerter = configuration.alerters[int(encounter.alerter[row, column])]
+    level = configuration.corrective_level(alerter)
+    if level is None:
+        return
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    radius = level.volume.horizontal_m / NAUTICAL_MILE_M
+    east, north = encounter.own_plane[:, row] / NAUTICAL_MILE_M
+    axes.plot(east + radius * np.sin(turn), north + radius * np.cos(turn), "k:", linewidth=1.0)
+
+
+def _colour(level: int) -> str:
+    return _COLOURS[min(level, len(_COLOURS) - 1)]

@@ -1,0 +1,173 @@
+"""``dsa-des alert``: tables and figures of recorded encounters."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.conf_file import read_conf
+from components.alert_configuration.configuration import Configuration
+from components.alerting.alert_figure import draw_alerts
+from components.alerting.alert_table import alert_table, without_memory
+from components.alerting.encounter import Encounter, read_encounter
+from components.alerting.levels import Alerts, alert_levels
+from components.traffic.traffic_file import TrafficFileError
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
+from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.files.output_names import named, reason_of
+from dsa_des.terminal.tables import print_table
+from dsa_des.terminal.terminal import console, say
+
+_SUFFIXES = (".daa", ".xyz")
+_OTHER_PROBLEMS = 5
+
+
+class _Done(NamedTuple):
+    """An encounter and its alerts."""
+
+    path: Path
+    encounter: Encounter
+    alerts: Alerts
+
+
+def alert_files(
+    encounters: tuple[str, ...],
+    conf: str,
+    out: str,
+    no_hysteresis: bool,
+    figure: str | None,
+    decimals: int,
+) -> None:
+    """Write the tables and figures that the command line asks for.
+
+    Raises
+    ------
+    UsageError
+        For every file that cannot be used, before anything is written.
+    OutputError
+        If a result cannot be written.
+    """
+    paths, several = _found(encounters)
+    names = {"--out": out, **({"--figure": figure} if figure is not None else {})}
+    places = {option: named(name, option) for option, name in names.items()}
+    if figure is not None and places["--out"].resolve() == places["--figure"].resolve():
+        raise UsageError("--figure and --out name the same place: each needs its own")
+    for option, place in places.items():
+        if several:
+            OutputFolder(place).check()
+        else:
+            check_file(place, option)
+    configuration = _read(Path(conf))
+    if no_hysteresis:
+        configuration = without_memory(configuration)
+    done = _alerts(configuration, paths)
+    try:
+        if several:
+            _write_folders(configuration, done, places, decimals)
+        else:
+            _write(configuration, done[0], places["--out"], decimals)
+            if "--figure" in places:
+                _draw(configuration, done[0], places["--figure"])
+    except OSError as error:
+        raise OutputError(f"{error.filename or out}: cannot be written: {reason_of(error)}") from (
+            error
+        )
+    _show(configuration, done, places)
+
+
+def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
+    """Return the files that are named, those of folders sorted, and whether they may be several."""
+    found: list[Path] = []
+    several = len(encounters) > 1
+    for text in encounters:
+        try:
+            path = resolve_home(text)
+        except InputFileError as error:
+            raise UsageError(f"{text}: {error}") from error
+        if not is_folder(path):
+            found.append(path)
+            continue
+        several = True
+        inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+        if not inside:
+            raise UsageError(f"{text}: the folder holds no {' or '.join(_SUFFIXES)} file")
+        found += inside
+    stems: dict[str, Path] = {}
+    for path in found:
+        other = stems.setdefault(path.stem, path)
+        if other is not path:
+            raise UsageError(f"{other} and {path} would both be written to {path.stem}.csv")
+    return found, several
+
+
+def _read(path: Path) -> Configuration:
+    try:
+        return read_conf(path)
+    except TrafficFileError as error:
+        raise UsageError(*str(error).split("\n")) from error
+
+
+def _alerts(configuration: Configuration, paths: list[Path]) -> list[_Done]:
+    """Return the alerts of all files, or one error about all that cannot be used."""
+    done, problems = [], []
+    for path in paths:
+        try:
+            encounter = read_encounter(path, configuration)
+        except TrafficFileError as error:
+            problems.append(str(error).split("\n"))
+            continue
+        alerts = alert_levels(
+            configuration,
+            encounter.time_s,
+            encounter.present,
+            encounter.relative,
+            encounter.alerter,
+            encounter.bounds,
+        )
+        done.append(_Done(path, encounter, alerts))
+    if problems:
+        lines = [line for problem in problems[:_OTHER_PROBLEMS] for line in problem]
+        if len(problems) > _OTHER_PROBLEMS:
+            lines.append(f"and {len(problems) - _OTHER_PROBLEMS} more files with problems")
+        raise UsageError(*lines)
+    return done
+
+
+def _write_folders(
+    configuration: Configuration, done: list[_Done], places: dict[str, Path], decimals: int
+) -> None:
+    with OutputFolder(places["--out"]).writing() as folder:
+        for one in done:
+            _write(configuration, one, folder / f"{one.path.stem}.csv", decimals)
+    if "--figure" in places:
+        with OutputFolder(places["--figure"]).writing() as folder:
+            for one in done:
+                _draw(configuration, one, folder / f"{one.path.stem}.png")
+
+
+def _write(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
+    write_file(path, alert_table(configuration, one.encounter, one.alerts, decimals).encode())
+
+
+def _draw(configuration: Configuration, one: _Done, path: Path) -> None:
+    draw_alerts(path, one.path.stem, configuration, one.encounter, one.alerts)
+
+
+def _show(configuration: Configuration, done: list[_Done], places: dict[str, Path]) -> None:
+    """Print when each level first comes on."""
+    levels = range(1, configuration.most_levels + 1)
+    rows = []
+    for one in done:
+        for number, target in enumerate(one.encounter.targets):
+            level = one.alerts.level[:, number]
+            seen = [one.encounter.time_s[level == k] for k in levels]
+            firsts = [f"{times[0]:.1f}" if len(times) else "" for times in seen]
+            highest = int(np.max(level, initial=0))
+            rows.append([one.path.name, target, str(highest), *firsts])
+    headings = ["file", "target", "highest level", *(f"level {k} from, s" for k in levels)]
+    right = range(2, len(headings))
+    print_table(console(), "Alerts, times as in the files", headings, rows, right=right)
+    for place in places.values():
+        say(f"written: {place}")

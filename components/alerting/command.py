@@ -1,0 +1,40 @@
+"""The command ``dsa-des alert``; it imports click only, so that ``--help`` stays instant."""
+
+from typing import Any
+
+import click
+
+from dsa_des.commands.plain_errors import plain_errors
+
+
+@click.command()
+@click.argument("encounters", metavar="FILE...", nargs=-1, required=True)
+@click.option("--conf", required=True, metavar="FILE.conf", help="Alerters, times and memory.")
+@click.option(
+    "--out",
+    required=True,
+    metavar="ALERTS.csv",
+    help="The table; of several encounters a folder, one table each.",
+)
+@click.option("--no-hysteresis", is_flag=True, help="No memory: every row stands by itself.")
+@click.option(
+    "--figure",
+    metavar="FILE.png",
+    help="Also draw levels, times and flights; of several encounters a folder.",
+)
+@click.option(
+    "--decimals",
+    default=6,
+    show_default=True,
+    type=click.IntRange(0, 15),
+    help="Decimals of the numbers in the table.",
+)
+@plain_errors
+def alert(**options: Any) -> None:
+    """Alert levels of recorded encounters, by a configuration of DAIDALUS.
+
+    FILE is a .daa or .xyz file, whose first aircraft is the ownship, or a folder of them.
+    """
+    from components.alerting.alert_files import alert_files
+
+    alert_files(**options)

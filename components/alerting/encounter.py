@@ -1,0 +1,224 @@
+"""A recorded encounter as relative states at the ownship's times."""
+
+from collections.abc import Callable
+from os import PathLike
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.configuration import Configuration
+from components.geometry.daidalus_sphere import east_north_m, east_north_mps
+from components.traffic.daa_file import EXTRA_HEADERS, read_daa_samples
+from components.traffic.traffic_file import Problems
+from components.well_clear.uncertainty import Bounds
+from components.well_clear.violation import Relative
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+Samples = dict[str, FloatArray]
+
+
+class Encounter(NamedTuple):
+    """An ownship and its targets at the ownship's times.
+
+    Parameters
+    ----------
+    ownship : str
+    targets : tuple of str
+    time_s : (times,)
+        As in the file.
+    present : (times, targets) of bool
+        Where a target has a sample since the ownship's last one.
+    relative : six of (times, targets)
+        East, north, up in m and their rates in m/s, ownship less intruder, in the ownship's plane.
+    alerter : (times, targets) of int
+        Place of each target's alerter in the configuration, from 0.
+    bounds : Bounds or None
+        How far the relative states may be wrong, where the file says so.
+    own_state : (4, times)
+        Altitude, and velocity east, north, up of the ownship, m and m/s.
+    own_plane : (2, times)
+        East and north of the ownship in the plane of its first sample, m, for figures.
+    target_plane : (2, times, targets)
+        The same of the targets.
+    """
+
+    ownship: str
+    targets: tuple[str, ...]
+    time_s: FloatArray
+    present: BoolArray
+    relative: Relative
+    alerter: IntArray
+    bounds: Bounds | None
+    own_state: FloatArray
+    own_plane: FloatArray
+    target_plane: FloatArray
+
+
+def read_encounter(path: str | PathLike[str], configuration: Configuration) -> Encounter:
+    """Read a `.daa` or `.xyz` file; the first aircraft is the ownship.
+
+    Parameters
+    ----------
+    path : path-like
+    configuration : Configuration
+        Its alerters, and how the file's standard deviations count.
+
+    Raises
+    ------
+    TrafficFileError
+        With all problems of the file; also without velocities, or with an alerter that is not
+        there.
+
+    Notes
+    -----
+    Targets count at the ownship's times. One whose last sample is older than the ownship's but
+    younger than the ownship's previous one is flown straight to the ownship's time.
+    """
+    samples = read_daa_samples(path, tuple(EXTRA_HEADERS))
+    problems = Problems(str(path))
+    names = tuple(samples)
+    own = samples[names[0]]
+    if "ve" not in own:
+        problems.fail("there are no velocities: columns trk, gs, vs or vx, vy, vz are needed")
+    others = [samples[name] for name in names[1:]]
+    place, present = _latest(own["time"], others)
+    targets = {key: _gather([o[key] for o in others], place) for key in own}
+    late_s = np.where(present, own["time"][:, np.newaxis] - targets["time"], 0.0)
+    flat = "sx" in own
+    state = _flat_states if flat else _projected_states
+    relative, own_state, own_plane, target_plane = state(own, targets, late_s)
+    which = _alerters(configuration, own, targets, present, problems)
+    bounds = _bounds(configuration, own, targets, relative) if "s_ew_std" in own else None
+    return Encounter(
+        names[0],
+        names[1:],
+        own["time"],
+        present,
+        relative,
+        which,
+        bounds,
+        own_state,
+        own_plane,
+        target_plane,
+    )
+
+
+def _latest(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
+    """Return each target's last sample at each of the ownship's times, and whether it is new."""
+    place = np.stack([np.searchsorted(o["time"], own_s, side="right") - 1 for o in others], axis=1)
+    before = np.concatenate([[-np.inf], own_s[:-1]])
+    times = _gather([other["time"] for other in others], place)
+    # On its first row the ownship takes a target only with a sample of that very time.
+    since = np.where(np.isinf(before), np.nextafter(own_s, -np.inf), before)
+    return place, (place >= 0) & (times > since[:, np.newaxis])
+
+
+def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:
+    return np.stack(
+        [column[np.maximum(place[:, i], 0)] for i, column in enumerate(columns)], axis=1
+    )
+
+
+def _flat_states(
+    own: Samples, targets: Samples, late_s: FloatArray
+) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
+    """Return the states of a file in east, north and up."""
+    velocity = [(own[key][:, np.newaxis], targets[key]) for key in ("ve", "vn", "vu")]
+    at = [
+        (own[key][:, np.newaxis], targets[key] + late_s * rates[1])
+        for key, rates in zip(("sx", "sy", "sz"), velocity, strict=True)
+    ]
+    relative = tuple(mine - other for mine, other in [*at, *velocity])
+    return (
+        relative,
+        np.stack([own[key] for key in ("sz", "ve", "vn", "vu")]),
+        np.stack([own["sx"], own["sy"]]),
+        np.stack([at[0][1], at[1][1]]),
+    )
+
+
+def _projected_states(
+    own: Samples, targets: Samples, late_s: FloatArray
+) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
+    """Return the states of a file in latitude and longitude, in the plane below the ownship."""
+    own_lat, own_lon = (np.radians(own[key])[:, np.newaxis] for key in ("lat", "lon"))
+    lat, lon = (np.radians(targets[key]) for key in ("lat", "lon"))
+    mine = east_north_mps(
+        own_lat, own_lon, own["ve"][:, np.newaxis], own["vn"][:, np.newaxis], own_lat, own_lon
+    )
+    theirs = east_north_mps(lat, lon, targets["ve"], targets["vn"], own_lat, own_lon)
+    at = east_north_m(lat, lon, own_lat, own_lon)
+    up = own["alt"][:, np.newaxis] - (targets["alt"] + late_s * targets["vu"])
+    relative = (
+        -(at[0] + late_s * theirs[0]),
+        -(at[1] + late_s * theirs[1]),
+        up,
+        mine[0] - theirs[0],
+        mine[1] - theirs[1],
+        own["vu"][:, np.newaxis] - targets["vu"],
+    )
+    first = own_lat[:1], own_lon[:1]
+    return (
+        relative,
+        np.stack([own["alt"], mine[0][:, 0], mine[1][:, 0], own["vu"]]),
+        np.stack(east_north_m(own_lat, own_lon, *first))[:, :, 0],
+        np.stack(east_north_m(lat, lon, *first)),
+    )
+
+
+def _alerters(
+    configuration: Configuration,
+    own: Samples,
+    targets: Samples,
+    present: BoolArray,
+    problems: Problems,
+) -> IntArray:
+    """Return the place of each target's alerter, from 0."""
+    shape = present.shape
+    if "alerter" not in own:
+        return np.zeros(shape, dtype=np.int64)
+    count = len(configuration.alerters)
+    if configuration["ownship_centric_alerting"]:
+        number = np.broadcast_to(own["alerter"][:, np.newaxis], shape)
+    else:
+        number = targets["alerter"]
+    bad = present & ~((number >= 1) & (number <= count) & (number == np.floor(number)))
+    if bad.any():
+        problems.fail(
+            f"an alerter is {number[bad][0]:g}: it must be a whole number from 1 to {count}, the "
+            "number of alerters of the configuration",
+            column="alerter",
+        )
+    return np.where(present, number, 1.0).astype(np.int64) - 1
+
+
+def _bounds(
+    configuration: Configuration, own: Samples, targets: Samples, relative: Relative
+) -> Bounds:
+    """Return how far relative states may be wrong: standard deviations times z-scores."""
+
+    def both(find: Callable[..., Any], *keys: str) -> FloatArray:
+        mine = [own[key][:, np.newaxis] for key in keys]
+        theirs = [targets[key] for key in keys]
+        return np.asarray(find(*mine) + find(*theirs))
+
+    position = configuration["h_pos_z_score"] * both(_largest, "s_ew_std", "s_ns_std", "s_en_std")
+    east, north = relative[0], relative[1]
+    least, most = configuration["h_vel_z_score_min"], configuration["h_vel_z_score_max"]
+    distance_m = configuration["h_vel_z_distance"]
+    range_m = np.maximum(np.hypot(east, north) - position, 0.0)
+    share = np.minimum(range_m / distance_m, 1.0) if distance_m > 0.0 else 1.0
+    score = most - (most - least) * share
+    return Bounds(
+        position,
+        configuration["v_pos_z_score"] * both(np.abs, "sz_std"),
+        score * both(_largest, "v_ew_std", "v_ns_std", "v_en_std"),
+        configuration["v_vel_z_score"] * both(np.abs, "vz_std"),
+    )
+
+
+def _largest(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
+    """Return the standard deviation along the longest axis of a 2 by 2 covariance."""
+    covariance = np.sign(signed_root) * signed_root**2
+    mean, half = 0.5 * (east**2 + north**2), 0.5 * (east**2 - north**2)
+    return np.asarray(np.sqrt(mean + np.hypot(half, covariance)))

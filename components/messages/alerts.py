@@ -1,0 +1,53 @@
+"""The message of an alerting block: the alert level of each target."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from components.aircraft.aircraft import Roster
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.message import Message, Text, per_entry, per_row, static
+
+#: Most levels of an alerter whose times are recorded.
+MOST_LEVELS = 4
+_TIMES = {f"time_to_level_{level}_s": "float64" for level in range(1, MOST_LEVELS + 1)}
+
+
+def _target_names(message: Any) -> Text:
+    return Text(message.target, message.roster.names)
+
+
+@dataclass(eq=False)
+class AlertLevels(Message):
+    """Alert levels of targets, at each instant at which the alerting looks at them.
+
+    Parameters
+    ----------
+    offsets : (rows + 1,)
+    target : (entries,) of int
+    level : (entries,) of int
+        0 without an alert.
+    times : dict of (entries,)
+        ``time_to_level_1_s`` and so on: time to the volume of each level, NaN where it is not
+        met within the lookahead.
+    time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
+        The projected closest approach, in straight flight.
+    relative : dict of (entries,)
+        What the levels rest on, ownship less target: ``east_m``, ``north_m``, ``up_m`` and
+        ``east_mps``, ``north_mps``, ``climb_mps``.
+    own_motion : dict of (rows,)
+        The ownship's ``alt_m``, ``east_mps``, ``north_mps``, ``climb_mps``; NaN where unknown yet.
+    roster : Roster
+    """
+
+    entry_table = "alerts"
+
+    offsets: IntArray
+    target: IntArray = per_entry(column="text", value=_target_names)
+    level: IntArray = per_entry(column="int64")
+    times: dict[str, FloatArray] = per_entry(columns=_TIMES)
+    time_to_closest_s: FloatArray = per_entry(column="float64")
+    closest_horizontal_m: FloatArray = per_entry(column="float64")
+    closest_vertical_m: FloatArray = per_entry(column="float64")
+    relative: dict[str, FloatArray] = per_entry()
+    own_motion: dict[str, FloatArray] = per_row()
+    roster: Roster = static()

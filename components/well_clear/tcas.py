@@ -1,0 +1,155 @@
+"""TCAS II: the volumes of traffic and resolution advisories by sensitivity level."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from components.well_clear.nearly import nearly_zero, surely_less
+from components.well_clear.relative_motion import (
+    discriminant,
+    exit_of_circle_s,
+    horizontal_of,
+)
+from components.well_clear.vertical_interval import Span, vertical_span
+from components.well_clear.violation import Relative
+from components.well_clear.volume import FOOT_M, NAUTICAL_MILE_M
+from dsa_des.arrays.types import FloatArray, IntArray
+
+
+class Thresholds(NamedTuple):
+    """Sizes of an advisory at one sensitivity level; `miss_m` is infinite without a filter."""
+
+    tau_s: float
+    distance_m: float
+    height_m: float
+    miss_m: float
+
+
+def _sizes(tau_s: float, nmi: float, height_ft: float, miss_ft: float = np.inf) -> Thresholds:
+    return Thresholds(tau_s, nmi * NAUTICAL_MILE_M, height_ft * FOOT_M, miss_ft * FOOT_M)
+
+
+#: Highest altitude of each level below the last, m.
+LEVEL_TOPS_M = np.array([1000.0, 2350.0, 5000.0, 10_000.0, 20_000.0, 42_000.0]) * FOOT_M
+FIRST_LEVEL = 2
+#: By level from `FIRST_LEVEL`; TCAS II version 7.1, FAA booklet HQ-111358 (2011), table 2.
+TRAFFIC_ADVISORY = (
+    _sizes(20, 0.30, 850),
+    _sizes(25, 0.33, 850),
+    _sizes(30, 0.48, 850),
+    _sizes(40, 0.75, 850),
+    _sizes(45, 1.00, 850),
+    _sizes(48, 1.30, 850),
+    _sizes(48, 1.30, 1200),
+)
+RESOLUTION_ADVISORY = (
+    None,
+    _sizes(15, 0.20, 600, 1215),
+    _sizes(20, 0.35, 600, 2126),
+    _sizes(25, 0.55, 600, 3342),
+    _sizes(30, 0.80, 600, 4861),
+    _sizes(35, 1.10, 700, 6683),
+    _sizes(35, 1.10, 800, 6683),
+)
+
+
+def sensitivity_level(altitude_m: FloatArray) -> IntArray:
+    """Return the sensitivity level at the ownship's altitude; a bound belongs to the level below.
+
+    Parameters
+    ----------
+    altitude_m : (n,)
+
+    Returns
+    -------
+    (n,) of int
+        2 to 8.
+    """
+    return FIRST_LEVEL + np.searchsorted(LEVEL_TOPS_M, np.asarray(altitude_m), side="left")
+
+
+def tcas_span(
+    relative: Relative, altitude_m: Any, climb_mps: Any, *, resolution: bool, end_s: float
+) -> Span:
+    """Return from when to when an advisory is due in straight flight.
+
+    Parameters
+    ----------
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less intruder, at time 0.
+    altitude_m, climb_mps : (n,)
+        Of the ownship: its climb changes the sensitivity level on the way.
+    resolution : bool
+        Resolution advisory; otherwise traffic advisory.
+    end_s : float
+        How far ahead is looked.
+
+    Returns
+    -------
+    Span
+        Earliest entry and latest exit, s.
+    """
+    table = RESOLUTION_ADVISORY if resolution else TRAFFIC_ADVISORY
+    altitude_m, climb_mps = np.asarray(altitude_m), np.asarray(climb_mps)
+    entry = np.full(np.shape(altitude_m), np.inf)
+    leave = -entry
+    bottoms = np.concatenate([[-np.inf], LEVEL_TOPS_M])
+    tops = np.concatenate([LEVEL_TOPS_M, [np.inf]])
+    for sizes, bottom_m, top_m in zip(table, bottoms, tops, strict=True):
+        if sizes is None:
+            continue
+        begin_s, till_s = _within(altitude_m, climb_mps, bottom_m, top_m, end_s)
+        span = _span(relative, sizes, begin_s, np.maximum(till_s, begin_s))
+        there = surely_less(begin_s, till_s)
+        entry = np.where(there, np.minimum(entry, span.begin_s), entry)
+        leave = np.where(there, np.maximum(leave, span.end_s), leave)
+    return Span(entry, leave)
+
+
+def _within(
+    altitude_m: FloatArray, climb_mps: FloatArray, bottom_m: float, top_m: float, end_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return from when to when the ownship is between two altitudes, s."""
+    level = climb_mps == 0.0
+    rate = np.where(level, 1.0, climb_mps)
+    one, other = (bottom_m - altitude_m) / rate, (top_m - altitude_m) / rate
+    inside = (altitude_m > bottom_m) & (altitude_m <= top_m)
+    begin = np.where(level, np.where(inside, 0.0, end_s), np.minimum(one, other))
+    till = np.where(level, np.where(inside, end_s, 0.0), np.maximum(one, other))
+    return np.clip(begin, 0.0, end_s), np.clip(till, 0.0, end_s)
+
+
+def _span(relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: FloatArray) -> Span:
+    """Return the interval of one sensitivity level's advisory in [begin, end]."""
+    east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
+    vertical = vertical_span(up, climb, sizes.height_m, sizes.tau_s, begin_s, end_s)
+    some = surely_less(vertical.begin_s, vertical.end_s)
+    start = np.where(some, vertical.begin_s, 0.0)
+    length = np.where(some, vertical.end_s - start, 0.0)
+    motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
+    q, p, a, _ = motion
+    delta = discriminant(motion, sizes.distance_m)
+    root = np.sqrt(np.maximum(delta, 0.0))
+    inside = q <= sizes.distance_m**2
+    under = 4.0 * delta + (sizes.tau_s * a) ** 2
+    linear = 2.0 * p + sizes.tau_s * a
+    constant = np.maximum(q + sizes.tau_s * p - sizes.distance_m**2, 0.0)
+    wide = np.sqrt(np.maximum(under, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        first = np.where(constant > 0.0, 2.0 * constant / (wide - linear), 0.0)
+        after_tau = (wide - linear) / (2.0 * a)
+    last = np.where(delta >= 0.0, exit_of_circle_s(motion, sizes.distance_m, root), after_tau)
+    still = nearly_zero(a)
+    entry = np.where(inside, 0.0, np.maximum(first, 0.0))
+    leave = np.where(inside & still, length, np.minimum(last, length))
+    some &= inside | (
+        (p < 0.0) & (under >= 0.0) & ((delta >= 0.0) | (linear < 0.0) | (constant == 0.0))
+    )
+    if np.isfinite(sizes.miss_m):
+        miss = discriminant(motion, sizes.miss_m)
+        filtered = np.where(still, q <= sizes.miss_m**2, miss >= 0.0)
+        past = exit_of_circle_s(motion, sizes.miss_m, np.sqrt(np.maximum(miss, 0.0)))
+        leave = np.where(still, leave, np.minimum(leave, past))
+        some &= filtered
+    some &= surely_less(start + entry, start + leave)
+    return Span(np.where(some, start + entry, np.inf), np.where(some, start + leave, -np.inf))

@@ -1,0 +1,26 @@
+"""The shipped closed loops: seen early the aircraft stay apart, seen late they do not."""
+
+from pathlib import Path
+
+import dsa_des
+
+CONFIGS = Path(__file__).parents[2] / "configs" / "avoidance"
+EN_ROUTE_M = 0.66 * 1852
+
+
+def closest_m(scene: str, *sets: str) -> float:
+    """Smallest slant range of the true flights."""
+    found = dsa_des.run(dsa_des.load_scene(CONFIGS / scene, sets=sets))
+    return float(found.info["summary"]["targets"]["crossing"]["closest_approach"]["range_m"])
+
+
+def test_the_ownship_turns_out_of_the_way():
+    assert closest_m("crossing.toml") > 2 * EN_ROUTE_M
+
+
+def test_seen_too_late_well_clear_is_lost():
+    assert closest_m("crossing_seen_late.toml") < 0.5 * EN_ROUTE_M
+
+
+def test_without_a_turn_they_would_have_met():
+    assert closest_m("crossing.toml", "blocks.avoidance.level=9") < 40.0

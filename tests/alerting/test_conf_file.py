@@ -1,0 +1,113 @@
+"""Configurations: what is read, and one error that names each thing wrong with a bad one."""
+
+import math
+
+import pytest
+
+from components.alert_configuration.conf_file import read_conf
+from components.traffic.traffic_file import TrafficFileError
+from tests.alerting.conf_text import CONF
+
+LINES = CONF.splitlines()
+
+
+def write(tmp_path, text):
+    path = tmp_path / "sizes.conf"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def line_of(key):
+    return 1 + next(i for i, line in enumerate(LINES) if line.startswith(key))
+
+
+def test_names_units_and_defaults(tmp_path):
+    found = read_conf(write(tmp_path, CONF))
+    first, second = found.alerters
+    assert (first.name, second.name) == ("One_Two", "One")
+    far, near = first.levels
+    assert far.volume.horizontal_m == pytest.approx(0.7 * 1852)
+    assert far.volume.vertical_m == pytest.approx(500 * 0.3048)
+    assert (far.volume.horizontal_time_s, far.volume.vertical_time_s) == (30.0, 3.0)
+    assert (far.volume.time_variable, near.volume.time_variable) == (
+        "modified_tau",
+        "time_to_entry",
+    )
+    assert near.volume.vertical_m == 120.0
+    assert (far.alerting_time_s, far.early_alerting_time_s) == (55.0, 75.0)
+    assert near.early_alerting_time_s == 25.0
+    assert second.levels[0].alerting_time_s == 30.0
+    assert (found["hysteresis_time"], found["alerting_n"]) == (5.0, 4)
+    assert found["lookahead_time"] == 180.0
+    assert found["turn_rate"] == pytest.approx(math.radians(3))
+    assert found["vertical_accel"] == pytest.approx(0.25 * 9.80665)
+    assert found["min_vs"] == pytest.approx(-6000 * 0.3048 / 60)
+    assert found.corrective_level(first) is far
+
+
+def test_keys_are_read_in_any_case_and_order(tmp_path):
+    shuffled = "\n".join(reversed([line.lower() for line in LINES]))
+    shuffled = shuffled.replace("gov.nasa.larcfm.accord.wcv_", "gov.nasa.larcfm.ACCoRD.WCV_")
+    for name in ("taumod", "tep", "tcpa"):
+        shuffled = shuffled.replace(f"WCV_{name}\n", f"WCV_{name.upper()}\n")
+    found = read_conf(write(tmp_path, shuffled))
+    assert [level.volume for level in found.alerters[0].levels] == [
+        level.volume for level in read_conf(write(tmp_path, CONF)).alerters[0].levels
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("hysteresis_time = 5 [s]", "hysteresis_time = 5", "hysteresis_time has no unit"),
+        ("hysteresis_time = 5 [s]", "hysteresis_time = 5 [ft]", "has the unit [ft]"),
+        ("hysteresis_time", "hysteresis_tim", "did you mean 'hysteresis_time'"),
+        ("= 500 [ft]", "= -500 [ft]", "One_Two_far_WCV_ZTHR is -500: it may not be negative"),
+        ("= 500 [ft]", "= 0 [ft]", "One_Two_far_WCV_ZTHR is 0: it must be above 0"),
+        ("= 500 [ft]", "= nan [ft]", "a finite number is needed"),
+        ("= 500 [ft]", "= 5_00 [ft]", "a number is needed"),
+        ("= 500 [ft]", "= [ft]", "has no value"),
+        ("region = MID\nOne_Two", "region = MDI\nOne_Two", "did you mean 'MID'"),
+        ("alerting_m = 2", "alerting_m = 5", "must be at most alerting_n, 4"),
+        ("alerting_m = 2", "alerting_m = 2.5", "a whole number is needed"),
+        ("WCV_TEP", "WCV_TEPP", "did you mean 'WCV_TEP'"),
+        ("alert_2_detector = near", "alert_2_detector = nea", "did you mean 'near'"),
+        ("One_far", "One_far", "the alerter 'Three' has no levels"),
+        ("alert_2", "alert_3", "has level 3 but no level 2"),
+        ("alerters = One_Two, One", "", "there is no key 'alerters'"),
+        ("One_d_WCV_TTHR = 12 [s]", "", "'One_d_WCV_TTHR' is missing"),
+        ("alerting_n = 4", "alerting_n = 4\nalerting_N = 4", "stands in line 8 already"),
+        ("alerting_n = 4", "alerting_n = 4\nconflict_crit = true", "only false is supported"),
+        ("alerting_n = 4", "alerting_n = 4\nlookahead_time = 0 [s]", "it must be above 0"),
+        ("alerting_n = 4", "alerting_n = 4\nwhat is this", "is not 'key = value [unit]'"),
+        ("false", "maybe", "it must be true or false"),
+        (
+            "One_Two_alert_2_region",
+            "One_Two_alert_2_spread_hdir = 3 [deg]\nOne_Two_alert_2_region",
+            "One_Two_alert_2_spread_hdir is not 0",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, old, new, said):
+    text = CONF.replace(old, new)
+    if "Three" in said:
+        text = text.replace("One_Two, One", "One_Two, One, Three")
+    with pytest.raises(TrafficFileError) as error:
+        read_conf(write(tmp_path, text))
+    assert said in str(error.value)
+    assert "sizes.conf" in str(error.value)
+
+
+def test_everything_wrong_is_said_at_once_with_its_line(tmp_path):
+    text = CONF.replace("hysteresis_time = 5 [s]", "hysteresis_time = 5")
+    text = text.replace("One_d_WCV_DTHR = 1 [km]", "One_d_WCV_DTHR = one [km]")
+    with pytest.raises(TrafficFileError) as error:
+        read_conf(write(tmp_path, text))
+    assert "2 problems" in str(error.value)
+    assert f"line {line_of('hysteresis')}:" in str(error.value)
+    assert f"line {line_of('One_d_WCV_DTHR')}:" in str(error.value)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(TrafficFileError, match="there is no such file"):
+        read_conf(tmp_path / "none.conf")
