@@ -8,7 +8,8 @@ _CLUTTER = "wiring/test_ground_clutter_in_ned.py"
 
 FAULTS = [
     *in_file(
-        _GROUP, "components/line_of_sight/transform.py", (*_SIGHT, "wiring/test_aspect_tables.py"),
+        _GROUP, "components/line_of_sight/transform.py",
+        ("wiring/test_aspect_tables.py", *_SIGHT),
         ("relative-heading-turned-round", "wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)",
          "wrap_pi_unchecked(seen.azimuth_rad - other.yaw_rad)"),
         ("relative-heading-from-the-nose", "wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)",
@@ -19,6 +20,9 @@ FAULTS = [
          '"target_pitch_rad": own.pitch_rad + 0.0 * other.pitch_rad,'),
         ("target-roll-is-its-pitch", '"target_roll_rad": other.roll_rad,',
          '"target_roll_rad": other.pitch_rad,'),
+    ),
+    *in_file(
+        _GROUP, "components/line_of_sight/transform.py", "wiring/test_weather_on_radar.py",
         ("target-altitude-is-ownship-s", '"alt_m": other.alt_m,',
          '"alt_m": own.alt_m + 0.0 * other.alt_m,'),
     ),

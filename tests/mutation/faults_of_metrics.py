@@ -6,10 +6,11 @@ _GROUP = "metrics"
 _SEPARATION = "wiring/test_separation_metrics.py"
 _KEYS = "wiring/test_metric_keys.py"
 _BY_HAND = "studies/test_metrics_by_hand.py"
+_SEVERAL = "wiring/test_metrics_of_several_targets.py"
 
 FAULTS = [
     *in_file(
-        _GROUP, "components/metrics/separation.py", (_SEPARATION, _KEYS),
+        _GROUP, "components/metrics/separation.py", (_SEPARATION, _SEVERAL, _KEYS),
         ("slant-range-as-horizontal", "np.where(there, range_m * np.cos(elevation_rad), np.inf)",
          "np.where(there, range_m, np.inf)"),
         ("horizontal-as-vertical", "range_m * np.cos(elevation_rad)",
@@ -33,7 +34,7 @@ FAULTS = [
          "there = np.ones_like(own.present)"),
     ),
     *in_file(
-        _GROUP, "components/metrics/encounter.py", (_SEPARATION, _KEYS),
+        _GROUP, "components/metrics/encounter.py", (_SEPARATION, _SEVERAL, _KEYS),
         ("well-clear-in-metres", "WELL_CLEAR_M = (2000 * FOOT_M, 250 * FOOT_M)",
          "WELL_CLEAR_M = (2000, 250)"),
         ("well-clear-450-ft", "WELL_CLEAR_M = (2000 * FOOT_M, 250 * FOOT_M)",
@@ -95,7 +96,7 @@ FAULTS = [
          'found[f"detected.{name}"] = np.ones(len(time_s))'),
     ),
     *in_file(
-        _GROUP, "components/metrics/declaration.py", (_KEYS, _BY_HAND),
+        _GROUP, "components/metrics/declaration.py", (_SEVERAL, _KEYS, _BY_HAND),
         ("declared-when-first-seen", "first = first_rows(columns, rows[declared], count)",
          "first = first_rows(columns, rows, count)"),
         ("delay-from-the-start",
@@ -113,7 +114,7 @@ FAULTS = [
          'taken(columns, "true_range_m", first_rows(columns, rows, count)),'),
     ),
     *in_file(
-        _GROUP, "components/metrics/track_quality.py", (_KEYS, _BY_HAND),
+        _GROUP, "components/metrics/track_quality.py", (_SEVERAL, _KEYS, _BY_HAND),
         ("age-with-delay-forgotten", "origin = _running_max(lines.time_s - delays, lines)",
          "origin = _running_max(lines.time_s, lines)"),
         ("age-at-the-end-of-gaps", "(low + high) / 2.0 * lines.gap_s", "high * lines.gap_s"),
@@ -138,7 +139,8 @@ FAULTS = [
          "np.sqrt(_means(replica, angle**2, count))"),
     ),
     *in_file(
-        _GROUP, "components/metrics/fused_share.py", (_KEYS, "studies/test_fused_share_exact.py"),
+        _GROUP, "components/metrics/fused_share.py",
+        (_SEVERAL, _KEYS, "studies/test_fused_share_exact.py"),
         ("share-of-the-other", 'own = chosen(detections, seen, "target", "time_s")\n'
          '            both = _holds(fused["sensors"], a) & _holds(fused["sensors"], b)',
          'own = chosen(detections, seen, "target", "time_s")\n'

@@ -27,7 +27,10 @@ _PARTS = (
 _LOADED_ONCE = (
     "numpy", "scipy.special", "scipy.optimize", "pydantic", "pyarrow.parquet", "simpy", "networkx",
     "rich.console", "rich.table", "click", "mpmath", "pymap3d", "geographiclib.geodesic",
+    "hypothesis.strategies", "_hypothesis_pytestplugin",
 )  # fmt: skip
+# Pytest warns that it can no longer rewrite the assertions of what is loaded already.
+_QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning", "-q", "--tb=no")
 _TOLD = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 
 
@@ -69,7 +72,7 @@ class TestRun:
         self._said = folder / ".said"
         self._begun, self._limit_s = time.monotonic(), limit_s
         self._late = False
-        arguments = [*options, "-q", "--tb=no", "-p", "no:cacheprovider", *tests]
+        arguments = [*options, *_QUIET, "-p", "no:cacheprovider", *tests]
         _load_libraries()
         sys.stdout.flush()
         self._process = os.fork()
