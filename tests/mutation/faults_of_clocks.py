@@ -34,7 +34,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "dsa_des/running/connections.py",
-        (_WIRES, "engine/test_delayed_pictures.py"),
+        (_WIRES, "engine/test_delayed_pictures.py", "engine/test_delays_between_clocks.py"),
         ("delay-forgotten", "round(wire.total_delay_s * scene.ticks_per_s) + ", "0 + "),
         ("delay-in-scans-forgotten", " + _scan_delay(scene, wire, nodes)", ""),
         ("delay-of-one-scan", "delay = wire.delay_scans * int(clock.period)",
@@ -77,7 +77,8 @@ FAULTS = [
         ("started-on-entering", "started = int(self._env.now)\n            service",
          "started = job.entered\n            service"),
         ("newest-is-dropped", "self._note(self._line.popleft(), now, DROPPED)",
-         "self._note(self._line.pop(), now, DROPPED)"),
+         "self._note(self._line.pop(), now, DROPPED)",
+         "with drop_oldest one message waits at most: each that enters takes out the one before"),
         ("last-come-first-served", "job = self._line.popleft()\n            self._busy",
          "job = self._line.pop()\n            self._busy"),
         ("never-skips", 'if self.p.when_busy != "skip" or not self._busy:', "if True:"),

@@ -152,8 +152,16 @@ FAULTS = [
          "0.0 * cells.target_roll_rad[chosen],"),
         ("table-area-elevation-turned", "            cells.elevation_rad[chosen],",
          "            -cells.elevation_rad[chosen],"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/tabulated_area.py", "wiring/test_each_target_s_own_table.py",
         ("first-target-s-table-for-all", "np.flatnonzero(which[cells.target] == index)",
          "np.flatnonzero(which[0 * cells.target] == index)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/aspect_rcs.py", "wiring/test_each_target_s_own_table.py",
+        ("first-target-s-rcs-table-for-all", "which = place[cells.target]",
+         "which = place[0 * cells.target]"),
     ),
     *in_file(
         _GROUP, "components/optical/silhouette.py",
