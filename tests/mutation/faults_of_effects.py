@@ -3,15 +3,21 @@
 from fault import in_file
 
 _GROUP = "effects"
-_PLAN = "test_planning_changes_nothing.py"
-_RADAR_EFFECTS = "radar/test_radar_effects.py"
+_SHARED = "engine/test_tolerances_are_shared.py"
+_PLAN = (
+    "test_planning_changes_nothing.py::"
+    "test_simulating_everything_beside_what_a_scene_calls_for_gives_the_same_bytes"
+)
+_RADAR_EFFECTS = "radar/test_radar_effects.py::test_the_reason_is_in_the_scene"
 _HOOKS = "engine/test_hooks_of_effects.py"
 _WEATHER = "wiring/test_weather_on_radar.py"
-_AUTO = "accuracy/test_auto_models.py"
+_KEPT = "accuracy/test_auto_models.py::test_what_keeps_the_exact_model"
+_TOLD = "accuracy/test_auto_models.py::test_explain_names_bound_allowance_and_who_was_refused"
+_PD = "accuracy/test_auto_models.py::test_auto_pd_says_why_and_contradicts_a_named_method"
 
 FAULTS = [
     *in_file(
-        _GROUP, "dsa_des/running/effect_plan.py", (_RADAR_EFFECTS, _AUTO),
+        _GROUP, "dsa_des/running/effect_plan.py", _SHARED,
         ("tolerance-never-spent",
          "            for quantity, bound in verdict.bound.items():\n"
          "                left[quantity] -= bound\n            parts",
@@ -26,12 +32,12 @@ FAULTS = [
          "allowed = _within("),
     ),
     *in_file(
-        _GROUP, "dsa_des/running/effect_plan.py", (_PLAN, "cli/test_explain_command.py"),
+        _GROUP, "dsa_des/running/effect_plan.py", (_SHARED, _PLAN),
         ("everything-is-not", "elif everything and not built and effect.neutral:",
          "elif False and not built and effect.neutral:"),
     ),
     *in_file(
-        _GROUP, "dsa_des/running/assembly.py", (_HOOKS, _RADAR_EFFECTS),
+        _GROUP, "dsa_des/running/assembly.py", (_HOOKS, _TOLD, _KEPT),
         ("planned-but-not-built",
          "for item, effect in built.items()\n            }",
          "for item, effect in list(built.items())[1:]\n            }"),
@@ -198,13 +204,15 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/detection_rung.py",
-        ("radar/test_detection_rungs.py", _AUTO),
+        ("radar/test_detection_rungs.py", _PD),
         ("table-errs-by-nothing", "TABLE_ERROR = 1e-6", "TABLE_ERROR = 1e-3"),
         ("closed-form-for-many-pulses", "return block.p.pulses == 1 and _models(block) <= {1, 2}",
          "return _models(block) <= {1, 2}"),
     ),
     *in_file(
-        _GROUP, "components/line_of_sight/transform.py", _AUTO,
+        _GROUP, "components/line_of_sight/transform.py",
+        ("accuracy/test_auto_models.py::test_auto_keeps_to_the_budget_and_is_cheaper_in_half_of_the_scenes",
+         "accuracy/test_auto_models.py::test_replicas_in_lock_step_pick_the_same_models_as_separate_runs"),
         ("picked-attitude-not-used", "LineOfSight(self.rung.earth, self.rung.attitude)",
          'LineOfSight(self.rung.earth, "exact")'),
         ("picked-earth-not-used", "LineOfSight(self.rung.earth, self.rung.attitude)",
