@@ -1,4 +1,4 @@
-"""Effects that are left out share what the scene allows: the cheapest go first, the rest is known."""
+"""Effects that are left out share what the scene allows: the cheapest go first."""
 
 from types import SimpleNamespace
 

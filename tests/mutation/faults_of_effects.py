@@ -211,8 +211,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/line_of_sight/transform.py",
-        ("accuracy/test_auto_models.py::test_auto_keeps_to_the_budget_and_is_cheaper_in_half_of_the_scenes",
-         "accuracy/test_auto_models.py::test_replicas_in_lock_step_pick_the_same_models_as_separate_runs"),
+        "wiring/test_picked_models_are_used.py",
         ("picked-attitude-not-used", "LineOfSight(self.rung.earth, self.rung.attitude)",
          'LineOfSight(self.rung.earth, "exact")'),
         ("picked-earth-not-used", "LineOfSight(self.rung.earth, self.rung.attitude)",

@@ -48,7 +48,9 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "dsa_des/studies/summary.py", _COMPARE,
-        ("pairs-by-place", "_, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)",
+        ("pairs-by-place",
+         "_, here, there = "
+         "np.intersect1d(runs[first], runs[second], return_indices=True)",
          "here = there = np.arange(min(len(first), len(second)))\n"
          "    there = there[::-1]"),
         ("baseline-for-the-other",

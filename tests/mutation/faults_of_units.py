@@ -101,11 +101,11 @@ FAULTS = [
         _GROUP, "components/radar/threshold_radar.py",
         ("wiring/test_radar_detection_keys.py", "wiring/test_calibrated_radars.py"),
         ("threshold-as-voltage", "float(10.0 * np.log10(snr))", "float(20.0 * np.log10(snr))"),
-        ("clutter-as-voltage", "margin - 10.0 * np.log10(1.0 + cnr)",
-         "margin - 20.0 * np.log10(1.0 + cnr)"),
     ),
     *in_file(
         _GROUP, "components/radar/threshold_radar.py", "wiring/test_ground_clutter_in_ned.py",
+        ("clutter-as-voltage", "margin - 10.0 * np.log10(1.0 + cnr)",
+         "margin - 20.0 * np.log10(1.0 + cnr)"),
         ("clutter-without-noise", "10.0 * np.log10(1.0 + cnr)",
          "10.0 * np.log10(np.maximum(1.0, cnr))"),
     ),

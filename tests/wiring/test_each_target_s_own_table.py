@@ -1,4 +1,4 @@
-"""Of several targets with tables each is seen by its own, and one without a table by its numbers."""
+"""Of several targets each is seen by its own table, and one without a table by its numbers."""
 
 import math
 
