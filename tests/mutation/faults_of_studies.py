@@ -3,7 +3,7 @@
 from fault import in_file
 
 _GROUP = "studies"
-_INTERVALS = ("studies/test_intervals.py", "studies/test_coverage.py")
+_INTERVALS = ("studies/test_statistics_by_scipy.py", "studies/test_intervals.py")
 _DRAWS = "studies/test_axes_and_random_draws.py"
 _COMPARE = ("studies/test_compare_command.py", "studies/test_intervals.py",
             "studies/test_timing_answers.py")  # fmt: skip
@@ -59,7 +59,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "dsa_des/studies/summary.py",
-        ("studies/test_intervals.py", "studies/test_samples.py", "studies/test_coverage.py"),
+        ("studies/test_intervals.py", "studies/test_samples.py"),
         ("missing-count-as-trials", "trials = np.where(np.isnan(values), 0.0, trials)", "pass"),
         ("units-are-runs",
          'self.units = self._codes(self.over if self.over else ["replica"])',
@@ -98,8 +98,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/metrics/lossy_scans.py",
-        ("studies/test_metrics_by_hand.py", "studies/test_timing_answers.py",
-         "studies/test_coverage.py"),
+        ("studies/test_metrics_by_hand.py", "studies/test_timing_answers.py"),
         ("interval-unstretched", "return period_s / through", "return period_s"),
         ("age-as-of-a-renewal-alone", "return square * through / (2.0 * period_s)",
          "return square * through / period_s"),

@@ -110,7 +110,8 @@ FAULTS = [
          "10.0 * np.log10(np.maximum(1.0, cnr))"),
     ),
     *in_file(
-        _GROUP, "components/radar/range_boundary.py", "wiring/test_radar_detection_keys.py",
+        _GROUP, "components/radar/range_boundary.py",
+        "wiring/test_margins_of_range_boundaries.py",
         ("fourth-root-margin", "40.0 * np.log10(ratio)", "20.0 * np.log10(ratio)"),
     ),
     *in_file(
@@ -150,7 +151,8 @@ FAULTS = [
          "math.degrees(rate_rad_s)"),
     ),
     *in_file(
-        _GROUP, "components/traffic/units.py", "traffic/test_traffic_readers.py",
+        _GROUP, "components/traffic/units.py",
+        ("traffic/test_units_of_files.py", "traffic/test_traffic_readers.py"),
         ("feet-as-metres", '"ft": _FOOT_M,', '"ft": 1.0,'),
         ("statute-miles", "_NAUTICAL_MILE_M = 1852.0", "_NAUTICAL_MILE_M = 1609.344"),
         ("feet-per-second", '"fpm": _FOOT_M / 60.0', '"fpm": _FOOT_M'),
