@@ -172,7 +172,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/resolution_cells.py",
-        ("wiring/test_radar_detection_keys.py", "radar/test_false_alarm_counts.py"),
+        ("wiring/test_false_alarms_of_radars.py", "radar/test_false_alarm_counts.py"),
         ("cells-rounded-down", "math.ceil(width / cell - 1e-9)", "math.floor(width / cell + 1e-9)"),
         ("cells-from-range-zero", "(farthest_m - nearest_m, range_cell_m)",
          "(farthest_m, range_cell_m)"),

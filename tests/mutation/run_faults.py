@@ -66,7 +66,11 @@ def _arguments() -> Namespace:
 
 
 def _is_one(fault: Fault, only: Sequence[str]) -> bool:
-    return any(text in (fault.group, fault.file) or text in fault.name for text in only)
+    groups = {known.group for known in FAULTS}
+    return any(
+        text == fault.group if text in groups else text == fault.file or text in fault.name
+        for text in only
+    )
 
 
 def _run_all(faults: Sequence[Fault], asked: Namespace, folder: Path) -> list[Outcome]:

@@ -18,8 +18,8 @@ VIEW = {
 
 
 def alarms(kind: str, **keys) -> dict[str, np.ndarray]:
-    found = rows(alone(kind, **VIEW, **keys), target=None)
-    assert len(found) > 200
+    found = rows(alone(kind, **{**VIEW, **keys}), target=None)
+    assert len(found) > 100
     return {name: np.array([row[name] for row in found]) for name in (
         "azimuth_rad", "elevation_rad", "range_m", "snr_db", "confidence")}  # fmt: skip
 
@@ -54,6 +54,16 @@ def test_margins_are_from_the_threshold_or_from_the_snr_of_the_reference_pd():
         found = alarms("radar.swerling", swerling=swerling, reference_pd=pd)
         needed_db = 10.0 * math.log10(math.log(PFA) / math.log(pd) - 1.0)
         np.testing.assert_allclose(found["snr_db"] - found["confidence"], needed_db, rtol=1e-9)
+
+
+@pytest.mark.parametrize("nearest_m", [1.0, 1500.0])
+def test_cells_begin_at_the_minimum_range(nearest_m):
+    """Of 50 by 10 by 30 cells, or by 15."""
+    range_m = alarms("radar.threshold", minimum_range_m=nearest_m)["range_m"]
+    assert nearest_m - 50.0 <= np.min(range_m) < nearest_m + 150.0
+    assert np.max(range_m) <= 3000.0
+    expected = 50 * 10 * (30 if nearest_m == 1.0 else 15) * PFA * 20
+    assert len(range_m) == pytest.approx(expected, abs=4.5 * math.sqrt(expected))
 
 
 def test_a_radar_that_is_off_reports_no_noise():
