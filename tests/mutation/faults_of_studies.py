@@ -5,8 +5,7 @@ from fault import in_file
 _GROUP = "studies"
 _INTERVALS = ("studies/test_statistics_by_scipy.py", "studies/test_intervals.py")
 _DRAWS = "studies/test_axes_and_random_draws.py"
-_COMPARE = ("studies/test_compare_command.py", "studies/test_intervals.py",
-            "studies/test_timing_answers.py")  # fmt: skip
+_SUMMARIES = "studies/test_summaries_by_hand.py"
 
 FAULTS = [
     *in_file(
@@ -47,7 +46,7 @@ FAULTS = [
         ("few-is-two", "FEW = 10", "FEW = 2"),
     ),
     *in_file(
-        _GROUP, "dsa_des/studies/summary.py", _COMPARE,
+        _GROUP, "dsa_des/studies/summary.py", _SUMMARIES,
         ("pairs-by-place",
          "_, here, there = "
          "np.intersect1d(runs[first], runs[second], return_indices=True)",
@@ -59,7 +58,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "dsa_des/studies/summary.py",
-        ("studies/test_intervals.py", "studies/test_samples.py"),
+        (_SUMMARIES, "studies/test_samples.py"),
         ("missing-count-as-trials", "trials = np.where(np.isnan(values), 0.0, trials)", "pass"),
         ("units-are-runs",
          'self.units = self._codes(self.over if self.over else ["replica"])',

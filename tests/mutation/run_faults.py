@@ -34,9 +34,6 @@ def main() -> int:
     if not outcomes:
         return 1
     known = {outcome.name: outcome for outcome in [*_earlier(asked.json), *outcomes]}
-    if asked.json is not None:
-        rows = [vars(outcome) for outcome in known.values()]
-        asked.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if asked.page is not None:
         asked.page.write_text(fault_page.page(FAULTS, known), encoding="utf-8")
     return _summary(faults, outcomes)
@@ -49,6 +46,14 @@ def _earlier(file: Path | None) -> list[Outcome]:
     digests = {fault.digest for fault in FAULTS}
     found = [Outcome(**row) for row in json.loads(file.read_text(encoding="utf-8"))]
     return [outcome for outcome in found if outcome.digest in digests]
+
+
+def _keep(outcome: Outcome, file: Path | None) -> None:
+    """Put an outcome in the place of an earlier one; a run that is stopped loses none."""
+    if file is not None:
+        known = {each.name: each for each in [*_earlier(file), outcome]}
+        rows = [vars(each) for each in known.values()]
+        file.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
 def _arguments() -> Namespace:
@@ -96,6 +101,7 @@ def _run_all(faults: Sequence[Fault], asked: Namespace, folder: Path) -> list[Ou
                 running.remove(trial)
                 copies.append(trial.copy)
                 found[outcome.name] = outcome
+                _keep(outcome, asked.json)
                 print(
                     f"{outcome.seconds:5.1f} s  {outcome.result:9} {trial.fault.group}: "
                     f"{outcome.name}  {outcome.by}",
