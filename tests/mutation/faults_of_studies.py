@@ -5,6 +5,7 @@ from fault import in_file
 _GROUP = "studies"
 _INTERVALS = ("studies/test_statistics_by_scipy.py", "studies/test_intervals.py")
 _DRAWS = "studies/test_axes_and_random_draws.py"
+_KEYS = "studies/test_draws_of_several_keys.py"
 _SUMMARIES = "studies/test_summaries_by_hand.py"
 
 FAULTS = [
@@ -70,7 +71,7 @@ FAULTS = [
          "return units, np.where(many > 0, total, np.nan)"),
     ),
     *in_file(
-        _GROUP, "dsa_des/studies/draws.py", _DRAWS,
+        _GROUP, "dsa_des/studies/draws.py", (_DRAWS, _KEYS),
         ("half-the-range", "low + (high - low) * u)", "low + 0.5 * (high - low) * u)"),
         ("spread-squared", "low + high * NormalDist()", "low + high * high * NormalDist()"),
         ("last-choice-never", "min(int(u * len(self.values)), len(self.values) - 1)",
@@ -84,7 +85,7 @@ FAULTS = [
          'return key_of(seed, "study replica", 0) >> 1'),
     ),
     *in_file(
-        _GROUP, "dsa_des/studies/axes.py", (_DRAWS, "studies/test_timing_answers.py"),
+        _GROUP, "dsa_des/studies/axes.py", (_DRAWS, _KEYS),
         ("range-without-its-end", "count = int((high - low) / step) + 1",
          "count = int((high - low) / step)"),
         ("steps-are-gaps", "step = (high - low) / (count - 1) if count > 1 else Fraction(0)",
