@@ -5,6 +5,7 @@ from fault import in_file
 _GROUP = "columns"
 _MEASURED = "wiring/test_measured_angles.py"
 _TRACKED = "wiring/test_fused_and_tracked_positions.py"
+_NOISE = "wiring/test_noise_passes_the_fusion.py"
 _QUEUE = ("wiring/test_ages_and_queues.py", "engine/test_shared_processors.py")
 
 FAULTS = [
@@ -33,7 +34,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/messages/detections.py",
-        (_TRACKED, "wiring/test_radars_together.py", _MEASURED),
+        (_NOISE, _TRACKED, "wiring/test_radars_together.py"),
         ("detected-is-an-offset", "value=lambda message: np.diff(message.offsets)",
          "value=lambda message: message.offsets[1:]"),
         ("range-source-is-angle-source",
@@ -60,9 +61,7 @@ FAULTS = [
          "range_source[found[name]] = -1"),
     ),
     *in_file(
-        _GROUP, "components/fusion/false_alarms.py",
-        ("radar/test_false_alarm_counts.py", "sensor_effects/test_camera_false_alarms.py",
-         "wiring/test_radar_detection_keys.py"),
+        _GROUP, "components/fusion/false_alarms.py", _NOISE,
         ("alarm-s-source-is-the-first", '("angle_source", index),', '("angle_source", 0),'),
         ("alarm-s-elevation-is-azimuth",
          'columns[column].append(getattr(new.message, column)[false])',
@@ -70,8 +69,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/messages/false_detections.py",
-        ("wiring/test_radar_detection_keys.py", "wiring/test_camera_keys.py",
-         "radar/test_false_alarm_counts.py"),
+        (_NOISE, "wiring/test_radar_detection_keys.py"),
         ("alarms-have-true-ranges", "true_range_m=joined(detections.true_range_m, np.nan),",
          "true_range_m=joined(detections.true_range_m, range_m),"),
         ("alarms-are-the-first-target", "target=joined(detections.target, FALSE_TARGET),",

@@ -225,7 +225,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/geometry/directions.py",
-        ("wiring/test_gated_fusion_angles.py", "geometry/test_cheaper_angles.py"),
+        ("wiring/test_gated_fusion_angles.py", "geometry/test_directions.py"),
         ("haversine-without-cosines",
          "high * high + np.cos(elevation_rad) * np.cos(other_elevation_rad) * wide * wide",
          "high * high + wide * wide"),
