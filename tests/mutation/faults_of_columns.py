@@ -78,7 +78,8 @@ FAULTS = [
          "elevation_rad=joined(detections.elevation_rad, 0.0),"),
     ),
     *in_file(
-        _GROUP, "components/tracking/stub.py", _TRACKED,
+        _GROUP, "components/tracking/stub.py",
+        (_TRACKED, "wiring/test_each_plane_has_its_own_report.py"),
         ("track-s-azimuth-is-elevation", 'azimuth_rad=pool["azimuth_rad"][entry],',
          'azimuth_rad=pool["elevation_rad"][entry],'),
         ("updated-by-the-first", 'contributors=pool["contributors"][entry],',
@@ -132,7 +133,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/embedding/result.py",
-        ("embedding/test_host_interface.py", "wiring/test_host_plane_keys.py"),
+        ("wiring/test_each_plane_has_its_own_report.py", "wiring/test_host_plane_keys.py"),
         ("host-is-told-elevation-first",
          "return self.azimuth_rad, self.elevation_rad, self.range_m",
          "return self.elevation_rad, self.azimuth_rad, self.range_m"),

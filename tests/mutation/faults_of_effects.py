@@ -11,8 +11,7 @@ _PLAN = (
 _RADAR_EFFECTS = "radar/test_radar_effects.py::test_the_reason_is_in_the_scene"
 _HOOKS = "engine/test_hooks_of_effects.py"
 _WEATHER = "wiring/test_weather_on_radar.py"
-_KEPT = "accuracy/test_auto_models.py::test_what_keeps_the_exact_model"
-_TOLD = "accuracy/test_auto_models.py::test_explain_names_bound_allowance_and_who_was_refused"
+_BOUNDS = "accuracy/test_bounds_of_weather.py"
 _PD = "accuracy/test_auto_models.py::test_auto_pd_says_why_and_contradicts_a_named_method"
 
 FAULTS = [
@@ -37,7 +36,7 @@ FAULTS = [
          "elif False and not built and effect.neutral:"),
     ),
     *in_file(
-        _GROUP, "dsa_des/running/assembly.py", (_HOOKS, _TOLD, _KEPT),
+        _GROUP, "dsa_des/running/assembly.py", (_HOOKS, _BOUNDS),
         ("planned-but-not-built",
          "for item, effect in built.items()\n            }",
          "for item, effect in list(built.items())[1:]\n            }"),
@@ -56,7 +55,7 @@ FAULTS = [
          "return two_way_transmission(0.0 * loss_db)"),
     ),
     *in_file(
-        _GROUP, "components/radar/weather_effects.py", (_RADAR_EFFECTS,),
+        _GROUP, "components/radar/weather_effects.py", _BOUNDS,
         ("bound-of-one-way", "most_db = 2.0 * worst_one_way_db(table, reach_m)",
          "most_db = worst_one_way_db(table, reach_m) / 4.0"),
         ("bound-without-steepness", "influence = steepness * most_db * math.log(10.0) / 10.0",
@@ -80,7 +79,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py",
-        ("wiring/test_radar_detection_keys.py", "radar/test_swerling_block.py"),
+        ("wiring/test_radar_detection_keys.py", "radar/test_ground_clutter_effect.py"),
         ("steady-whatever-the-model", '(self._models,) = self.built("RCS") or [steady]',
          "(self._models,) = [steady]"),
         ("table-for-the-exact", '(self._method,) = self.built("method of Pd") or ["table"]',
@@ -89,7 +88,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/rcs_effects.py",
-        ("radar/test_swerling_block.py", _RADAR_EFFECTS, "wiring/test_aspect_tables.py"),
+        ("radar/test_swerling_block.py", _RADAR_EFFECTS, "wiring/test_calibrated_radars.py",
+         "wiring/test_aspect_tables.py"),
         ("fluctuation-not-called-for", 'return Verdict(block.p.swerling not in (0, 5), ',
          'return Verdict(block.p.swerling in (0, 5), '),
         ("steady-targets-outvote", "if craft.swerling % 5]", "if craft.swerling == 1]"),
@@ -97,7 +97,9 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/range_effects.py",
-        ("wiring/test_radar_detection_keys.py", _RADAR_EFFECTS),
+        ("radar/test_radar_effects.py::"
+         "test_no_echo_in_the_blind_range_and_the_same_one_beyond", _RADAR_EFFECTS,
+         "wiring/test_radar_detection_keys.py"),
         ("blind-far-away", "np.where(cells.range_m < nearest_m, 0.0, 1.0)",
          "np.where(cells.range_m > nearest_m, 0.0, 1.0)"),
         ("never-blind", "nearest = block.p.minimum_range_m\n", "nearest = None\n"),
@@ -113,7 +115,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/false_alarm_effects.py",
-        ("wiring/test_radar_detection_keys.py", "radar/test_false_alarm_counts.py"),
+        ("wiring/test_false_alarms_of_radars.py", "wiring/test_radar_detection_keys.py"),
         ("alarms-of-a-radar-that-is-off", "if block.p.false_alarms and not block.p.enabled:",
          "if False:"),
         ("no-alarms", "return Verdict(block.p.false_alarms, f", "return Verdict(False, f"),
