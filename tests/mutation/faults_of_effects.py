@@ -11,7 +11,7 @@ _PLAN = (
 _RADAR_EFFECTS = "radar/test_radar_effects.py::test_the_reason_is_in_the_scene"
 _HOOKS = "engine/test_hooks_of_effects.py"
 _WEATHER = "wiring/test_weather_on_radar.py"
-_BOUNDS = "accuracy/test_bounds_of_weather.py"
+_BOUNDS = "accuracy/test_what_a_tolerance_leaves_out.py"
 _PD = "accuracy/test_auto_models.py::test_auto_pd_says_why_and_contradicts_a_named_method"
 
 FAULTS = [
@@ -153,7 +153,8 @@ FAULTS = [
          'or camera.p.silhouette in ("sampled_table", "mesh")'),
     ),
     *in_file(
-        _GROUP, "components/optical/dynamic_signature.py", "wiring/test_camera_signature.py",
+        _GROUP, "components/optical/dynamic_signature.py",
+        ("wiring/test_camera_signature.py", "wiring/test_what_is_remembered_across_windows.py"),
         ("motion-not-called-for", 'return Verdict(weight > 0, f"dynamic_weight',
          'return Verdict(weight > 1e9, f"dynamic_weight'),
         ("motion-forgets-the-last-scan",
@@ -186,14 +187,17 @@ FAULTS = [
          "return _BODY_AXES"),
     ),
     *in_file(
-        _GROUP, "components/sensor/mounting.py", "sensor_effects/test_sensor_mounting.py",
+        _GROUP, "components/sensor/mounting.py",
+        ("sensor_effects/test_sensor_mounting.py", "wiring/test_measured_angles.py",
+         "wiring/test_reach.py"),
         ("roll-alone-is-no-mounting", '"mount_roll_deg": p.mount_roll_deg,',
          '"mount_roll_deg": 0.0 * p.mount_roll_deg,'),
         ("misalignment-not-called-for", "if any(p.misalignment_deg):", "if False:"),
     ),
     *in_file(
         _GROUP, "components/sensor/declaration_rule.py",
-        "sensor_effects/test_declaration_delay.py",
+        ("sensor_effects/test_declaration_delay.py",
+         "wiring/test_what_is_remembered_across_windows.py"),
         ("m-is-n", "Declarations(block.p.declare_m or 1, block.p.declare_n or 1)",
          "Declarations(block.p.declare_n or 1, block.p.declare_n or 1)"),
         ("last-declaration-for-first", "new = self._first_tick[target] < 0",
@@ -206,7 +210,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/detection_rung.py",
-        ("radar/test_detection_rungs.py", _PD),
+        (_BOUNDS, "radar/test_detection_rungs.py", _PD),
         ("table-errs-by-nothing", "TABLE_ERROR = 1e-6", "TABLE_ERROR = 1e-3"),
         ("closed-form-for-many-pulses", "return block.p.pulses == 1 and _models(block) <= {1, 2}",
          "return _models(block) <= {1, 2}"),
@@ -220,7 +224,9 @@ FAULTS = [
          'LineOfSight("ellipsoid", self.rung.attitude)'),
     ),
     *in_file(
-        _GROUP, "components/messages/reach.py", ("wiring/test_reach.py", "test_culling.py"),
+        _GROUP, "components/messages/reach.py",
+        ("wiring/test_reach.py", "wiring/test_a_sensor_that_is_off_keeps_none.py",
+         "test_culling.py"),
         ("sensor-that-is-off-looks", "elif request.enabled:", "elif True:"),
         ("nearest-reach-counts", "max(look.range_m for look in looks)",
          "min(look.range_m for look in looks if look.range_m > 0 or len(looks) == 1)"),

@@ -66,3 +66,34 @@ def test_the_largest_from_its_largest_side_is_still_looked_at(kind, contrast, we
     signature = seen(-1.0)["long"]["confidence"] - 1.0
     assert set(seen(0.999 * signature)) == {"long"}
     assert set(seen(1.001 * signature)) == set()
+
+
+def test_what_is_seen_by_its_plume_or_by_its_table_alone_is_looked_at(tmp_path):
+    """Hardly a body: a jet's plume from behind, and a table of a larger silhouette."""
+    nodes = [(az, el) for az in range(0, 360, 30) for el in range(-90, 91, 30)]
+    lines = ["az_deg,el_deg,area_m2", *(f"{az},{el},400.0" for az, el in nodes)]
+    path = tmp_path / "area.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    body = {"front_m2": 0.1, "side_m2": 0.0, "horizontal_m2": 0.0, "silhouette_table": str(path)}
+    warm = {**body, "back_m2": 0.1}
+    craft = {
+        "name": "jet",
+        **ABEAM,
+        "heading_deg": 0.0,
+        "engine": "turbojet",
+        "eo": body,
+        "ir": warm,
+    }
+    for kind, keys in (
+        ("optical.ir", {"plume": True}),
+        ("optical.ir", {"silhouette": "aspect_table"}),
+        ("optical.eo", {"silhouette": "aspect_table"}),
+    ):
+        signatures = []
+        for threshold in (-1.0, None):
+            if threshold is None:
+                threshold = 0.999 * (signatures[0]["confidence"] - 1.0)
+            camera = sensor(kind, threshold=threshold, **keys)
+            scene = chain({"camera": camera}, ownship=LEVEL, targets=[craft])
+            signatures += rows(run(scene), scan=0)
+        assert len(signatures) == 2

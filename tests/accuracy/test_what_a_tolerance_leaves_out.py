@@ -63,3 +63,14 @@ def test_a_bound_holds_and_is_of_the_size_of_the_influence(weather):
         )  # fmt: skip
         assert left == pytest.approx(allowed - spent)
         assert math.isclose(spent, bound, rel_tol=0.01) is left_out
+
+
+@pytest.mark.parametrize(
+    ("pulses", "swerling", "built"),
+    [(1, 1, True), (1, 2, True), (1, 3, False), (5, 1, False), (5, 2, False)],
+)
+def test_only_one_pulse_of_swerling_one_or_two_is_closed(pulses, swerling, built):
+    given = scene(accuracy={"detection_probability": 1e-3})
+    given["blocks"]["radar"] |= {"pulses": pulses, "swerling": swerling}
+    plan = {item.effect.name: item for item in Simulation(load_scene(given)).plan}
+    assert plan["exact Pd"].built is built
