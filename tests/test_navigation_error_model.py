@@ -95,3 +95,15 @@ def test_bias_and_spread_are_what_was_asked_for():
 def test_bad_input_is_named(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+@pytest.mark.parametrize("down_m", [1500.0, -1500.0])
+def test_a_displacement_is_as_long_at_the_height_it_leads_to(down_m):
+    """Against the tangent plane: metres to the north and east span fewer degrees farther up."""
+    pymap3d = pytest.importorskip("pymap3d")
+    here = (-41.3, -179.9, 2400.0)
+    north_m, east_m = 900.0, -1100.0
+    lat, lon, alt = position_with_error(*here, bias_north_east_down_m=(north_m, east_m, down_m))
+    east, north, up = pymap3d.geodetic2enu(float(lat), float(lon), float(alt), *here)
+    assert (east, north) == pytest.approx((east_m, north_m), abs=0.05)
+    assert up == pytest.approx(-down_m, abs=0.2)

@@ -159,6 +159,14 @@ def test_windows_partition_the_scans(rate, offset, ppm, jitter_s, cuts, later):
         assert not ((beyond >= bounds[0]) & (beyond < bounds[-1])).any()
 
 
+def test_a_scan_at_the_edge_of_a_window_belongs_to_the_next():
+    (clock,), _ = clocks_of(ClockSpec(Fraction(10), jitter_s=0.004))
+    edges = clock.ticks(np.arange(1, 20)).tolist()
+    for scan, edge in enumerate(edges, start=1):
+        assert clock.between(0, edge)[0].tolist() == list(range(scan))
+        assert clock.between(edge, edges[-1] + 1)[0].tolist() == list(range(scan, 20))
+
+
 def test_jitter_moves_scans_by_its_deviation_and_never_before_the_start():
     spec = ClockSpec(Fraction(100), jitter_s=1e-3)
     (clock,), ticks_per_s = clocks_of(spec)

@@ -94,3 +94,27 @@ def test_without_a_calibration_the_threshold_is_that_of_pd_0_9():
     row = seen(scene)
     assert row is not None
     assert row["snr_db"] - row["confidence"] == pytest.approx(needed_db(0.9, 1), abs=1e-5)
+
+
+@pytest.mark.parametrize("pulses", [1, 8])
+@pytest.mark.parametrize("swerling", [1, 4])
+def test_the_stated_pd_is_that_of_all_pulses(pulses, swerling):
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.83, "swerling": swerling}
+    radar = {**RADAR, "type": "radar.swerling", "calibrate": calibrate, "pulses": pulses}
+    scene = chain({"radar": radar}, ownship=OWN, targets=[at(4200, 5.0, swerling)])
+    row = seen(scene)
+    assert row is not None
+    assert row["detection_probability"] == pytest.approx(0.83, abs=1e-6)
+
+
+def test_each_target_fluctuates_by_its_own_model():
+    """Five targets at one place: none has another one's Pd."""
+    radar = {**RADAR, "type": "radar.swerling", "bandwidth_hz": 2e6, "power_w": 30.0}
+    targets = [{**at(3600, 5.0, model), "name": f"swerling{model}"} for model in range(5)]
+    found = {row["target"]: row for row in rows(run(chain({"radar": radar}, ownship=OWN,
+             targets=targets)))}  # fmt: skip
+    snr = 10.0 ** (0.1 * next(iter(found.values()))["snr_db"])
+    assert 3.0 < snr < 100.0
+    for model in range(5):
+        row = found[f"swerling{model}"]
+        assert row["detection_probability"] == pytest.approx(pd_of(snr, model), rel=1e-6)

@@ -41,9 +41,13 @@ def clutter_to_signal(target: dict, height_m: float, gamma_db: float, rcs_m2: fl
 @pytest.mark.parametrize(
     ("ground_m", "gamma_db"), [(1300.0, -15.0), (1300.0, -5.0), (1150.0, -5.0)]
 )
-def test_clutter_is_that_of_the_ground_below_the_line_of_sight(ground_m, gamma_db):
+@pytest.mark.parametrize("rain_mm_h", [0.0, 3.0])
+def test_clutter_is_that_of_the_ground_below_the_line_of_sight(ground_m, gamma_db, rain_mm_h):
+    """Rain on the way weakens both echoes alike."""
     terrain = {"height_m": ground_m, "clutter_gamma_db": gamma_db}
-    seen = first_look(chain({"radar": RADAR}, targets=TARGETS, terrain=terrain), "radar")
+    weather = {"rain_rate_mm_h": rain_mm_h, "rain_top_m": 9000.0}
+    scene = chain({"radar": RADAR}, targets=TARGETS, terrain=terrain, weather=weather)
+    seen = first_look(scene, "radar")
     height_m = crooked.OWNSHIP["alt_m"] - ground_m
     for target in TARGETS:
         row = seen[target["name"]]

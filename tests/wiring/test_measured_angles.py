@@ -30,6 +30,7 @@ def test_reports_are_on_the_grid_of_each_angle(kind, across_deg, up_deg):
     for name, vector in BODY.items():
         azimuth, elevation = crooked.angles(vector)
         assert found[name]["true_azimuth_rad"] == pytest.approx(azimuth, abs=1e-9)
+        assert found[name]["true_elevation_rad"] == pytest.approx(elevation, abs=1e-9)
         expected = on_grid(azimuth, math.radians(across_deg))
         assert found[name]["azimuth_rad"] == pytest.approx(expected, abs=1e-9)
         expected = on_grid(elevation, math.radians(up_deg))

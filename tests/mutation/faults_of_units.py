@@ -1,0 +1,188 @@
+"""Faults of units: degrees for radians, kilometres for metres, decibels for ratios."""
+
+from fault import in_file
+
+_GROUP = "units"
+_WEATHER = "wiring/test_weather_on_radar.py"
+_BUDGET = ("wiring/test_link_budget_keys.py", "radar/test_link_budget_calibration.py")
+
+FAULTS = [
+    *in_file(
+        _GROUP, "components/sensor/parameters.py",
+        ("wiring/test_reach.py", "wiring/test_measured_angles.py"),
+        ("reach-in-kilometres", "self.range_km * 1000.0", "self.range_km * 1.0"),
+        ("reach-in-nautical-miles", "self.range_km * 1000.0", "self.range_km * 1852.0"),
+        ("field-of-view-in-degrees", "math.radians(self.azimuth_deg[0])", "self.azimuth_deg[0]"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/sensor.py", "wiring/test_measured_angles.py",
+        ("azimuth-grid-in-degrees", "math.radians(parameters.azimuth_resolution_deg)",
+         "parameters.azimuth_resolution_deg"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/mounting.py", "sensor_effects/test_sensor_mounting.py",
+        ("mounted-in-degrees", "(math.radians(angle) for angle in true_deg)",
+         "(angle for angle in true_deg)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/weather_effects.py", _WEATHER,
+        ("fog-in-celsius", "weather.fog_temperature_c + 273.15",
+         "weather.fog_temperature_c + 273.0"),
+    ),
+    *in_file(
+        _GROUP, "components/atmosphere/slant_path.py",
+        (_WEATHER, "atmosphere/test_slant_path_attenuation.py"),
+        ("attenuation-by-the-metre", "mean_db_km * (distance * 1e-3)", "mean_db_km * distance"),
+        ("two-way-as-one-way", "np.power(10.0, -0.2 * ", "np.power(10.0, -0.1 * "),
+        ("rain-above-its-top", "_share_between(low, high, -np.inf, table.rain_height_m)",
+         "_share_between(low, high, table.rain_height_m, np.inf)"),
+        ("fog-outside-its-layer", "np.minimum(high, top) - np.maximum(low, bottom)",
+         "np.minimum(high, top) - bottom + 0.0 * low"),
+        ("gas-of-the-lower-end", "to_next_node + whole_steps + from_last_node) / steps)",
+         "to_next_node + whole_steps + from_last_node) / (steps + 1.0))"),
+    ),
+    *in_file(
+        _GROUP, "components/atmosphere/rain.py",
+        (_WEATHER, "atmosphere/test_specific_attenuation.py"),
+        ("horizontal-is-vertical", '"horizontal": 1.0, "vertical": -1.0',
+         '"horizontal": -1.0, "vertical": 1.0'),
+        ("rain-coefficients-natural", "k_horizontal=10.0 ** value", "k_horizontal=2.718 ** value"),
+    ),
+    *in_file(
+        _GROUP, "components/atmosphere/visibility.py",
+        ("wiring/test_camera_keys.py", "atmosphere/test_fog_and_rain_visibility.py"),
+        ("visibility-of-five-per-cent", "KOSCHMIEDER = 3.912", "KOSCHMIEDER = 3.0"),
+        ("fog-visibility-in-kilometres", "visibility = 1002.0 * np.power",
+         "visibility = 1.002 * np.power"),
+        ("visibilities-add", "total += base / np.where(clear, 1.0, array)",
+         "total = np.maximum(total, base / np.where(clear, 1.0, array))"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/weather_effects.py", "wiring/test_camera_keys.py",
+        ("visibility-in-kilometres", "return weather.visibility_km * 1000.0",
+         "return weather.visibility_km"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/dynamic_signature.py", "wiring/test_camera_signature.py",
+        ("interval-in-ticks", "(tick[1:] - tick[:-1])[cells.row] / self._ticks_per_s",
+         "(tick[1:] - tick[:-1])[cells.row] / 1e9 * 2.0"),
+        ("interval-since-the-start", "(tick[1:] - tick[:-1])[cells.row] / self._ticks_per_s",
+         "np.maximum(tick[1:], 1)[cells.row] / self._ticks_per_s"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/radar_equation.py", _BUDGET,
+        ("gain-once", "2.0 * antenna_gain_db + integration_gain_db",
+         "antenna_gain_db + integration_gain_db"),
+        ("losses-gain", "- noise_figure_db - losses_db", "- noise_figure_db + losses_db"),
+        ("decibels-of-voltage", "10.0 ** (total_db / 10.0)", "10.0 ** (total_db / 20.0)"),
+        ("third-power-of-range", "(constant_m2 / square) * (rcs / square)",
+         "(constant_m2 / square) * (rcs / safe)"),
+        ("one-four-pi-less", "((4.0 * math.pi) ** 3 * noise_w)",
+         "((4.0 * math.pi) ** 2 * noise_w)"),
+        ("at-freezing-point", "REFERENCE_TEMPERATURE_K = 290.0",
+         "REFERENCE_TEMPERATURE_K = 273.15"),
+        ("echoes-from-too-near", "np.where(near, 0.0, np.minimum(echo, _LARGEST))",
+         "np.minimum(echo, _LARGEST)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/link_budget.py", _BUDGET,
+        ("calibrated-in-metres", 'float(positive("range_km", range_km)) * 1000.0',
+         'float(positive("range_km", range_km)) * 1.0'),
+        ("far-field-by-decibels",
+         "2.0 * 10.0 ** (self.antenna_gain_db / 10.0) * self.wavelength",
+         "2.0 * self.antenna_gain_db * self.wavelength"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/swerling.py", "wiring/test_radar_detection_keys.py",
+        ("snr-as-voltage", "10.0 * np.log10(np.where(echo, snr, 1.0))",
+         "20.0 * np.log10(np.where(echo, snr, 1.0))"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/threshold_radar.py",
+        ("wiring/test_radar_detection_keys.py", "wiring/test_calibrated_radars.py"),
+        ("threshold-as-voltage", "float(10.0 * np.log10(snr))", "float(20.0 * np.log10(snr))"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/threshold_radar.py", "wiring/test_ground_clutter_in_ned.py",
+        ("clutter-as-voltage", "margin - 10.0 * np.log10(1.0 + cnr)",
+         "margin - 20.0 * np.log10(1.0 + cnr)"),
+        ("clutter-without-noise", "10.0 * np.log10(1.0 + cnr)",
+         "10.0 * np.log10(np.maximum(1.0, cnr))"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/range_boundary.py",
+        "wiring/test_margins_of_range_boundaries.py",
+        ("fourth-root-margin", "40.0 * np.log10(ratio)", "20.0 * np.log10(ratio)"),
+    ),
+    *in_file(
+        _GROUP, "components/aircraft/aircraft.py", "wiring/test_aircraft_keys.py",
+        ("rcs-as-voltage", "10.0 ** (craft.rcs_dbsm / 10.0)", "10.0 ** (craft.rcs_dbsm / 20.0)"),
+    ),
+    *in_file(
+        _GROUP, "components/aircraft/rcs_table.py",
+        ("wiring/test_aspect_tables.py", "radar/test_rcs_models.py"),
+        ("table-rcs-as-voltage", "np.power(10.0, flat / 10.0)", "np.power(10.0, flat / 20.0)"),
+        ("table-by-the-node-below", "lower * (1.0 - up) + upper * up", "lower + 0.0 * upper * up"),
+        ("table-azimuth-in-radians", "past(azimuth * (180.0 / np.pi) - first, 360.0)",
+         "past(azimuth - first, 360.0)"),
+    ),
+    *in_file(
+        _GROUP, "components/aircraft/silhouette_table.py",
+        ("optical/test_aspect_table_lookup.py", "wiring/test_aspect_tables.py"),
+        ("square-feet-as-feet", "_SQUARE_FOOT_M2 = 0.3048**2", "_SQUARE_FOOT_M2 = 0.3048"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/gated.py", "wiring/test_gated_fusion_angles.py",
+        ("angle-gate-in-degrees", "np.radians(self.p.angle_gate_deg)", "self.p.angle_gate_deg"),
+    ),
+    *in_file(
+        _GROUP, "components/avoidance/turn_away.py", "wiring/test_turning_away.py",
+        ("near-in-metres", "tracks.range_m <= 1000.0 * self.p.range_km",
+         "tracks.range_m <= 1852.0 * self.p.range_km"),
+        ("turns-in-degrees", "math.radians(self.p.turn_deg) * ", "self.p.turn_deg * "),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/steered_flight.py",
+        ("traffic/test_steered_flight.py", "wiring/test_turning_away.py"),
+        ("speed-over-half-the-time", "/ (2.0 * _BASE_S)", "/ _BASE_S"),
+        ("commanded-rate-in-radians", "math.degrees(rate_rad_s), turn_rad",
+         "rate_rad_s, turn_rad"),
+        ("always-to-the-right", "math.copysign(math.degrees(rate_rad_s), turn_rad)",
+         "math.degrees(rate_rad_s)"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/units.py",
+        ("traffic/test_units_of_files.py", "traffic/test_traffic_readers.py"),
+        ("feet-as-metres", '"ft": _FOOT_M,', '"ft": 1.0,'),
+        ("statute-miles", "_NAUTICAL_MILE_M = 1852.0", "_NAUTICAL_MILE_M = 1609.344"),
+        ("feet-per-second", '"fpm": _FOOT_M / 60.0', '"fpm": _FOOT_M'),
+        ("knots-by-the-minute", '"knots": _NAUTICAL_MILE_M / 3600.0',
+         '"knots": _NAUTICAL_MILE_M / 60.0'),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/random_traffic.py", "wiring/test_random_traffic_keys.py",
+        ("disc-in-metres", "1000.0 * p.radius_km", "p.radius_km"),
+        ("bearings-to-one-radian", "2.0 * math.pi * bearing", "bearing"),
+        ("headings-to-one-radian", "360.0 * heading, speed", "6.28 * heading, speed"),
+    ),
+    *in_file(
+        _GROUP, "components/navigation/effects.py", "wiring/test_navigation_keys.py",
+        ("bias-in-degrees", "math.radians(angle) for angle in angles_deg",
+         "angle for angle in angles_deg"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/resolution_cells.py",
+        ("wiring/test_false_alarms_of_radars.py", "radar/test_false_alarm_counts.py"),
+        ("cells-rounded-down", "math.ceil(width / cell - 1e-9)", "math.floor(width / cell + 1e-9)"),
+        ("cells-from-range-zero", "(farthest_m - nearest_m, range_cell_m)",
+         "(farthest_m, range_cell_m)"),
+    ),
+    *in_file(
+        _GROUP, "components/geometry/flat_earth.py",
+        ("geometry/test_line_of_sight_rungs.py", "wiring/test_line_of_sight.py"),
+        ("degree-of-a-nautical-sphere", "METRES_PER_DEGREE = 111195.0",
+         "METRES_PER_DEGREE = 111120.0"),
+        ("meridians-parallel", "np.sin((90.0 - np.abs(lat1)) * RAD_PER_DEG) * METRES_PER_DEGREE",
+         "np.sin((90.0 - 0.0 * lat1) * RAD_PER_DEG) * METRES_PER_DEGREE"),
+    ),
+]  # fmt: skip

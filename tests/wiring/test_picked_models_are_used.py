@@ -1,0 +1,35 @@
+"""Models that are picked by their error are those that the lines of sight come from."""
+
+import crooked
+from wired import chain, rows, run, sensor
+
+NEARLY_LEVEL = {**crooked.OWNSHIP, "pitch_deg": 0.3, "roll_deg": 0.2, "climb_mps": 0.0}
+RADAR = sensor(
+    "radar.range_boundary", range_km=5.0, elevation_deg=[-20, 20], azimuth_deg=[-170, 170]
+)
+FAR = [
+    {**crooked.ROLLING, "up_m": 300.0}, {**crooked.DIVING, "up_m": -200.0, "climb_mps": 0.0},
+]  # fmt: skip
+
+
+def looked(**transform):
+    scene = chain({"radar": RADAR}, ownship=NEARLY_LEVEL, targets=FAR)
+    if transform.get("model") == "auto":
+        scene["accuracy"] = {"angle_deg": 3.0, "range_m": 200.0}
+    scene["blocks"]["transform"] |= transform
+    found = run(scene)
+    return rows(found), found.summary
+
+
+def test_what_is_picked_is_what_it_would_be_by_name():
+    auto, told = looked(model="auto", attitude="auto")
+    picked = told["models"]["transform"]
+    assert picked["earth"] != "ellipsoid" and picked["attitude"] == "small_angle"
+    named, _ = looked(model=picked["earth"], attitude=picked["attitude"])
+    assert len(named) == 2
+    assert auto == named
+    for other in (
+        {"model": "ellipsoid", "attitude": picked["attitude"]},
+        {"model": picked["earth"], "attitude": "exact"},
+    ):
+        assert looked(**other)[0] != named
