@@ -86,6 +86,7 @@ class DaidalusAlerting(Component):
         self._source = next((port for port in ("tracks", "fused") if port in ports), "")
         self._configuration: Configuration = configuration
         self._roster: Any = None
+        self._own_came: IntArray = np.empty(0, dtype=np.int64)
         self._own_tick: IntArray = np.empty(0, dtype=np.int64)
         self._own_place: FloatArray = np.empty((0, 3))
         self._attitude: FloatArray = np.empty((0, 3))
@@ -110,7 +111,10 @@ class DaidalusAlerting(Component):
             self._fit = StraightFit(self.p.fit_s, len(states.roster))
             self._memory = AlertMemory(memory_rule(self._configuration), len(states.roster))
         place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
-        self._own_tick = np.concatenate([self._own_tick, states.tick])
+        self._own_came = np.concatenate([self._own_came, arrived.tick])
+        # Of those that overtook each other on the way, the newest counts.
+        ticks = np.concatenate([self._own_tick, states.tick])
+        self._own_tick = np.maximum.accumulate(ticks)
         self._own_place = np.concatenate([self._own_place, np.stack(place, axis=1)])
         if self._source:
             angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
@@ -131,9 +135,15 @@ class DaidalusAlerting(Component):
         new = np.isfinite(sights.range_m) & (sights.target >= 0)
         if self._source == "tracks":
             new &= sights.age_s == 0.0  # older ones came with an earlier row
+        # The attitude of the same instant, of those that have arrived.
+        place = np.minimum(
+            np.searchsorted(self._own_tick, sights.tick, side="right"),
+            np.searchsorted(self._own_came, arrived.tick, side="right"),
+        )
+        new &= place[row] > 0
         row = row[new]
-        place = np.searchsorted(self._own_tick, sights.tick[row], side="right") - 1
-        yaw, pitch, roll = self._attitude[np.maximum(place, 0)].T
+        place = place[row] - 1
+        yaw, pitch, roll = self._attitude[place].T
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
         range_m = sights.range_m[new]
         level = range_m * np.cos(elevation)
@@ -151,10 +161,8 @@ class DaidalusAlerting(Component):
             for tick, now_s in zip(ticks.tolist(), times, strict=True)
         ]
         self._fit.forget_before(times[-1])
-        keep = max(int(np.searchsorted(self._own_tick, ticks[0], side="right")) - _KEPT_POSES, 0)
         own = self._own_states(ticks)
-        self._own_tick, self._own_place = self._own_tick[keep:], self._own_place[keep:]
-        self._attitude = self._attitude[keep:]
+        self._forget_poses(int(ticks[-1]))
         known = np.stack([one for one, _ in fitted])
         # Positions count from the ownship: its own less theirs is the other way round.
         relative = [-np.ravel([state[i] for _, state in fitted]) for i in range(6)]
@@ -185,12 +193,20 @@ class DaidalusAlerting(Component):
             self._roster,
         )
 
+    def _forget_poses(self, tick: int) -> None:
+        """Drop poses of the ownship that neither its velocity nor a late sight asks for."""
+        span = round(self.p.fit_s * self.context.ticks_per_s)
+        old = int(np.searchsorted(self._own_tick, tick - span, side="left"))
+        keep = max(min(old, len(self._own_tick) - _KEPT_POSES), 0)
+        for name in ("_own_came", "_own_tick", "_own_place", "_attitude"):
+            setattr(self, name, getattr(self, name)[keep:])
+
     def _own_states(self, ticks: IntArray) -> dict[str, FloatArray]:
         """Return the ownship's altitude and its mean velocity over the last seconds."""
         per_s = self.context.ticks_per_s
         span = round(self.p.fit_s * per_s)
-        last = np.searchsorted(self._own_tick, ticks, side="right") - 1
-        first = np.searchsorted(self._own_tick, ticks - span, side="left")
+        last = np.maximum(np.searchsorted(self._own_came, ticks, side="right") - 1, 0)
+        first = np.minimum(np.searchsorted(self._own_tick, ticks - span, side="left"), last)
         now, then = self._own_place[last], self._own_place[first]
         time_s = (self._own_tick[last] - self._own_tick[first]) / per_s
         time_s = np.where(time_s > 0.0, time_s, np.nan)

@@ -159,6 +159,17 @@ def test_windows_change_no_byte(tmp_path, monkeypatch, wires):
     assert len(at_once) > 8
 
 
+def test_an_ownship_that_is_known_late_changes_no_byte(tmp_path, monkeypatch):
+    """With a shorter memory than the delay, only what has arrived counts, in windows too."""
+    one = scene(tmp_path, "fusion -> alerting", m=2, fit_s=0.6)
+    one["wires"].remove("traffic -> alerting")
+    one["wires"].append({"from": "traffic", "to": "alerting", "delay_s": 0.7, "jitter_s": 0.2})
+    at_once = rows(run(one), "alerts")
+    monkeypatch.setattr(DaidalusAlerting, "windowed", False)
+    assert rows(run(one), "alerts") == at_once
+    assert len(at_once) > 4
+
+
 def test_tracks_and_fused_rows_together_are_refused(tmp_path):
     with pytest.raises(SceneError, match="believes one of them"):
         run(scene(tmp_path, "fusion -> alerting", "tracker -> alerting"))
