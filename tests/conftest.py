@@ -3,6 +3,7 @@
 import os
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -42,10 +43,18 @@ def configs() -> Path:
     return ROOT / "configs"
 
 
+@cache
 def slow_tests() -> list[str]:
     """Return the lines of tests/slow.txt: files, or FILE::FUNCTION."""
     lines = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").splitlines()
     return [line for line in lines if line and not line.startswith("#")]
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not import files that are slow as a whole where slow tests are left out."""
+    if config.getoption("markexpr") != "not slow" or not collection_path.is_file():
+        return None
+    return collection_path.relative_to(ROOT).as_posix() in slow_tests() or None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
