@@ -31,7 +31,7 @@ def page(faults: Sequence[Fault], outcomes: Mapping[str, Outcome]) -> str:
     """Return the page as Markdown, from the last outcome of each fault by its name."""
     days = [outcome.at for outcome in outcomes.values()]
     between = " to ".join(dict.fromkeys((min(days), max(days)))) if days else "no day"
-    lines = [_HEAD + f"As last tried, on {between}{_commit()}:\n"]
+    lines = [_HEAD + f"The last outcome of each fault, of {between}; written{_commit()}:\n"]
     lines += ["| where | faults | noticed | survived | equivalent | not tried |"]
     lines += ["|---|--:|--:|--:|--:|--:|"]
     for group in [*dict.fromkeys(fault.group for fault in faults), ""]:
@@ -64,4 +64,4 @@ def _commit() -> str:
     found = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
     )
-    return f", at commit {found.stdout.strip()}" if found.returncode == 0 else ""
+    return f" at commit {found.stdout.strip()}" if found.returncode == 0 else ""
