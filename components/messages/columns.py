@@ -30,6 +30,18 @@ _TRUE: Mapping[str, Column] = {
     "true_range_m": ("m", "", "true slant range"),
 }
 
+_ERRORS: Mapping[str, Column] = {
+    "range_rate_m_s": ("m/s", "", "measured range rate, positive when opening; null without one"),
+    "azimuth_variance_rad2": ("rad²", _BODY, "mean square error of the azimuth, as stated"),
+    "elevation_variance_rad2": ("rad²", _BODY, "mean square error of the elevation, as stated"),
+    "range_variance_m2": ("m²", "", "mean square error of the range; null where none is measured"),
+    "range_rate_variance_m2_s2": (
+        "m²/s²",
+        "",
+        "mean square error of the range rate; null where none is measured",
+    ),
+}
+
 COLUMNS: Mapping[str, Mapping[str, Column]] = {
     "scans": {
         "scan": ("", "", "number of the scan, from 0"),
@@ -57,6 +69,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be: latitude"),
         "own_lon_deg": ("deg", _WGS84, "its longitude"),
         "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        **_ERRORS,
     },
     "fused": {
         "target": ("", "", "name of the target"),

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.messages.constant_columns import not_measured
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
@@ -42,6 +43,16 @@ EXTRAS = {
 }
 
 
+#: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
+MEASURED = (
+    "range_rate_m_s",
+    "azimuth_variance_rad2",
+    "elevation_variance_rad2",
+    "range_variance_m2",
+    "range_rate_variance_m2_s2",
+)
+
+
 @dataclass(frozen=True)
 class SensorOffer:
     """What a sensor says of its detections to the blocks that receive them.
@@ -51,10 +62,21 @@ class SensorOffer:
     measures_range : bool
     resolution_rad : float
         Coarser of the two angular grid steps, for choosing between sensors.
+    measures_range_rate : bool
+    azimuth_variance_rad2, elevation_variance_rad2 : float or None
+        Of the columns of the same names in `Detections`, where all entries have one value; None
+        where it differs from detection to detection.
+    range_variance_m2, range_rate_variance_m2_s2 : float or None
+        None where it differs, or is not measured.
     """
 
     measures_range: bool
     resolution_rad: float
+    measures_range_rate: bool = False
+    azimuth_variance_rad2: float | None = None
+    elevation_variance_rad2: float | None = None
+    range_variance_m2: float | None = None
+    range_rate_variance_m2_s2: float | None = None
 
 
 def _target_names(message: Any) -> Text:
@@ -63,6 +85,10 @@ def _target_names(message: Any) -> Text:
 
 def _contributor_names(message: Any) -> Text:
     return combination_text(message.contributors, message.sensors)
+
+
+def _measured() -> Any:
+    return per_entry(column="float64", default=None, kw_only=True)
 
 
 @dataclass(eq=False)
@@ -85,6 +111,13 @@ class Detections(Message):
         Measured, in the ownship's body axes, on the sensor's grid.
     range_m : (entries,)
         Measured slant range; NaN for a sensor that has none.
+    range_rate_m_s : (entries,)
+        Measured rate of the slant range, positive when it opens; NaN where it is not measured.
+    azimuth_variance_rad2, elevation_variance_rad2 : (entries,)
+        Mean square of the error of the measured angles, in body axes, as the sensor states it: a
+        grid's is step²/12. The cut at the edge of the field of view is not in it.
+    range_variance_m2, range_rate_variance_m2_s2 : (entries,)
+        The same of range and range rate; NaN where they are not measured.
     confidence : (entries,)
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
@@ -118,7 +151,17 @@ class Detections(Message):
     true_elevation_rad: FloatArray = per_entry(column="float64")
     true_range_m: FloatArray = per_entry(column="float64")
     extras: dict[str, AnyArray] = per_entry(columns=EXTRAS, value=lambda m: m.extra_columns())
+    range_rate_m_s: FloatArray = _measured()
+    azimuth_variance_rad2: FloatArray = _measured()
+    elevation_variance_rad2: FloatArray = _measured()
+    range_variance_m2: FloatArray = _measured()
+    range_rate_variance_m2_s2: FloatArray = _measured()
     roster: Roster = static()
+
+    def __post_init__(self) -> None:
+        for name in MEASURED:
+            if getattr(self, name) is None:
+                setattr(self, name, not_measured(len(self.target)))
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""
