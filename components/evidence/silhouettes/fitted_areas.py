@@ -55,17 +55,21 @@ def fitted_areas(
     ):
         if not value > least:
             raise ValueError(f"{name} is {value:g}: it must be above {least:g}{why}")
-    areas = {"front_m2": front_m2, "side_m2": abeam_m2 - ball_m2}
-    if back_m2 is not None:
-        areas["back_m2"] = back_m2
+    side_m2 = abeam_m2 - ball_m2
 
     def from_above_m2(plate_m2: float) -> float:
-        return float(
-            visible_area(
-                0.5 * math.pi, 0.0, 0.0, -0.5 * math.pi,
-                horizontal_m2=plate_m2, model="convex_hull", **areas,
-            )
-        )  # fmt: skip
+        shown = visible_area(
+            0.5 * math.pi,
+            0.0,
+            0.0,
+            -0.5 * math.pi,
+            front_m2=front_m2,
+            side_m2=side_m2,
+            horizontal_m2=plate_m2,
+            back_m2=back_m2,
+            model="convex_hull",
+        )
+        return float(shown)
 
     low, high = 0.0, above_m2
     while from_above_m2(high) < above_m2:
@@ -73,7 +77,8 @@ def fitted_areas(
     for _ in range(_STEPS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if from_above_m2(middle) < above_m2 else (low, middle)
-    return {**areas, "horizontal_m2": high}
+    found = {"front_m2": front_m2, "side_m2": side_m2, "horizontal_m2": high}
+    return found if back_m2 is None else {**found, "back_m2": back_m2}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
