@@ -19,6 +19,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
+from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes, Mounting
@@ -183,6 +184,7 @@ class Sensor(Component):
             true_range_m=r,
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
+            **believed_pose(targets, rows),
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
