@@ -1,13 +1,15 @@
 """What the ownship believes of its own pose at each scan of a sensor."""
 
+from typing import Any
+
 from components.messages.detections import POSE
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import IntArray
 
 _BELIEVED = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
 
 
-def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, FloatArray]:
+def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     """Return the ownship's believed pose at each scan, by field of `Detections`.
 
     Parameters
