@@ -8,6 +8,7 @@ from collections.abc import Mapping
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
 _WGS84 = "WGS 84"
+_TURNED = "north-east-down to body: yaw, pitch, roll"
 
 #: Unit, frame, meaning.
 Column = tuple[str, str, str]
@@ -66,9 +67,12 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "illuminated_s": ("s", "", "when a sweeping beam lit the target"),
         "ned_azimuth_rad": ("rad", _NED, "azimuth from north, by the believed attitude"),
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
-        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be: latitude"),
+        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be then: latitude"),
         "own_lon_deg": ("deg", _WGS84, "its longitude"),
         "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        "own_heading_rad": ("rad", _TURNED, "how it believes to be turned: nose, from north"),
+        "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
+        "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
         **_ERRORS,
     },
     "fused": {

@@ -37,9 +37,16 @@ EXTRAS = {
     "illuminated_s": "float64",
     "ned_azimuth_rad": "float64",
     "ned_elevation_rad": "float64",
+}
+#: The ownship's pose as it believes it to be: columns of ``detections``, and fields of
+#: `Detections`.
+POSE = {
     "own_lat_deg": "float64",
     "own_lon_deg": "float64",
     "own_alt_m": "float64",
+    "own_heading_rad": "float64",
+    "own_pitch_rad": "float64",
+    "own_roll_rad": "float64",
 }
 
 
@@ -127,9 +134,16 @@ class Detections(Message):
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
         has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
-        ownship's navigation errs, there are the line of sight in NED by what it believes of its
-        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``, and where it believes to be,
-        ``own_lat_deg``, ``own_lon_deg`` and ``own_alt_m``.
+        ownship's navigation errs, there is the line of sight in NED by what it believes of its
+        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``.
+    own_lat_deg, own_lon_deg, own_alt_m : (rows,), or None
+        Where the ownship believes to be at each scan (WGS 84); the truth where its navigation has
+        no error. None from a sensor that does not say; recorded with every detection.
+    own_heading_rad, own_pitch_rad, own_roll_rad : (rows,), or None
+        How it believes to be turned, NED to body (yaw-pitch-roll).
+    own_of_entries : dict of (entries,), or None
+        The same six where entries were measured at instants of their own within the scan;
+        `pose_columns` gives those of every entry in any case.
     roster : Roster
     """
 
@@ -157,6 +171,15 @@ class Detections(Message):
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
     roster: Roster = static()
+    own_lat_deg: FloatArray | None = per_row(default=None, kw_only=True)
+    own_lon_deg: FloatArray | None = per_row(default=None, kw_only=True)
+    own_alt_m: FloatArray | None = per_row(default=None, kw_only=True)
+    own_heading_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_pitch_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_roll_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_of_entries: dict[str, FloatArray] | None = per_entry(
+        columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
+    )
 
     def __post_init__(self) -> None:
         for name in MEASURED:
@@ -171,6 +194,14 @@ class Detections(Message):
         """Return the extras with ``declared``, which all detections have."""
         # A sensor without a rule declares what it detects; no target is behind a false alarm.
         return {"declared": self.target >= 0, **self.extras}
+
+    def pose_columns(self) -> dict[str, FloatArray]:
+        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
+        if self.own_of_entries is not None:
+            return self.own_of_entries
+        counts = np.diff(self.offsets)
+        pose = {name: getattr(self, name) for name in POSE}
+        return {n: np.repeat(v, counts) for n, v in pose.items() if v is not None}
 
 
 @dataclass(eq=False)

@@ -18,6 +18,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
+from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
 from components.sensor.look import Cells, Look
@@ -186,6 +187,7 @@ class Sensor(Component):
             **measured,
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
+            **believed_pose(targets, rows),
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
