@@ -165,11 +165,6 @@ class Detections(Message):
     true_elevation_rad: FloatArray = per_entry(column="float64")
     true_range_m: FloatArray = per_entry(column="float64")
     extras: dict[str, AnyArray] = per_entry(columns=EXTRAS, value=lambda m: m.extra_columns())
-    range_rate_m_s: FloatArray = _measured()
-    azimuth_variance_rad2: FloatArray = _measured()
-    elevation_variance_rad2: FloatArray = _measured()
-    range_variance_m2: FloatArray = _measured()
-    range_rate_variance_m2_s2: FloatArray = _measured()
     roster: Roster = static()
     own_lat_deg: FloatArray | None = per_row(default=None, kw_only=True)
     own_lon_deg: FloatArray | None = per_row(default=None, kw_only=True)
@@ -180,6 +175,11 @@ class Detections(Message):
     own_of_entries: dict[str, FloatArray] | None = per_entry(
         columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
     )
+    range_rate_m_s: FloatArray = _measured()
+    azimuth_variance_rad2: FloatArray = _measured()
+    elevation_variance_rad2: FloatArray = _measured()
+    range_variance_m2: FloatArray = _measured()
+    range_rate_variance_m2_s2: FloatArray = _measured()
 
     def __post_init__(self) -> None:
         for name in MEASURED:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,6 +61,9 @@ def add_false_detections(
         added = np.broadcast_to(np.asarray(false, dtype=true.dtype), row.shape)
         return np.concatenate([true, added])[order]
 
+    about: dict[str, Any] = {
+        name: joined(getattr(detections, name), stated.get(name, np.nan)) for name in MEASURED
+    }
     return replace(
         detections,
         offsets=np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(counts))))),
@@ -71,7 +75,7 @@ def add_false_detections(
         true_azimuth_rad=joined(detections.true_azimuth_rad, np.nan),
         true_elevation_rad=joined(detections.true_elevation_rad, np.nan),
         true_range_m=joined(detections.true_range_m, np.nan),
-        **{name: joined(getattr(detections, name), stated.get(name, np.nan)) for name in MEASURED},
+        **about,
         extras={
             name: joined(values, given.get(name, False if values.dtype == bool else np.nan))
             for name, values in detections.extras.items()

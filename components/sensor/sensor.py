@@ -100,7 +100,7 @@ class Sensor(Component):
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
-        constant = dict(self.grid.variances)
+        constant: dict[str, Any] = dict(self.grid.variances)
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             del constant[AZIMUTH], constant[ELEVATION]
         return SensorOffer(self.measures_range, resolution_rad, **constant)
@@ -161,6 +161,7 @@ class Sensor(Component):
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
             offsets = offsets_of(cells.row[found], len(wake))
+        measured: dict[str, Any] = {}
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
         if len(found):
@@ -169,7 +170,6 @@ class Sensor(Component):
             azimuth, elevation = self.axes.to_body(azimuth, elevation)
         else:
             azimuth, elevation, range_m = p, q, r
-            measured = {}
         detections = self._message(
             tick=wake.ticks,
             scan=wake.scans,
