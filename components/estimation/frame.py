@@ -12,7 +12,7 @@ import numpy as np
 from components.geometry.attitude import ned_to_body_unchecked
 from components.geometry.ellipsoid import north_east_up
 from components.geometry.normals import local_axes
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Place:
     to_body: FloatArray
     velocity_m_s: FloatArray | None = None
 
-    def take(self, which: object) -> "Place":
+    def take(self, which: IntArray) -> "Place":
         """Return some of the places."""
         velocity = None if self.velocity_m_s is None else self.velocity_m_s[:, which]
         return Place(self.position_m[:, which], self.to_body[:, :, which], velocity)
