@@ -98,6 +98,7 @@ class NoiseReports:
             _between(upwards, self._cells.elevation_rad),
             _between(outwards, self._cells.range_m),
         )
+        measured = self._block.grid_variances(azimuth, elevation)
         azimuth, elevation = self._block.axes.to_body(azimuth, elevation)
         snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=self._block.p.pulses)
         # Noise may barely cross a low threshold; -60 dB stands for nothing.
@@ -110,6 +111,7 @@ class NoiseReports:
             range_m=range_m,
             confidence=snr_db - self._block.false_alarm_zero_db(),
             extras={"snr_db": snr_db},
+            measured=measured,
         )
 
 

@@ -40,7 +40,7 @@ class LegTable:
         self._kind = np.array([list(FORMULAS).index(s.kind) for s in segments], dtype=np.int64)
         self._slot = np.empty(len(segments), dtype=np.int64)
         self._tables: dict[int, FloatArray] = {}
-        for kind in np.unique(self._kind).tolist():
+        for kind in np.bincount(self._kind).nonzero()[0].tolist():  # np.unique imports np.ma
             members = np.flatnonzero(self._kind == kind)
             self._slot[members] = np.arange(len(members))
             self._tables[kind] = np.stack([segments[i].parameters for i in members], axis=-1)

@@ -333,10 +333,11 @@ FAULTS = [
          "math.radians(self.azimuth_deg[1])"),
     ),
     *in_file(
-        _GROUP, "components/sensor/sensor.py", "wiring/test_measured_angles.py",
+        _GROUP, "components/sensor/grid.py", "wiring/test_measured_angles.py",
         ("elevation-grid-of-azimuth",
-         "_grid(self.elevation_step_rad, limit_low=low, limit_high=high)",
-         "_grid(self.azimuth_step_rad, limit_low=low, limit_high=high)"),
+         "_grid(self._elevation_step, limit_low=low, limit_high=high)",
+         "_grid(self._azimuth_step, limit_low=low, limit_high=high)"),
         ("range-not-on-its-grid", "self._range_grid.round(range_m)", "range_m"),
+        ("variance-of-a-whole-step", "return step**2 / 12.0", "return step**2"),
     ),
 ]  # fmt: skip
