@@ -108,13 +108,13 @@ class MovingTargetFilter:
     @property
     def _usable(self) -> FloatArray:
         """Centres of the bank's filters that are used, in PRF, in [-1/2, 1/2)."""
-        number = np.arange(self.pulses)
-        centre = (number + self.pulses // 2) % self.pulses / self.pulses - 0.5
+        number = np.arange(self.pulses) - self.pulses // 2
+        centre = number / self.pulses
         notch = 2.0 / self.pulses
         if self.notch_m_s is not None:
             notch = self.notch_m_s / self.blind_speed_m_s
         outside = np.abs(centre) >= notch * (1.0 - 1e-12)
-        return np.sort(centre[outside & (number > 0)])
+        return np.asarray(centre[outside & (number != 0)])
 
     def gains(
         self,

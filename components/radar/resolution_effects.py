@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.sensor.look import Cells
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
 
@@ -39,8 +39,8 @@ class Merging:
     def __init__(self, block: Any) -> None:
         self._block = block
 
-    def __call__(self, cells: Cells, power: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Return which echo stands for its resolution cell, and the power it has then.
+    def __call__(self, cells: Cells, power: FloatArray) -> FloatArray:
+        """Return the power of the echo that stands for its resolution cell, and 0 of the others.
 
         Parameters
         ----------
@@ -50,15 +50,14 @@ class Merging:
 
         Returns
         -------
-        leads : (cells,) of bool
-        power : (cells,)
-            The sum over the cell where it leads, and 0 where it does not.
+        (cells,) array
+            The sum over the resolution cell.
         """
         if len(cells) < 2 or not (np.diff(cells.row) == 0).any():
-            return np.ones(len(cells), dtype=bool), power
-        place = self._block.grid_point(
-            cells.body_azimuth_rad, cells.body_elevation_rad, cells.range_m
-        )
+            return power
+        block = self._block
+        seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
+        place = block.grid.round(*seen, cells.range_m)
         # By cell, the strongest first; of equals the first of the roster.
         order = np.lexsort((cells.target, -power, *place, cells.row))
         new = np.ones(len(order), dtype=bool)
@@ -66,8 +65,6 @@ class Merging:
         for values in (cells.row, *place):
             ordered = values[order]
             new[1:] |= ordered[1:] != ordered[:-1]
-        leads = np.zeros(len(order), dtype=bool)
-        leads[order] = new
         total = np.zeros(len(order))
         # One after the other from the strongest on, so that a cell's sum does not depend on others.
         first = np.flatnonzero(new)
@@ -77,4 +74,4 @@ class Merging:
             more = count > later
             summed[more] += power[order[first[more] + later]]
         total[order[first]] = summed
-        return leads, total
+        return total
