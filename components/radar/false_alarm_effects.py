@@ -100,7 +100,8 @@ class NoiseReports:
         )
         measured = self._block.grid_variances(azimuth, elevation)
         azimuth, elevation = self._block.axes.to_body(azimuth, elevation)
-        snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=self._block.p.pulses)
+        summed = self._block.p.pulses_summed
+        snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=summed)
         # Noise may barely cross a low threshold; -60 dB stands for nothing.
         snr_db = 10.0 * np.log10(np.maximum(snr, 1e-6))
         return add_false_detections(

@@ -28,6 +28,7 @@ from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
+from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
@@ -50,6 +51,7 @@ class LinkBudgetRadar(Radar):
     Parameters = LinkBudgetParameters
     hooks = {
         "mean RCS": "(cells) -> each cell's mean RCS in m²",
+        "energy of a look": "what the time of a scan leaves for each beam",
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
     }
     effects: ClassVar[tuple[Effect, ...]] = (
@@ -59,6 +61,7 @@ class LinkBudgetRadar(Radar):
         GroundClutter(),
         OneReportByCell(),
         FalseAlarms(),
+        TimeBudget(),
         BeamSweep(),
     )
 
@@ -133,7 +136,7 @@ class LinkBudgetRadar(Radar):
         """Return the mean SNR in dB at which the probability of detection is `pd`."""
         snr = required_snr(
             pd,
-            pulses=self.p.pulses,
+            pulses=self.p.pulses_summed,
             false_alarm_probability=self.p.false_alarm_probability,
             model=model,
         )
@@ -155,8 +158,12 @@ class LinkBudgetRadar(Radar):
         return [*many_false_alarms(self.p, cells_of_radar(self).count), *two_thresholds(self.p)]
 
     def report(self) -> dict[str, Any]:
-        """Return the bandwidth in use."""
-        return {**super().report(), **budget_report(self.name, self.budget)}
+        """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
+        return {
+            **super().report(),
+            **budget_report(self.name, self.budget),
+            **time_report(self.name, self.p),
+        }
 
 
 class ThresholdRadar(LinkBudgetRadar):
