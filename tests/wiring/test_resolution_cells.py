@@ -86,9 +86,7 @@ def test_noise_reports_a_cell_with_the_false_alarm_probability_however_many_are_
         scan_rate_hz=100, resolution_cells=merged, **CELL,
     )  # fmt: skip
     del radar["mount_roll_deg"], radar["mount_azimuth_deg"]
-    found = rows(
-        run(chain({"radar": radar}, ownship=own, targets=still, duration_s=scans / 100))
-    )
+    found = rows(run(chain({"radar": radar}, ownship=own, targets=still, duration_s=scans / 100)))
     looks = scans * (1 if merged else len(swarm))
     low, high = binom.interval(0.99, looks, pfa)
     assert low <= len(found) <= high
