@@ -5,7 +5,10 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from components.geometry.field_of_view import rising_sector
+from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
+from components.sensor.resolution import Grid
 from dsa_des.block.component import ClockedParameters
 
 
@@ -79,6 +82,26 @@ class SensorParameters(ClockedParameters):
             raise ValueError(
                 f"declare_m is {self.declare_m}: it must be at most declare_n, {self.declare_n}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _grid_meets_field(self) -> Self:
+        reach = self.reach()
+        for angle, (low, high) in (
+            ("azimuth", rising_sector(*reach.azimuth_rad)),
+            ("elevation", reach.elevation_rad),
+        ):
+            step_deg = getattr(self, f"{angle}_resolution_deg")
+            if high - low >= TWO_PI:
+                continue
+            try:
+                Grid(math.radians(step_deg), limit_low=low, limit_high=high)
+            except ValueError as error:
+                edges = ", ".join(f"{edge:g}" for edge in getattr(self, f"{angle}_deg"))
+                raise ValueError(
+                    f"{angle}_resolution_deg is {step_deg:g}: a multiple of it must lie in the "
+                    f"field of view, {angle}_deg = [{edges}], or nothing could be reported"
+                ) from error
         return self
 
     def reach(self) -> Reach:

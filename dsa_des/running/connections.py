@@ -33,18 +33,15 @@ def connect(
     Raises
     ------
     SceneError
-        If a wire's delay or initial message makes no sense, or a block that runs on demand has
-        no block to demand anything.
+        If a wire's delay makes no sense, or a block that runs on demand has no block to demand
+        anything.
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
         channel = Channel(wire.source, delay, _faults(scene, wire, everything), time)
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
-            try:
-                channel.hold(declared.initial(wire.holds), 0)
-            except (TypeError, ValueError) as error:
-                raise SceneError([scene.problem("wires", f"{wire}: holds: {error}")]) from error
+            channel.hold(declared.initial(wire.holds), 0)
         target = nodes[wire.target]
         target.channels.setdefault(wire.input, []).append(channel)
         nodes[wire.source].subscribers.setdefault(wire.output, []).append(

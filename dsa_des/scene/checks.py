@@ -187,3 +187,9 @@ def check_activity(
                     "writer can hold a message"
                 )
                 problems.append(scene.problem(("wires",), message))
+                continue
+            try:
+                with strangers_code(TypeError, ValueError):
+                    declared.message.initial(wire.holds)
+            except (TypeError, ValueError, Left) as error:
+                problems.append(scene.problem(("wires",), f"{wire}: holds: {error}"))

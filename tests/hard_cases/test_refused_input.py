@@ -58,6 +58,19 @@ CASES = {
     ),
     "long chain": (extending(1200, 'extends = "{next}"'), ["check", "c0.toml"], "at most 32"),
     "a device": ({"a.toml": 'extends = "/dev/zero"'}, ["check", "a.toml"], "is a device"),
+    "a field of view between two grid points": (
+        {},
+        set_("blocks.radar.azimuth_deg", "[20.1, 20.2]",
+             "--set", "blocks.radar.azimuth_resolution_deg=5"),
+        "azimuth_resolution_deg = 5: a multiple of it must lie in the field of view, "
+        "azimuth_deg = [20.1, 20.2]",
+    ),
+    "a field of view below the first grid point": (
+        {},
+        set_("blocks.ir.elevation_deg", "[0.5, 4.5]",
+             "--set", "blocks.ir.elevation_resolution_deg=5"),
+        "a multiple of it must lie in the field of view, elevation_deg = [0.5, 4.5]",
+    ),
     "a pipe": ({"|p": ""}, ["check", "p"], "is a pipe: a regular file is needed"),
     "a pipe as traffic": (
         {"|p.daa": ""}, ["check", "REPLAY", "--set", "blocks.traffic.file=p.daa"], "is a pipe",

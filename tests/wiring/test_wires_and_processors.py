@@ -135,7 +135,7 @@ def test_what_a_wire_holds_is_there_before_the_first_message():
     assert told[0] == told[1] != []
     late["holds"] = {"target": ["one"]}
     with pytest.raises(dsa_des.SceneError, match="empty table"):
-        run(found)
+        dsa_des.load_scene(found)
 
 
 @covers("latency_s", of=("[blocks]",))
