@@ -139,7 +139,8 @@ class SilhouetteTable:
 def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: ArrayLike) -> Any:
     """Build a table from one row per node, in any order.
 
-    Azimuths may lie in any turn; a node given twice (0 and 360) must say the same both times.
+    Azimuths may lie in any turn; a node given twice (0 and 360) must say the same both times. The
+    rows of the poles, where all azimuths are one direction, are averaged.
 
     Parameters
     ----------
@@ -159,6 +160,7 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
     elevation = finite("elevation_deg", elevation_deg).ravel()
     area = finite("area_m2", area_m2).ravel()
     refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
+    refuse("area_m2", area, ~(area >= 0.0), "be 0 or more")
     turned = past(azimuth, 360.0)
     nodes: dict[tuple[float, float], float] = {}
     for az, el, value in zip(turned.tolist(), elevation.tolist(), area.tolist(), strict=True):
@@ -176,11 +178,13 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
                     f"the table has a hole: no area for the node az_deg {az:g}, el_deg {el:g}; "
                     "every azimuth needs every elevation"
                 )
-    return SilhouetteTable(
-        np.array(azimuths),
-        np.array(elevations),
-        np.array([[nodes[az, el] for az in azimuths] for el in elevations]),
-    )
+    rows = np.array([[nodes[az, el] for az in azimuths] for el in elevations])
+    for row, el in zip(rows, elevations, strict=True):
+        # From straight above every azimuth is the same direction: which node of an uneven row
+        # were taken, the sign of a zero would decide.
+        if abs(el) == 90.0 and np.ptp(row) > 0.0:
+            row[:] = row.mean()
+    return SilhouetteTable(np.array(azimuths), np.array(elevations), rows)
 
 
 def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:

@@ -19,13 +19,14 @@ from components.evidence.silhouettes.comparison import (
     comparison_table,
     draw_comparison,
 )
+from components.evidence.silhouettes.turned_table import turned_table_warning
 from components.optical.silhouette import visible_area
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.input_files import LARGEST_TOML_BYTES, InputFileError, read_input_text
+from dsa_des.files.input_files import InputFileError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.output_names import named
-from dsa_des.files.toml_input import parse_toml
 from dsa_des.record.run_folder import write_run_json
+from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_lines
 
@@ -114,6 +115,8 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
         except InputFileError as error:
             raise ValueError(f"--reference {options.reference}: {error}") from None
         references["table"] = _silhouette(model="aspect_table", table=table)
+        if warning := turned_table_warning(areas, table):
+            say(f"warning: --reference {options.reference}: {warning}", err=True)
     if options.mesh is not None:
         from components.optical.mesh import load_mesh
 
@@ -135,10 +138,11 @@ def _areas(options: argparse.Namespace) -> dict[str, float]:
                 f"--areas is {options.areas!r}: it must be three numbers, FRONT,SIDE,HORIZONTAL"
             )
         return dict(zip(_AREAS, values, strict=True))
+    # With all that it extends: most files of configs/aircraft hold a few keys over another's.
     try:
-        content = parse_toml(read_input_text(options.aircraft, LARGEST_TOML_BYTES))
-    except ValueError as error:
-        raise ValueError(f"--aircraft {options.aircraft}: {error}") from None
+        content = read_scene_file(options.aircraft).data
+    except UsageError as error:
+        raise ValueError(f"--aircraft: {error}") from None
     eo = content.get("eo")
     table: dict[str, Any] = eo if isinstance(eo, dict) else {}
     for name in _AREAS:

@@ -1,0 +1,51 @@
+"""The command ``dsa-des encounters``; it imports click only, so that ``--help`` stays instant."""
+
+from typing import Any
+
+import click
+
+from dsa_des.commands.plain_errors import plain_errors
+
+
+@click.group()
+def encounters() -> None:
+    """Encounters of an airspace: sample models, make sets, weigh risk."""
+
+
+@encounters.command()
+@click.argument("table", metavar="TABLE.csv")
+@click.option("--nominal", required=True, metavar="COLUMN", help="Event without avoidance, 0 or 1.")
+@click.option("--mitigated", required=True, metavar="COLUMN", help="Event with avoidance, 0 or 1.")
+@click.option("--weight", metavar="COLUMN", help="Weight of each encounter [default: all 1].")
+@click.option("--by", metavar="COLUMN", help="Also a ratio for each class that this column names.")
+@click.option(
+    "--edges",
+    metavar="A,B,...",
+    help="Edges of the classes, where the column of --by holds numbers.",
+)
+@click.option(
+    "--confidence",
+    type=click.FloatRange(0.5, 1.0, min_open=True, max_open=True),
+    default=0.95,
+    show_default=True,
+)
+@click.option(
+    "--interval",
+    "method",
+    type=click.Choice(["delta", "bootstrap"]),
+    default="delta",
+    show_default=True,
+    help="Paired delta method on the logarithm, or resampled encounters.",
+)
+@click.option("--resamples", type=click.IntRange(100, 1_000_000), default=4000, show_default=True)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option(
+    "--skip-damaged", is_flag=True, help="Leave damaged rows out and count them; else an error."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON only.")
+@plain_errors
+def risk(**options: Any) -> None:
+    """Risk ratio of a TABLE with one row per encounter, run without and with avoidance."""
+    from components.encounters.risk_table import show_risk
+
+    show_risk(**options)

@@ -1,0 +1,83 @@
+"""``dsa-des encounters risk``: what it prints, and what it says of damaged tables."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from components.encounters.command import encounters
+from tests.encounters.reference_data import reference_file
+
+TABLE = """\
+encounter,w,without,with,bearing_deg
+11,1,1,0,10
+12,2,1,1,95
+13,3,0,1,170
+14,4,0,0,20
+"""
+COLUMNS = ("--nominal", "without", "--mitigated", "with", "--weight", "w")
+
+
+def call(*arguments: object) -> Result:
+    words = ["risk", *(str(a) for a in arguments)]
+    return CliRunner().invoke(encounters, words, catch_exceptions=False)
+
+
+def table(folder: Path, text: str = TABLE) -> Path:
+    path = folder / "pairs.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_published_ratio_on_the_command_line() -> None:
+    path = reference_file("degas_sample/sample_results.csv")
+    names = ("--nominal", "nmac_nominal", "--mitigated", "nmac_mitigated", "--weight", "weight")
+    told = call(path, *names).stdout.splitlines()
+    line = next(line for line in told if line.startswith("risk ratio"))
+    assert abs(float(line.split()[-1]) - 0.126765133837) < 1e-12
+
+
+def test_numbers_as_json_and_by_class(tmp_path: Path) -> None:
+    done = call(table(tmp_path), *COLUMNS, "--by", "bearing_deg", "--edges", "60,120", "--json")
+    found = json.loads(done.stdout)
+    assert found["ratio"] == pytest.approx(5 / 3) and found["skipped"] == 0
+    classes = found["classes"]
+    assert list(classes) == ["1: below 60", "2: 60 to 120", "3: 120 and above"]
+    assert (classes["1: below 60"]["ratio"], classes["2: 60 to 120"]["ratio"]) == (0.0, 1.0)
+    assert classes["3: 120 and above"]["reason"]
+
+
+def test_parquet_gives_the_same(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = {"w": [1.0, 2.0, 3.0], "without": [True, True, False], "with": [0, 1, 1]}
+    pq.write_table(pa.table(columns), tmp_path / "pairs.parquet")
+    found = json.loads(call(tmp_path / "pairs.parquet", *COLUMNS, "--json").stdout)
+    assert found["ratio"] == pytest.approx(5 / 3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("12,2,", "12,,", "pairs.csv: encounter 12 (line 3): w is missing: must be a number"),
+        ("12,2,", "12,-2,", "encounter 12 (line 3): w = '-2': must be a number of 0 or more"),
+        ("13,3,0,", "13,3,2,", "encounter 13 (line 4): without = '2': must be 0 or 1"),
+        ("14,4,0,0,20", "14,4", "line 5: has 2 values, but there are 5 columns"),
+        ("without", "witout", "--nominal without: there is no such column; did you mean 'witout'"),
+        ("1,1,0,10\n12,2,1", "1,0,0,10\n12,2,0", "no risk ratio: no encounter has a nominal"),
+    ],
+)
+def test_one_error_without_a_traceback(tmp_path: Path, old: str, new: str, said: str) -> None:
+    done = call(table(tmp_path, TABLE.replace(old, new)), *COLUMNS)
+    assert done.exit_code == 2
+    assert said in done.stderr and "Traceback" not in done.stderr
+
+
+def test_damaged_encounters_are_skipped_and_counted_on_request(tmp_path: Path) -> None:
+    path = table(tmp_path, TABLE.replace("13,3,", "13,nan,"))
+    done = call(path, *COLUMNS, "--skip-damaged")
+    assert done.exit_code == 0
+    assert "1 damaged encounters were skipped" in done.stdout
+    assert "risk ratio              0.666666666666667" in done.stdout
