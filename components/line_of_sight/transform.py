@@ -146,15 +146,16 @@ class Transform(Component):
             "present": present,
         }
 
-    def _revisited(self, own: Any, other: Any) -> dict[str, AnyArray]:
-        """Return the fields of the rows at other instants."""
-        return self._as_seen(own, other, own.present & other.present)
+    def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
+        """Return the fields of the rows at other instants, and where the ownship is then."""
+        seen = self._as_seen(own, other, own.present & other.present)
+        return {**seen, "own": {name: getattr(own, name) for name in _PLACE}}
 
-    def _believed(self, states: TrafficStates) -> dict[str, FloatArray] | None:
-        """Return what the ownship believes of itself, if that is not the truth."""
+    def _believed(self, states: TrafficStates) -> dict[str, FloatArray]:
+        """Return what the ownship believes of itself."""
         for belief in self._beliefs:
             return belief(states)
-        return None
+        return {name: getattr(states, f"own_{name}") for name in _PLACE}
 
 
 def _block(state: Any, rows: slice) -> SimpleNamespace:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
 _WGS84 = "WGS 84"
+_TURNED = "north-east-down to body: yaw, pitch, roll"
 
 #: Unit, frame, meaning.
 Column = tuple[str, str, str]
@@ -28,6 +29,18 @@ _TRUE: Mapping[str, Column] = {
     "true_azimuth_rad": ("rad", _BODY, "true azimuth"),
     "true_elevation_rad": ("rad", _BODY, "true elevation"),
     "true_range_m": ("m", "", "true slant range"),
+}
+
+_ERRORS: Mapping[str, Column] = {
+    "range_rate_m_s": ("m/s", "", "measured range rate, positive when opening; null without one"),
+    "azimuth_variance_rad2": ("rad²", _BODY, "mean square error of the azimuth, as stated"),
+    "elevation_variance_rad2": ("rad²", _BODY, "mean square error of the elevation, as stated"),
+    "range_variance_m2": ("m²", "", "mean square error of the range; null where none is measured"),
+    "range_rate_variance_m2_s2": (
+        "m²/s²",
+        "",
+        "mean square error of the range rate; null where none is measured",
+    ),
 }
 
 COLUMNS: Mapping[str, Mapping[str, Column]] = {
@@ -54,9 +67,13 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "illuminated_s": ("s", "", "when a sweeping beam lit the target"),
         "ned_azimuth_rad": ("rad", _NED, "azimuth from north, by the believed attitude"),
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
-        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be: latitude"),
+        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be then: latitude"),
         "own_lon_deg": ("deg", _WGS84, "its longitude"),
         "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        "own_heading_rad": ("rad", _TURNED, "how it believes to be turned: nose, from north"),
+        "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
+        "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
+        **_ERRORS,
     },
     "fused": {
         "target": ("", "", "name of the target"),

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.messages.constant_columns import not_measured
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
@@ -36,10 +37,27 @@ EXTRAS = {
     "illuminated_s": "float64",
     "ned_azimuth_rad": "float64",
     "ned_elevation_rad": "float64",
+}
+#: The ownship's pose as it believes it to be: columns of ``detections``, and fields of
+#: `Detections`.
+POSE = {
     "own_lat_deg": "float64",
     "own_lon_deg": "float64",
     "own_alt_m": "float64",
+    "own_heading_rad": "float64",
+    "own_pitch_rad": "float64",
+    "own_roll_rad": "float64",
 }
+
+
+#: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
+MEASURED = (
+    "range_rate_m_s",
+    "azimuth_variance_rad2",
+    "elevation_variance_rad2",
+    "range_variance_m2",
+    "range_rate_variance_m2_s2",
+)
 
 
 @dataclass(frozen=True)
@@ -51,10 +69,21 @@ class SensorOffer:
     measures_range : bool
     resolution_rad : float
         Coarser of the two angular grid steps, for choosing between sensors.
+    measures_range_rate : bool
+    azimuth_variance_rad2, elevation_variance_rad2 : float or None
+        Of the columns of the same names in `Detections`, where all entries have one value; None
+        where it differs from detection to detection.
+    range_variance_m2, range_rate_variance_m2_s2 : float or None
+        None where it differs, or is not measured.
     """
 
     measures_range: bool
     resolution_rad: float
+    measures_range_rate: bool = False
+    azimuth_variance_rad2: float | None = None
+    elevation_variance_rad2: float | None = None
+    range_variance_m2: float | None = None
+    range_rate_variance_m2_s2: float | None = None
 
 
 def _target_names(message: Any) -> Text:
@@ -63,6 +92,10 @@ def _target_names(message: Any) -> Text:
 
 def _contributor_names(message: Any) -> Text:
     return combination_text(message.contributors, message.sensors)
+
+
+def _measured() -> Any:
+    return per_entry(column="float64", default=None, kw_only=True)
 
 
 @dataclass(eq=False)
@@ -85,6 +118,13 @@ class Detections(Message):
         Measured, in the ownship's body axes, on the sensor's grid.
     range_m : (entries,)
         Measured slant range; NaN for a sensor that has none.
+    range_rate_m_s : (entries,)
+        Measured rate of the slant range, positive when it opens; NaN where it is not measured.
+    azimuth_variance_rad2, elevation_variance_rad2 : (entries,)
+        Mean square of the error of the measured angles, in body axes, as the sensor states it: a
+        grid's is step²/12. The cut at the edge of the field of view is not in it.
+    range_variance_m2, range_rate_variance_m2_s2 : (entries,)
+        The same of range and range rate; NaN where they are not measured.
     confidence : (entries,)
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
@@ -94,9 +134,16 @@ class Detections(Message):
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
         has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
-        ownship's navigation errs, there are the line of sight in NED by what it believes of its
-        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``, and where it believes to be,
-        ``own_lat_deg``, ``own_lon_deg`` and ``own_alt_m``.
+        ownship's navigation errs, there is the line of sight in NED by what it believes of its
+        attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``.
+    own_lat_deg, own_lon_deg, own_alt_m : (rows,), or None
+        Where the ownship believes to be at each scan (WGS 84); the truth where its navigation has
+        no error. None from a sensor that does not say; recorded with every detection.
+    own_heading_rad, own_pitch_rad, own_roll_rad : (rows,), or None
+        How it believes to be turned, NED to body (yaw-pitch-roll).
+    own_of_entries : dict of (entries,), or None
+        The same six where entries were measured at instants of their own within the scan;
+        `pose_columns` gives those of every entry in any case.
     roster : Roster
     """
 
@@ -119,6 +166,25 @@ class Detections(Message):
     true_range_m: FloatArray = per_entry(column="float64")
     extras: dict[str, AnyArray] = per_entry(columns=EXTRAS, value=lambda m: m.extra_columns())
     roster: Roster = static()
+    own_lat_deg: FloatArray | None = per_row(default=None, kw_only=True)
+    own_lon_deg: FloatArray | None = per_row(default=None, kw_only=True)
+    own_alt_m: FloatArray | None = per_row(default=None, kw_only=True)
+    own_heading_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_pitch_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_roll_rad: FloatArray | None = per_row(default=None, kw_only=True)
+    own_of_entries: dict[str, FloatArray] | None = per_entry(
+        columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
+    )
+    range_rate_m_s: FloatArray = _measured()
+    azimuth_variance_rad2: FloatArray = _measured()
+    elevation_variance_rad2: FloatArray = _measured()
+    range_variance_m2: FloatArray = _measured()
+    range_rate_variance_m2_s2: FloatArray = _measured()
+
+    def __post_init__(self) -> None:
+        for name in MEASURED:
+            if getattr(self, name) is None:
+                setattr(self, name, not_measured(len(self.target)))
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""
@@ -128,6 +194,14 @@ class Detections(Message):
         """Return the extras with ``declared``, which all detections have."""
         # A sensor without a rule declares what it detects; no target is behind a false alarm.
         return {"declared": self.target >= 0, **self.extras}
+
+    def pose_columns(self) -> dict[str, FloatArray]:
+        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
+        if self.own_of_entries is not None:
+            return self.own_of_entries
+        counts = np.diff(self.offsets)
+        pose = {name: getattr(self, name) for name in POSE}
+        return {n: np.repeat(v, counts) for n, v in pose.items() if v is not None}
 
 
 @dataclass(eq=False)

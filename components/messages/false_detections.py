@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.messages.detections import Detections
+from components.messages.detections import MEASURED, Detections
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Index into the roster of a detection without a target; it is recorded as null.
@@ -22,6 +23,7 @@ def add_false_detections(
     range_m: ArrayLike = np.nan,
     confidence: ArrayLike = np.nan,
     extras: Mapping[str, ArrayLike] | None = None,
+    measured: Mapping[str, ArrayLike] | None = None,
 ) -> Detections:
     """Return a sensor's report with false detections after the true ones of each scan.
 
@@ -37,6 +39,8 @@ def add_false_detections(
     extras : mapping of (alarms,) or one number
         Columns of `Detections.extras`; those not given are NaN, or False where they hold truth
         values.
+    measured : mapping of (alarms,) or one number
+        Range rate and variances (`MEASURED`), as for a target; those not given are NaN.
 
     Returns
     -------
@@ -51,11 +55,15 @@ def add_false_detections(
     # Stable: true detections were put first, so they stay first within each row.
     order = np.argsort(rows, kind="stable")
     given = extras or {}
+    stated = measured or {}
 
     def joined(true: AnyArray, false: ArrayLike) -> AnyArray:
         added = np.broadcast_to(np.asarray(false, dtype=true.dtype), row.shape)
         return np.concatenate([true, added])[order]
 
+    about: dict[str, Any] = {
+        name: joined(getattr(detections, name), stated.get(name, np.nan)) for name in MEASURED
+    }
     return replace(
         detections,
         offsets=np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(counts))))),
@@ -67,6 +75,7 @@ def add_false_detections(
         true_azimuth_rad=joined(detections.true_azimuth_rad, np.nan),
         true_elevation_rad=joined(detections.true_elevation_rad, np.nan),
         true_range_m=joined(detections.true_range_m, np.nan),
+        **about,
         extras={
             name: joined(values, given.get(name, False if values.dtype == bool else np.nan))
             for name, values in detections.extras.items()

@@ -91,7 +91,8 @@ class RelativeTargets(Message):
         As in `TrafficStates`.
     believed : dict of (rows,), or None
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
-        ``pitch_rad``, ``roll_rad``. None where its navigation has no error.
+        ``pitch_rad``, ``roll_rad``; the truth where its navigation has no error. None from a
+        block that does not say.
     revisit : KnownFlights or None
         The targets at other instants than those of the rows, as each row knows their flights.
     state_tick : (rows,) of int, or None

@@ -34,6 +34,6 @@ def true_entries(message: AnyDetections) -> AnyDetections:
             values = getattr(message, item.name)
             if isinstance(values, dict):
                 kept[item.name] = {name: column[keep] for name, column in values.items()}
-            else:
+            elif values is not None:
                 kept[item.name] = values[keep]
     return replace(message, offsets=offsets_of(row, len(rows) - 1), **kept)

@@ -106,37 +106,32 @@ class NavigationReport(_Navigation):
 def in_the_horizons_axes(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
-    """Add each detection's line of sight in NED and the believed position of the ownship.
+    """Add each detection's line of sight in NED, by what the ownship believes of its attitude.
 
     Parameters
     ----------
     detections : Detections
+        With the ownship's believed pose; without one nothing is added.
     targets : RelativeTargets
-        What was looked at, with the ownship's belief; without one nothing is added.
     rows : (scans,) of int
-        Row of `targets` at each scan.
+        As every report is given them.
 
     Returns
     -------
     Detections
-        Its extras hold ``ned_azimuth_rad`` in [0, 2 pi), ``ned_elevation_rad``, ``own_lat_deg``,
-        ``own_lon_deg`` and ``own_alt_m``. The rotation is the exact one, also where the transform
-        took the thesis's small angles.
+        Its extras hold ``ned_azimuth_rad`` in [0, 2 pi) and ``ned_elevation_rad``. The rotation is
+        the exact one, also where the transform took the thesis's small angles.
     """
-    if targets.believed is None:
+    own = detections.pose_columns()
+    if not own:
         return detections
-    row = np.repeat(rows, np.diff(detections.offsets))
-    own = {name: values[row] for name, values in targets.believed.items()}
     direction = unit_vector(detections.azimuth_rad, detections.elevation_rad)
     azimuth, elevation = body_angles(
-        *body_to_ned(*direction, own["yaw_rad"], own["pitch_rad"], own["roll_rad"])
+        *body_to_ned(*direction, own["own_heading_rad"], own["own_pitch_rad"], own["own_roll_rad"])
     )
     added = {
         "ned_azimuth_rad": wrap_two_pi(azimuth),
         "ned_elevation_rad": elevation,
-        "own_lat_deg": own["lat_deg"],
-        "own_lon_deg": own["lon_deg"],
-        "own_alt_m": own["alt_m"],
     }
     return replace(detections, extras={**detections.extras, **added})
 

@@ -70,7 +70,13 @@ class AddedFalseAlarms:
             highest_elevation_rad=reach.elevation_rad[1],
         )
         azimuth, elevation, _ = block.measure(across, upward, np.full(len(row), np.nan))
+        measured = block.grid_variances(azimuth, elevation)
         azimuth, elevation = block.axes.to_body(azimuth, elevation)
         return add_false_detections(
-            detections, row, azimuth_rad=azimuth, elevation_rad=elevation, confidence=0.0
+            detections,
+            row,
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            confidence=0.0,
+            measured=measured,
         )

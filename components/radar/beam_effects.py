@@ -20,8 +20,8 @@ class BeamSweep(Effect):
 
     Everything about a target is then that of this instant, which is recorded as
     ``illuminated_s``: whether it is in reach, its SNR, its measured and true position. A target
-    that the beam does not meet counts as outside the field of view. What the ownship believes of
-    itself (`components.navigation.effects`) stays that of the scan's start.
+    that the beam does not meet counts as outside the field of view. The ownship's pose is of that
+    instant too; the error of its navigation is that of the scan's start.
     """
 
     name = "beam sweep"
@@ -81,13 +81,12 @@ class Sweep:
         at_start = targets.take(rows)
         revisit = at_start.revisit
         assert revisit is not None
-        # A picture that came late goes on from the instant it is of.
-        start = at_start.tick if at_start.state_tick is None else at_start.state_tick
-        start_s = (start / self._ticks_per_s)[:, np.newaxis]
+        start_s = self._start_s(at_start)[:, np.newaxis]
         found: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
             found.update(revisit(columns, start_s + offset_s))
+            found.pop("own")
             azimuth, _ = block.axes(found["body_azimuth_rad"], found["body_elevation_rad"])
             return azimuth
 
@@ -105,7 +104,7 @@ class Sweep:
     def __call__(
         self, detections: Detections, targets: RelativeTargets, rows: IntArray
     ) -> Detections:
-        """Add ``illuminated_s`` to what `lit` targets gave."""
+        """Add ``illuminated_s``, and the ownship's pose then, to what `lit` targets gave."""
         counts = np.diff(detections.offsets)
         # A false alarm has no true direction: the beam was where it is reported.
         false = detections.target < 0
@@ -119,4 +118,31 @@ class Sweep:
         offset_s[~false] = targets.offset_s[np.repeat(rows, counts)[~false], column]
         scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
-        return replace(detections, extras=extras)
+        own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
+        return replace(detections, extras=extras, own_of_entries=own)
+
+    def _start_s(self, targets: RelativeTargets) -> FloatArray:
+        """Return when the picture of each row was; one that came late goes on from there."""
+        start = targets.tick if targets.state_tick is None else targets.state_tick
+        started: FloatArray = start / self._ticks_per_s
+        return started
+
+    def _own_when_lit(
+        self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray
+    ) -> dict[str, FloatArray] | None:
+        """Return the believed pose at each entry's own instant, with the error of its scan."""
+        believed = detections.pose_columns()
+        if not believed or targets.revisit is None or not len(targets.roster):
+            return None
+        # Where the ownship is does not depend on the target that is asked for with it.
+        flights, anyone = targets.revisit.take_rows(row), np.zeros(1, dtype=np.int64)
+        start_s = self._start_s(targets)[row]
+        before, then = (
+            flights(anyone, time_s[:, np.newaxis])["own"]
+            for time_s in (start_s, start_s + offset_s)
+        )
+        moved = {}
+        for (column, belief), name in zip(believed.items(), before, strict=True):
+            known, now = before[name][:, 0], then[name][:, 0]
+            moved[column] = np.where(belief == known, now, belief + (now - known))
+        return moved

@@ -42,10 +42,10 @@ class GroundClutter(Effect):
                 raise ValueError(
                     f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
                 )
-        if block.p.pulses > 1:
+        if block.p.pulses_summed > 1:
             raise ValueError(
-                f"pulses is {block.p.pulses}: ground clutter is known for one look only; set it "
-                "to 1, with integration_gain_db for pulses integrated coherently"
+                f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
+                "set it to 1, with integration_gain_db for pulses integrated coherently"
             )
 
         def clutter_rcs_m2(cells: Cells) -> FloatArray:

@@ -37,7 +37,7 @@ class ExactDetection(Effect):
 
 def closed_form(block: Any) -> bool:
     """Say whether the exact Pd of all of a radar's targets is one power, cheaper than any rung."""
-    return block.p.pulses == 1 and _models(block) <= {1, 2}
+    return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
 
 
 def picked_method(block: Any, method: str) -> list[str]:
@@ -64,7 +64,7 @@ def picked_method(block: Any, method: str) -> list[str]:
             f"that [accuracy] allows {block.context.tolerance['detection_probability']:.2g} is left"
         )
     # Fewer pulses err more: the entry at or below the radar's own is an upper estimate.
-    error = GRAM_CHARLIER_ERROR[max(n for n in GRAM_CHARLIER_ERROR if n <= block.p.pulses)]
+    error = GRAM_CHARLIER_ERROR[max(n for n in GRAM_CHARLIER_ERROR if n <= block.p.pulses_summed)]
     return [
         f"Pd: {said}",
         f"Pd: not gram_charlier: it errs by up to {error:g}, and the table by less",

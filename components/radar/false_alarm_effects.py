@@ -98,8 +98,10 @@ class NoiseReports:
             _between(upwards, self._cells.elevation_rad),
             _between(outwards, self._cells.range_m),
         )
+        measured = self._block.grid_variances(azimuth, elevation)
         azimuth, elevation = self._block.axes.to_body(azimuth, elevation)
-        snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=self._block.p.pulses)
+        summed = self._block.p.pulses_summed
+        snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=summed)
         # Noise may barely cross a low threshold; -60 dB stands for nothing.
         snr_db = 10.0 * np.log10(np.maximum(snr, 1e-6))
         return add_false_detections(
@@ -110,6 +112,7 @@ class NoiseReports:
             range_m=range_m,
             confidence=snr_db - self._block.false_alarm_zero_db(),
             extras={"snr_db": snr_db},
+            measured=measured,
         )
 
 

@@ -59,7 +59,7 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
         detection_error(
             at["pd"][row, target],
             at["snr"][row, target],
-            radar.p.pulses,
+            radar.p.pulses_summed,
             radar.p.false_alarm_probability,
             int(at["model"][row, target]),
         )

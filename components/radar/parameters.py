@@ -1,5 +1,6 @@
 """Parameters that radar blocks share, and the link budget they describe."""
 
+import math
 from dataclasses import replace
 from typing import Any, Literal, Self
 
@@ -7,16 +8,14 @@ from pydantic import Field, model_validator
 
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
 from components.radar.plausible import implausible
-from components.sensor.parameters import SensorParameters
+from components.radar.resolution_parameters import ResolutionParameters
+from components.radar.time_parameters import TimeBudgetParameters
 from dsa_des.block.component import Parameters
 
 
-class RadarParameters(SensorParameters):
+class RadarParameters(ResolutionParameters):
     """Parameters of every radar."""
 
-    range_resolution_m: float = Field(
-        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
-    )
     beam_sweep: bool = Field(
         default=False,
         description="Whether a beam sweeps clockwise over the field of view once per scan: each "
@@ -35,7 +34,7 @@ class Calibration(Parameters):
     )
 
 
-class LinkBudgetParameters(RadarParameters):
+class LinkBudgetParameters(RadarParameters, TimeBudgetParameters):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
 
     power_w: float = Field(gt=0, description="Transmitted power, W.")
@@ -90,7 +89,21 @@ class LinkBudgetParameters(RadarParameters):
                 "integration_gain_db and pulses > 1 would count the same pulses twice; "
                 "set one of them"
             )
+        self.check_pulses_once(self.pulses, self.integration_gain_db)
+        look = self.look_energy
+        if look is not None and self.calibrate is not None and self.stated_dwell_s is None:
+            raise ValueError(
+                "calibrate is given and budget is 'dwell': how long was the look that the range "
+                "was stated for? Give dwell_s or pulses_per_dwell"
+            )
         return self
+
+    @property
+    def pulses_summed(self) -> int:
+        """Pulses of a look that are summed non-coherently."""
+        if self.budget != "dwell" or (look := self.look_energy) is None:
+            return self.pulses
+        return look.summed
 
     @property
     def cell_pfa(self) -> float:
@@ -100,7 +113,19 @@ class LinkBudgetParameters(RadarParameters):
         return self.cell_false_alarm_probability
 
     def link_budget(self) -> LinkBudget:
-        """Return the link budget, its bandwidth calibrated where the scene asks for it."""
+        """Return the link budget of a look, its bandwidth calibrated where the scene asks for it.
+
+        What is calibrated is the look that the scene states; the energy of the look that the scan
+        leaves time for comes after.
+        """
+        budget = self._stated_link_budget()
+        look = self.look_energy
+        if look is None or look.gain == 1.0:
+            return budget
+        gain_db = self.integration_gain_db + 10.0 * math.log10(look.gain)
+        return replace(budget, integration_gain_db=gain_db)
+
+    def _stated_link_budget(self) -> LinkBudget:
         budget = LinkBudget(
             power_w=self.power_w,
             antenna_gain_db=self.antenna_gain_db,
@@ -114,13 +139,16 @@ class LinkBudgetParameters(RadarParameters):
         )
         if self.calibrate is None:
             return budget
+        summed = self.pulses
+        if self.budget == "dwell" and self.integration == "noncoherent":
+            summed = self.stated_pulses or 1
         try:
             bandwidth_hz = calibrated_bandwidth(
                 budget,
                 rcs_dbsm=self.calibrate.rcs_dbsm,
                 range_km=self.calibrate.range_km,
                 pd=self.calibrate.pd,
-                pulses=self.pulses,
+                pulses=summed,
                 false_alarm_probability=self.false_alarm_probability,
                 model=f"swerling{self.calibrate.swerling}",
             )

@@ -128,7 +128,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
-        snr = self.snr(cells)
+        snr = self.resolved(cells, self.snr(cells))
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         cnr = self.clutter_cnr(cells)
@@ -153,7 +153,7 @@ class SwerlingRadar(LinkBudgetRadar):
                 return self._rcs_draws.uniform(target, scan, number)
 
             rcs[chosen] = scan_rcs(
-                rcs[chosen], draw, pulses=self.p.pulses, model=f"swerling{model}"
+                rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"
             )
         return self.echo_snr(cells, rcs)
 
@@ -161,7 +161,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
         p = self.p
         pd = probability_of_cells(
-            snr, p.pulses, p.false_alarm_probability, f"swerling{model}", self._method
+            snr, p.pulses_summed, p.false_alarm_probability, f"swerling{model}", self._method
         )
         if cnr is None or not cnr.any():
             return pd
@@ -182,7 +182,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """
         if terrain_of(self) is not None:
             return None
-        return _steepest_pd(self.p.pulses, self.p.false_alarm_probability)
+        return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""

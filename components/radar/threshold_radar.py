@@ -14,13 +14,21 @@ from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.clutter_effects import GroundClutter
 from components.radar.false_alarm_effects import FalseAlarms
+from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
 from components.radar.parameters import LinkBudgetParameters, budget_report
-from components.radar.plausible import high_false_alarms, implausible
+from components.radar.plausible import (
+    high_false_alarms,
+    implausible,
+    many_false_alarms,
+    two_thresholds,
+)
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
+from components.radar.resolution_effects import OneReportByCell
+from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
@@ -43,6 +51,7 @@ class LinkBudgetRadar(Radar):
     Parameters = LinkBudgetParameters
     hooks = {
         "mean RCS": "(cells) -> each cell's mean RCS in m²",
+        "energy of a look": "what the time of a scan leaves for each beam",
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
     }
     effects: ClassVar[tuple[Effect, ...]] = (
@@ -50,7 +59,9 @@ class LinkBudgetRadar(Radar):
         *WEATHER_EFFECTS,
         BlindRange(),
         GroundClutter(),
+        OneReportByCell(),
         FalseAlarms(),
+        TimeBudget(),
         BeamSweep(),
     )
 
@@ -125,7 +136,7 @@ class LinkBudgetRadar(Radar):
         """Return the mean SNR in dB at which the probability of detection is `pd`."""
         snr = required_snr(
             pd,
-            pulses=self.p.pulses,
+            pulses=self.p.pulses_summed,
             false_alarm_probability=self.p.false_alarm_probability,
             model=model,
         )
@@ -134,11 +145,25 @@ class LinkBudgetRadar(Radar):
     def warnings(self) -> list[str]:
         """Say which values no radar has, and what its false alarm probability comes to."""
         snr_db = self.required_snr_db(0.5, "swerling1")
-        return [*super().warnings(), *implausible(self.p), *high_false_alarms(self.p, snr_db)]
+        return [
+            *super().warnings(),
+            *implausible(self.p),
+            *high_false_alarms(self.p, snr_db),
+            *self._said_of_false_alarms(),
+        ]
+
+    def _said_of_false_alarms(self) -> list[str]:
+        if not (self.p.false_alarms and self.p.enabled):
+            return []
+        return [*many_false_alarms(self.p, cells_of_radar(self).count), *two_thresholds(self.p)]
 
     def report(self) -> dict[str, Any]:
-        """Return the bandwidth in use."""
-        return {**super().report(), **budget_report(self.name, self.budget)}
+        """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
+        return {
+            **super().report(),
+            **budget_report(self.name, self.budget),
+            **time_report(self.name, self.p),
+        }
 
 
 class ThresholdRadar(LinkBudgetRadar):
@@ -167,7 +192,7 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Compare every cell's SNR with the threshold."""
-        snr = self.snr(cells)
+        snr = self.resolved(cells, self.snr(cells))
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         margin = snr_db - self.threshold_db

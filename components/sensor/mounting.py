@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from components.geometry.angle_variances import turned_variances
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
 from components.geometry.sensor_angles import sensor_angles
 from components.messages.reach import Reach, ReasonArray
@@ -28,6 +29,16 @@ class BodyAxes:
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Return what the sensor reports in body axes of directions in its own axes."""
         return azimuth_rad, elevation_rad
+
+    def variances_in_body(
+        self,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        azimuth_variance_rad2: FloatArray,
+        elevation_variance_rad2: FloatArray,
+    ) -> Angles:
+        """Return variances in body axes of azimuths and elevations in the sensor's axes."""
+        return azimuth_variance_rad2, elevation_variance_rad2
 
     def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Return where directions in the sensor's axes truly point, in body axes."""
@@ -64,6 +75,22 @@ class MountedAxes(BodyAxes):
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Rotate back by the believed mounting."""
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
+
+    def variances_in_body(
+        self,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        azimuth_variance_rad2: FloatArray,
+        elevation_variance_rad2: FloatArray,
+    ) -> Angles:
+        """Turn variances by the believed mounting, as what they are of."""
+        return turned_variances(
+            azimuth_rad,
+            elevation_rad,
+            azimuth_variance_rad2,
+            elevation_variance_rad2,
+            self.believed_rad,
+        )
 
     def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Rotate back by the true mounting."""

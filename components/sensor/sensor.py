@@ -8,22 +8,22 @@ engine's business.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from components.geometry.field_of_view import rising_sector
-from components.geometry.wrapping import TWO_PI, past, wrap_pi
+from components.messages.constant_columns import constant_column
 from components.messages.detections import Detections, SensorOffer
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
+from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_rule import DeclarationRule
+from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes, Mounting
 from components.sensor.parameters import SensorParameters
-from components.sensor.resolution import Grid
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect
@@ -39,9 +39,6 @@ _FEW_COLUMNS = 8
 SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), DeclarationRule(), NavigationReport())
 
 _BODY_AXES = BodyAxes()
-
-# Grids are the same in every run of a scene: they are made once.
-_grid = lru_cache(maxsize=256)(Grid)
 
 
 class Sensor(Component):
@@ -102,7 +99,11 @@ class Sensor(Component):
 
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""
-        return SensorOffer(self.measures_range, max(self.azimuth_step_rad, self.elevation_step_rad))
+        resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
+        constant: dict[str, Any] = dict(self.grid.variances)
+        if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
+            del constant[AZIMUTH], constant[ELEVATION]
+        return SensorOffer(self.measures_range, resolution_rad, **constant)
 
     @cached_property
     def axes(self) -> BodyAxes:
@@ -160,10 +161,12 @@ class Sensor(Component):
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
             offsets = offsets_of(cells.row[found], len(wake))
+        measured: dict[str, Any] = {}
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
         if len(found):
             azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
+            measured = self.grid_variances(azimuth, elevation)
             azimuth, elevation = self.axes.to_body(azimuth, elevation)
         else:
             azimuth, elevation, range_m = p, q, r
@@ -181,8 +184,10 @@ class Sensor(Component):
             true_azimuth_rad=p,
             true_elevation_rad=q,
             true_range_m=r,
+            **measured,
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
+            **believed_pose(targets, rows),
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
@@ -238,42 +243,42 @@ class Sensor(Component):
         azimuth_rad, elevation_rad, range_m : arrays
             Range is NaN when the sensor measures none.
         """
-        azimuth = self._round_azimuth(azimuth_rad)
-        elevation = self._elevation_grid.round(elevation_rad)
-        if not self.measures_range:
-            return azimuth, elevation, np.full(len(range_m), np.nan)
-        return azimuth, elevation, self._range_grid.round(range_m)
+        return self.grid.round(azimuth_rad, elevation_rad, range_m)
 
     @cached_property
-    def _elevation_grid(self) -> Grid:
-        low, high = self.reach.elevation_rad
-        return _grid(self.elevation_step_rad, limit_low=low, limit_high=high)
+    def grid(self) -> SensorGrid:
+        """The grid of reports in the sensor's axes."""
+        return SensorGrid(
+            self.reach.azimuth_rad,
+            self.reach.elevation_rad,
+            self.azimuth_step_rad,
+            self.elevation_step_rad,
+            self.range_step_m if self.measures_range else None,
+        )
 
-    @cached_property
-    def _range_grid(self) -> Grid:
-        return _grid(self.range_step_m, limit_low=0.0)
+    def grid_variances(
+        self, azimuth_rad: FloatArray, elevation_rad: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Return the variances of what `measure` gives, by the column that they fill.
 
-    @cached_property
-    def _azimuth_sector(self) -> tuple[float, float]:
-        """The field of view with its upper edge at or above its lower one."""
-        return rising_sector(*self.reach.azimuth_rad)
+        Parameters
+        ----------
+        azimuth_rad, elevation_rad : (n,) arrays
+            As measured, in the sensor's axes.
 
-    @cached_property
-    def _azimuth_grid(self) -> Grid:
-        low, high = self._azimuth_sector
-        if high - low >= TWO_PI:
-            return _grid(self.azimuth_step_rad)
-        return _grid(self.azimuth_step_rad, limit_low=low, limit_high=high)
-
-    def _round_azimuth(self, azimuth_rad: FloatArray) -> FloatArray:
-        low, high = self._azimuth_sector
-        if high - low >= TWO_PI:
-            return wrap_pi(self._azimuth_grid.round(azimuth_rad))
-        if low >= -math.pi and high <= math.pi:
-            return self._azimuth_grid.round(azimuth_rad)
-        # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + past(azimuth_rad - low, TWO_PI), low, high)
-        return wrap_pi(self._azimuth_grid.round(unwrapped))
+        Returns
+        -------
+        dict of (n,) arrays
+            Of angles in body axes, and of range where it is measured: step²/12.
+        """
+        variances = {
+            name: constant_column(value, len(azimuth_rad))
+            for name, value in self.grid.variances.items()
+        }
+        azimuth, elevation = self.axes.variances_in_body(
+            azimuth_rad, elevation_rad, variances[AZIMUTH], variances[ELEVATION]
+        )
+        return {**variances, AZIMUTH: azimuth, ELEVATION: elevation}
 
 
 def _per_row(mask: BoolArray) -> IntArray:

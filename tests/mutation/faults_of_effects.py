@@ -212,7 +212,8 @@ FAULTS = [
         _GROUP, "components/radar/detection_rung.py",
         (_BOUNDS, "radar/test_detection_rungs.py", _PD),
         ("table-errs-by-nothing", "TABLE_ERROR = 1e-6", "TABLE_ERROR = 1e-3"),
-        ("closed-form-for-many-pulses", "return block.p.pulses == 1 and _models(block) <= {1, 2}",
+        ("closed-form-for-many-pulses",
+         "return block.p.pulses_summed == 1 and _models(block) <= {1, 2}",
          "return _models(block) <= {1, 2}"),
     ),
     *in_file(

@@ -11,7 +11,9 @@ from components.navigation.error_model import position_with_error
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 
-NED = ["ned_azimuth_rad", "ned_elevation_rad", "own_lat_deg", "own_lon_deg", "own_alt_m"]
+NED = ["ned_azimuth_rad", "ned_elevation_rad"]
+POSE = [*(f"own_{name}" for name in ("lat_deg", "lon_deg", "alt_m")),
+        *(f"own_{angle}_rad" for angle in ("heading", "pitch", "roll"))]  # fmt: skip
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000.0}
 BIASED = "[navigation]\nattitude_bias_deg = [1.5, 0, 0]\nposition_bias_m = [30, -20, 5]\n"
 NOISY = "[navigation]\nattitude_noise_deg = [0.5, 0.2, 0.3]\nposition_noise_m = [8, 8, 12]\n"
@@ -22,15 +24,18 @@ def test_windows_do_not_change_a_bit(scene, runs):
     run = runs.assert_grain_changes_nothing(scene(alarms, alarms, tables=NOISY))
     rows = run.tables["detections"].to_pylist()
     assert {row["block"] for row in rows} >= {"eo", "ir", "radar"}
-    assert all(row[name] is not None for row in rows for name in NED)
+    assert all(row[name] is not None for row in rows for name in NED + POSE)
 
 
 def test_body_angles_and_detections_are_physical(scene, runs):
     truth, erring = runs.run(scene()), runs.run(scene(tables=BIASED))
-    assert truth.tables["detections"].drop(NED) == erring.tables["detections"].drop(NED)
+    left_out = NED + POSE
+    assert truth.tables["detections"].drop(left_out) == erring.tables["detections"].drop(left_out)
     assert truth.tables["scans"] == erring.tables["scans"]
     for name in NED:
         assert truth.tables["detections"][name].null_count == len(truth.tables["detections"])
+    for name in POSE:
+        assert truth.tables["detections"][name].null_count == 0
 
 
 def test_a_yaw_bias_turns_every_bearing(scene, runs):

@@ -28,13 +28,25 @@ def test_every_recorded_column_is_described_and_none_besides():
 
 
 @pytest.mark.parametrize(
-    ("column", "unit"), [("_rad", "rad"), ("_deg", "deg"), ("_m", "m"), ("_s", "s"), ("_db", "dB")]
+    ("column", "unit"),
+    [
+        ("_rad", "rad"),
+        ("_deg", "deg"),
+        ("_m", "m"),
+        ("_s", "s"),
+        ("_db", "dB"),
+        ("_m_s", "m/s"),
+        ("_rad2", "rad²"),
+        ("_m2", "m²"),
+        ("_m2_s2", "m²/s²"),
+    ],
 )
 def test_units_are_those_of_the_names(column, unit):
     for columns in [LEADING, *COLUMNS.values()]:
         for name, (said, _, meaning) in columns.items():
             assert meaning
-            if name.endswith(column) and not name.endswith("rad_s"):
+            rate = name.endswith(("rad_s", "m_s")) and column in ("_s", "_m")
+            if name.endswith(column) and not rate:
                 assert said == unit, name
 
 

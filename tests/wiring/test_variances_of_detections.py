@@ -1,0 +1,65 @@
+"""Every detection carries the variances of its grid, in the ownship's body axes."""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from covering import RADARS, SENSORS
+from wired import alone, rows
+
+STEPS = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 1.0}
+MOUNT = {"mount_azimuth_deg": -35.0, "mount_elevation_deg": 21.0, "mount_roll_deg": -75.0}
+
+
+@pytest.mark.parametrize("kind", SENSORS)
+def test_a_grid_s_variance_is_a_twelfth_of_its_step_squared(kind):
+    keys = {"range_resolution_m": 60.0} if kind in RADARS else {}
+    found = rows(alone(kind, **STEPS, **keys), block="sensor")
+    assert len(found) == len(crooked.TARGETS)
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(math.radians(3.0) ** 2 / 12.0)
+        assert row["elevation_variance_rad2"] == pytest.approx(math.radians(1.0) ** 2 / 12.0)
+        expected = 300.0 if kind in RADARS else None
+        assert row["range_variance_m2"] == expected
+        assert row["range_rate_m_s"] is None and row["range_rate_variance_m2_s2"] is None
+
+
+@pytest.mark.parametrize("kind", SENSORS)
+def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind):
+    """By brute force: where the corners of a small cell of the sensor's grid lie in body axes."""
+    across, upward = np.radians([0.03, 0.01])
+    steps = {name: step / 100.0 for name, step in STEPS.items()}
+    turned = crooked.rotation(*MOUNT.values())
+    for row in rows(alone(kind, **MOUNT, **steps), block="sensor"):
+        middle = crooked.direction(row["azimuth_rad"], row["elevation_rad"])
+        azimuth, elevation = crooked.angles(turned @ middle)
+        part = (np.arange(20) + 0.5) / 20.0 - 0.5
+        corners = [
+            crooked.direction(azimuth + a * across, elevation + e * upward)
+            for a in part
+            for e in part
+        ]
+        cell = [crooked.angles(turned.T @ corner) for corner in corners]
+        spread = np.var(np.array(cell), axis=0)
+        assert row["azimuth_variance_rad2"] == pytest.approx(spread[0], rel=5e-3)
+        assert row["elevation_variance_rad2"] == pytest.approx(spread[1], rel=5e-3)
+
+
+def test_false_alarms_have_the_variances_of_their_sensor():
+    grid = {"azimuth_resolution_deg": 30.0, "elevation_resolution_deg": 30.0, "range_km": 5.0}
+    noise = {"false_alarms": True, "cell_false_alarm_probability": 0.2}
+    found = rows(
+        alone("radar.threshold", **grid, **noise, range_resolution_m=600.0),
+        block="sensor",
+        target=None,
+    )
+    assert found
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(math.radians(30.0) ** 2 / 12.0)
+        assert row["elevation_variance_rad2"] == pytest.approx(math.radians(30.0) ** 2 / 12.0)
+        assert row["range_variance_m2"] == 30000.0
+    frames = rows(alone("optical.eo", false_alarms_per_frame=1.0), block="sensor", target=None)
+    assert [row["azimuth_variance_rad2"] for row in frames] == pytest.approx(
+        [math.radians(0.01) ** 2 / 12.0] * len(frames)
+    )
