@@ -8,6 +8,7 @@ from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.resolution_effects import OneReportByCell
 from components.sensor.look import Cells, Look
 
 
@@ -29,7 +30,7 @@ class RangeBoundary(Radar):
 
     Parameters = RangeBoundaryParameters
     lockstep = True
-    effects = (BlindRange(), BeamSweep())
+    effects = (BlindRange(), OneReportByCell(), BeamSweep())
     ladders = (DETECTION,)
 
     def look(self, cells: Cells) -> Look:
@@ -39,4 +40,6 @@ class RangeBoundary(Radar):
         detected = np.ones(len(cells), dtype=bool)
         for factor in self.snr_factors:
             detected &= factor(cells) > 0.0
+        # Of equal targets the nearer one has the stronger echo.
+        detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
         return Look(detected, 40.0 * np.log10(ratio))

@@ -128,7 +128,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
-        snr = self.snr(cells)
+        snr = self.resolved(cells, self.snr(cells))
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         cnr = self.clutter_cnr(cells)

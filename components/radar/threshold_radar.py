@@ -14,13 +14,20 @@ from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.clutter_effects import GroundClutter
 from components.radar.false_alarm_effects import FalseAlarms
+from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
 from components.radar.parameters import LinkBudgetParameters, budget_report
-from components.radar.plausible import high_false_alarms, implausible
+from components.radar.plausible import (
+    high_false_alarms,
+    implausible,
+    many_false_alarms,
+    two_thresholds,
+)
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
+from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
@@ -52,6 +59,7 @@ class LinkBudgetRadar(Radar):
         *WEATHER_EFFECTS,
         BlindRange(),
         GroundClutter(),
+        OneReportByCell(),
         FalseAlarms(),
         TimeBudget(),
         BeamSweep(),
@@ -137,7 +145,17 @@ class LinkBudgetRadar(Radar):
     def warnings(self) -> list[str]:
         """Say which values no radar has, and what its false alarm probability comes to."""
         snr_db = self.required_snr_db(0.5, "swerling1")
-        return [*super().warnings(), *implausible(self.p), *high_false_alarms(self.p, snr_db)]
+        return [
+            *super().warnings(),
+            *implausible(self.p),
+            *high_false_alarms(self.p, snr_db),
+            *self._said_of_false_alarms(),
+        ]
+
+    def _said_of_false_alarms(self) -> list[str]:
+        if not (self.p.false_alarms and self.p.enabled):
+            return []
+        return [*many_false_alarms(self.p, cells_of_radar(self).count), *two_thresholds(self.p)]
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
@@ -174,7 +192,7 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Compare every cell's SNR with the threshold."""
-        snr = self.snr(cells)
+        snr = self.resolved(cells, self.snr(cells))
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         margin = snr_db - self.threshold_db
