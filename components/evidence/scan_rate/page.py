@@ -114,7 +114,9 @@ def study_scene() -> Scene:
 
 def approach_of(scene: Scene) -> Approach:
     """Return the encounter of the study, from its scene's own numbers."""
-    radar, traffic = scene.blocks["radar"].parameters, scene.blocks["traffic"].parameters
+    radar: Any = scene.blocks["radar"].parameters
+    traffic: Any = scene.blocks["traffic"].parameters
+    duration_s = 0.0 if scene.duration_s is None else float(scene.duration_s)
     target = next(one for one in traffic.intruders if one.name == "head_on")
     closing = traffic.ownship.speed_mps + target.speed_mps
     away_m = math.hypot(target.east_m, target.north_m, target.up_m)
@@ -129,7 +131,7 @@ def approach_of(scene: Scene) -> Approach:
         radar.pulses_per_dwell,
         closing,
         away_m,
-        away_m - closing * float(scene.duration_s),
+        away_m - closing * duration_s,
         radar.false_alarm_probability,
     )
 
