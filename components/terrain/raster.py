@@ -107,6 +107,14 @@ class ElevationRaster:
             f"{self.west_deg:.6g} to {self.east_deg:.6g}"
         )
 
+    def place(self, lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return places in rows from the south and columns from the west, with fractions."""
+        v = (lat_deg - self.south_deg) / self.lat_step_deg
+        # Whichever turn the longitude is given in; what lies a rounding west of the first column
+        # is on it.
+        edge = _EDGE * self.lon_step_deg
+        return v, (past(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
+
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
@@ -123,11 +131,7 @@ class ElevationRaster:
         inside : array of bool
         """
         rows, columns = self.height_m.shape
-        v = (lat_deg - self.south_deg) / self.lat_step_deg
-        # Whichever turn the longitude is given in; what lies a rounding west of the first column
-        # is on it.
-        edge = _EDGE * self.lon_step_deg
-        u = (past(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
+        v, u = self.place(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
         v, u = np.clip(v, 0.0, rows - 1), np.clip(u, 0.0, columns - 1)
         row = np.minimum(v.astype(np.int64), rows - 2)
