@@ -109,6 +109,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
     "manoeuvres": {
         "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
         "rate_rad_s": ("rad/s", "", "rate of that turn"),
+        "climb_m": ("m", "", "commanded change of altitude, positive upward"),
+        "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
     },
     "processing": {
         "processor": ("", "", "shared processor"),

@@ -22,7 +22,7 @@ COLUMNS = {
     "fused": "target sensors azimuth_rad elevation_rad range_m angle_source range_source "
     "true_azimuth_rad true_elevation_rad true_range_m",
     "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by",
-    "manoeuvres": "turn_rad rate_rad_s",
+    "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps",
 }
 KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared"]}
 TEXTS = ["target", "sensors", "angle_source", "range_source", "updated_by"]
