@@ -63,5 +63,5 @@ def test_a_rate_is_measured(rate):
 def test_the_states_of_a_rate_have_alerts_and_bands():
     (bands,) = (rate for rate in RATES if rate.name == "bands")
     kinds = bands.prepare(60)()
-    assert [sum(len(one.bands) > 1 for one in kind) > 20 for kind in kinds] == [True, *[False] * 3]
     assert all(any(len(one.bands) > 1 for one in kind) for kind in kinds)
+    assert any(one.recovery is not None for kind in kinds for one in kind)

@@ -32,7 +32,7 @@ def run_benchmark(
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
     pairs = [] if embed else [pair for pair in PAIRS if not scenes or pair.name in scenes]
     rates = [] if embed else [rate for rate in RATES if not scenes or rate.name in scenes]
-    others = {item.name for item in (*pairs, *rates)}
+    others = {pair.name for pair in pairs} | {rate.name for rate in rates}
     names = [name for name in scenes if name not in others]
     cases = [] if embed or (scenes and not names) else chosen(names)
     before = {} if compare is None else _read(Path(compare))

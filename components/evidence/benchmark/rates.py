@@ -54,7 +54,8 @@ def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[Stat
     def flown(position: list[Any]) -> State:
         track, speed = random.uniform(0.0, 2.0 * np.pi, count), random.uniform(25.0, 130.0, count)
         climb = random.normal(0.0, 3.0, count)
-        return State(*position, speed * np.sin(track), speed * np.cos(track), climb)
+        east_mps, north_mps = speed * np.sin(track), speed * np.cos(track)
+        return State(position[0], position[1], position[2], east_mps, north_mps, climb)
 
     up, zero = random.uniform(500.0, 3000.0, count), np.zeros(count)
     east, north = random.uniform(-within_m, within_m, (2, count))
@@ -71,7 +72,7 @@ def _levels(count: int) -> Callable[[], object]:
 
 def _bands(count: int) -> Callable[[], object]:
     configuration = read_conf(folder() / "alerting" / "do365b.conf")
-    own, intruder = states(count, 10_000.0, 200.0, 2)
+    own, intruder = states(count, 6_000.0, 150.0, 2)
     level = np.zeros(count, dtype=np.int64)
     intruders = [GuidedIntruders(intruder, configuration.alerters[0], level)]
     return lambda: [guidance_of_many(kind, configuration, own, intruders) for kind in KINDS]
