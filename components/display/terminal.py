@@ -42,6 +42,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         )
     if summary.get("targets"):
         _show_closest(console, summary["targets"])
+    for line in attitude_lines(summary.get("traffic") or {}):
+        _print_line(console, line)
     speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
     if speed:
         _print_line(console, speed)
@@ -89,6 +91,7 @@ _WHY_NOT_SEEN = {
     "off": "there while the sensor was off",
     "field_of_view": "outside its field of view",
     "range": "beyond its range",
+    "hidden": "hidden by the Earth or its ground",
     "culled": "too far away to be looked at",
 }
 
@@ -137,6 +140,30 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
                 reasons.append(f"in reach but not detected in {evaluated:,}")
             lines.append(f"{name} saw nothing: target {', '.join(reasons)} of {every:,} {unit}")
     return lines
+
+
+def attitude_lines(traffic: dict[str, Any]) -> list[str]:
+    """Say that attitude was derived from flown paths, and how wrong that is.
+
+    Parameters
+    ----------
+    traffic : dict
+        The section of a block that replays flights, with ``derived_attitude`` where any was.
+    """
+    derived = traffic.get("derived_attitude")
+    if not derived:
+        return []
+    error_deg = derived.get("median_azimuth_error_deg")
+    angles = [angle for angle in ("yaw", "pitch", "roll") if angle in derived]
+    names = list(dict.fromkeys(name for angle in angles for name in derived[angle]))
+    shown = ", ".join(names[:MOST_TARGETS]) + (", …" if len(names) > MOST_TARGETS else "")
+    line = f"Attitude derived from the flight path, not measured ({', '.join(angles)}): {shown}"
+    if error_deg is not None:
+        line += (
+            f". Expected error in azimuth {error_deg:g}° (median against the measured attitude of "
+            "flown intercepts), and fields of view follow from it"
+        )
+    return [line]
 
 
 def _by_size(fused: dict[str, int]) -> list[tuple[str, int]]:

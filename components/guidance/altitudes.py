@@ -1,17 +1,18 @@
-"""Level-offs at altitudes of a fixed grid, and which of them keep clear of intruders."""
+"""Level-offs at altitudes of a fixed grid, and which of them meet a volume."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.guidance.situation import Detector, Required, State
+from components.guidance.situation import Detector, State, meets
 from components.well_clear.nearly import nearly_equal
+from components.well_clear.vertical_interval import Span
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 
 class Altitudes:
-    """The altitudes at which the ownship may level off, and its flight to each.
+    """The altitudes at which n ownships may level off, and their flights to each.
 
     A flight to an altitude accelerates to a climb rate until `accelerated_s`, holds it until
     `held_s`, and is level at `level_s`; it first brakes where it climbs away from the altitude or
@@ -19,28 +20,30 @@ class Altitudes:
 
     Parameters
     ----------
-    own : State
+    own : State of (n,)
     values : mapping
         Values of a configuration, by key.
     """
 
     def __init__(self, own: State, values: Any) -> None:
-        self.own = own
+        self.own = own.columns()
         least, most, step = values["min_alt"], values["max_alt"], values["step_alt"]
         number = np.arange(math.floor((most - least) / step) + 2)
-        self.values = least + number * step
+        self.values = np.broadcast_to(least + number * step, (len(own.up_m), len(number)))
         self.instantaneous = values["vertical_accel"] == 0.0 or values["vertical_rate"] == 0.0
         self._plan(values["vertical_accel"], values["vertical_rate"])
+        self._far_ones_alike(values["lookahead_time"], step)
 
     def _plan(self, acceleration: float, rate: float) -> None:
         """Find the times and rates of the flights to all altitudes."""
-        climb, gap = float(self.own.climb_mps), self.values - float(self.own.up_m)
+        climb, gap = self.own.climb_mps, self.values - self.own.up_m
         if self.instantaneous:
-            self.accelerated_s = self.held_s = self.level_s = np.zeros(len(gap))
-            self._rate = self._acceleration = np.zeros(len(gap))
+            self.accelerated_s = self.held_s = self.level_s = np.zeros(gap.shape)
+            self._rate = self._acceleration = np.zeros(gap.shape)
+            self._holds = np.zeros(gap.shape, dtype=bool)
             return
         a = acceleration
-        stop = climb * abs(climb) / (2.0 * a)
+        stop = climb * np.abs(climb) / (2.0 * a)
         brakes = (climb * gap < 0.0) | (np.abs(stop) > np.abs(gap))
         start = np.where(brakes, 0.0, climb)
         left = np.where(brakes, gap - stop, gap)
@@ -48,104 +51,164 @@ class Altitudes:
         fast = np.maximum(rate, np.abs(start))
         speed = up * start  # towards the altitude, not negative
         hold_m = up * left - (fast**2 - speed**2) / (2.0 * a) - fast**2 / (2.0 * a)
-        peak = np.where(
-            hold_m >= 0.0, fast, np.sqrt(np.maximum(a * up * left + 0.5 * speed**2, 0.0))
-        )
-        first_s = np.where(brakes, abs(climb) / a, 0.0)
+        self._holds = hold_m >= 0.0
+        peak = np.where(self._holds, fast, np.sqrt(np.maximum(a * up * left + 0.5 * speed**2, 0.0)))
+        first_s = np.where(brakes, np.abs(climb) / a, 0.0)
         self.accelerated_s = first_s + (peak - speed) / a
         held = np.where(peak > 0.0, np.maximum(hold_m, 0.0) / np.where(peak > 0.0, peak, 1.0), 0.0)
         self.held_s = self.accelerated_s + held
         self.level_s = self.held_s + peak / a
         self._rate, self._acceleration = up * peak, up * a
 
-    def _flight_at(self, time_s: FloatArray) -> State:
-        """Return the straight flight at a time of each altitude's manoeuvre, run back to 0."""
-        climb, at = self.own.climb_mps, self.own.up_m
+    def _far_ones_alike(self, lookahead_s: float, step: float) -> None:
+        """Choose the altitudes whose flights differ within the lookahead.
+
+        Those whose climb is still held then are flown alike to either side, so one of them to each
+        side stands for all.
+        """
+        count = self.values.shape[1]
+        near = ~(self._holds & (self.held_s > lookahead_s))
+        near |= np.abs(self.values - self.own.up_m) <= step
+        some = near.any(axis=1)
+        first = np.where(some, near.argmax(axis=1), 0)
+        last = np.where(some, count - 1 - near[:, ::-1].argmax(axis=1), 0)
+        first = np.maximum(first - 1, 0)
+        width = int((np.minimum(last + 1, count - 1) - first).max(initial=0)) + 1
+        first = np.minimum(first, count - width)[:, np.newaxis]
+        #: Which altitudes are looked at, and who of them stands for each altitude.
+        self._looked_at = first + np.arange(width)
+        self._stands_for = np.clip(np.arange(count) - first, 0, width - 1)
+        chosen = self.chosen
+        self._level_m = chosen(self.values)
+        self._phases = tuple(
+            map(chosen, (self.accelerated_s, self.held_s, self.level_s, self._rate))
+        )
+        self._push = chosen(self._acceleration)
+
+    def chosen(self, of_each: FloatArray) -> FloatArray:
+        """Return values (n, k) of all altitudes for those that are looked at."""
+        return np.take_along_axis(of_each, self._looked_at, axis=1)
+
+    def of_all(self, chosen: BoolArray) -> BoolArray:
+        """Return for all altitudes what was found for those that were looked at."""
+        return np.take_along_axis(chosen, self._stands_for, axis=1)
+
+    def flight_at(self, time_s: FloatArray) -> State:
+        """Return the straight flights at a time of each manoeuvre looked at, run back to 0.
+
+        Parameters
+        ----------
+        time_s : (n, looked at)
+        """
+        own = self.own
+        values = self._level_m
         if self.instantaneous:
-            level = np.zeros(np.broadcast(time_s, self.values).shape)
-            up, rate = self.values + level, level
+            level = np.zeros(np.broadcast(time_s, values).shape)
+            up, rate = values + level, level
         else:
-            t1, t2, t3 = self.accelerated_s, self.held_s, self.level_s
+            (t1, t2, t3, speed), acceleration = self._phases, self._push
             phase_s = np.minimum(time_s, t1)
-            rate = climb + self._acceleration * phase_s
-            up = at + climb * phase_s + 0.5 * self._acceleration * phase_s**2
+            rate = own.climb_mps + acceleration * phase_s
+            up = own.up_m + own.climb_mps * phase_s + 0.5 * acceleration * phase_s**2
             held_s = np.clip(time_s - t1, 0.0, t2 - t1)
             brake_s = np.clip(time_s - t2, 0.0, t3 - t2)
-            up = up + self._rate * held_s
-            up = up + self._rate * brake_s - 0.5 * self._acceleration * brake_s**2
-            rate = rate - self._acceleration * brake_s
+            up = up + speed * held_s
+            up = up + speed * brake_s - 0.5 * acceleration * brake_s**2
+            rate = rate - acceleration * brake_s
             level = np.asarray(time_s >= t3)
-            up, rate = np.where(level, self.values, up), np.where(level, 0.0, rate)
-        same = np.zeros(np.shape(up))
-        return State(
-            self.own.east_m + same,
-            self.own.north_m + same,
-            up - rate * time_s,
-            self.own.east_mps + same,
-            self.own.north_mps + same,
-            rate,
+            up, rate = np.where(level, values, up), np.where(level, 0.0, rate)
+        return State(own.east_m, own.north_m, up - rate * time_s, own.east_mps, own.north_mps, rate)
+
+
+class _Instants(NamedTuple):
+    """Flights that are inside at an instant: when, and which."""
+
+    time_s: FloatArray
+    inside: BoolArray
+
+
+class AltitudeConflicts:
+    """When the flights to all altitudes meet a volume about one intruder of each ownship.
+
+    Parameters
+    ----------
+    altitudes : Altitudes
+        Of n ownships.
+    intruder : State of (n, 1)
+    detector : Detector
+    lookahead_s : float
+    """
+
+    def __init__(
+        self, altitudes: Altitudes, intruder: State, detector: Detector, lookahead_s: float
+    ) -> None:
+        self._altitudes, self._intruder = altitudes, intruder
+        self._detector, self._lookahead_s = detector, lookahead_s
+        self._seconds: list[_Instants] = []
+        t1, t2, t3 = map(
+            altitudes.chosen, (altitudes.accelerated_s, altitudes.held_s, altitudes.level_s)
         )
+        self._level_s = np.zeros(t1.shape) if altitudes.instantaneous else t3 + 1.0
+        self._level = self._over(self._level_s)
+        if altitudes.instantaneous:
+            return
+        self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, lookahead_s)
+        self._held = self._over(self._held_s)
+        self._at_seconds(np.zeros(t1.shape), t1)
+        self._at_seconds(np.ceil(t2), t3 + 1.0)
 
-    def clear(self, intruder: State, required: Required) -> BoolArray:
-        """Tell at which altitudes the ownship may level off, clear of one intruder."""
-        r = required
-        if self.instantaneous:
-            return ~self._met_level(intruder, r, np.zeros(len(self.values)))
-        met = self._met_at_seconds(intruder, r, np.zeros(len(self.values)), self.accelerated_s)
-        met |= self._met_held(intruder, r)
-        met |= self._met_at_seconds(intruder, r, np.ceil(self.held_s), self.level_s + 1.0)
-        met |= self._met_level(intruder, r, self.level_s + 1.0)
-        return ~met
+    def _over(self, begin_s: FloatArray) -> Span:
+        begin_s = np.minimum(begin_s, self._lookahead_s)
+        relative = self._altitudes.flight_at(begin_s).less(self._intruder)
+        return self._detector.span(relative, begin_s, self._lookahead_s)
 
-    def meets_within(
-        self, intruder: State, detector: Detector, horizon_s: float, lookahead_s: float
-    ) -> bool:
-        """Tell whether any flight to an altitude meets a volume soon after it."""
-        return not bool(self.clear(intruder, Required(detector, horizon_s, lookahead_s)).all())
-
-    def _met(
-        self, intruder: State, r: Required, time_s: FloatArray, end_s: FloatArray
-    ) -> BoolArray:
-        """Tell whether the flights at a time meet what is required until another."""
-        relative = self._flight_at(time_s).less(intruder)
-        found = np.zeros(np.shape(time_s), dtype=bool)
-        if r.from_s <= r.horizon_s:
-            found |= r.detector.meets(relative, np.maximum(r.from_s, time_s), end_s)
-        if r.before is not None:
-            until_s = np.minimum(end_s, min(r.lookahead_s, r.from_s))
-            found |= r.before.meets(relative, time_s, until_s)
-        return found
-
-    def _met_held(self, intruder: State, r: Required) -> BoolArray:
-        end_s = np.minimum(np.minimum(r.horizon_s + self.accelerated_s, self.held_s), r.lookahead_s)
-        return self._met(intruder, r, np.maximum(self.accelerated_s, 0.0), end_s)
-
-    def _met_level(self, intruder: State, r: Required, time_s: FloatArray) -> BoolArray:
-        end_s = np.minimum(r.horizon_s + time_s, r.lookahead_s)
-        return self._met(intruder, r, time_s, np.maximum(end_s, time_s))
-
-    def _met_at_seconds(
-        self, intruder: State, r: Required, first_s: FloatArray, last_s: FloatArray
-    ) -> BoolArray:
-        """Tell which flights are inside at a whole second of an interval."""
-        last_s = np.minimum(np.floor(last_s), r.lookahead_s)
-        met = np.zeros(len(self.values), dtype=bool)
+    def _at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
+        """Find which flights are inside at the whole seconds of an interval."""
+        last_s = np.minimum(np.floor(last_s), self._lookahead_s)
         # All flights of an acceleration share their first seconds, so these are few.
-        most = int(np.max(last_s - first_s, initial=-1.0))
-        for number in range(most + 1):
+        for number in range(int(np.max(last_s - first_s, initial=-1.0)) + 1):
             time_s = first_s + number
-            due = (time_s <= last_s) & ~met
+            due = time_s <= last_s
             if due.any():
-                met |= due & self._inside(intruder, r, time_s)
-        return met
+                relative = self._altitudes.flight_at(time_s).less(self._intruder)
+                begin_s = self._detector.span(relative, time_s, time_s + 1.0).begin_s
+                self._seconds.append(_Instants(time_s, due & nearly_equal(begin_s, time_s)))
 
-    def _inside(self, intruder: State, r: Required, time_s: FloatArray) -> BoolArray:
-        relative = self._flight_at(time_s).less(intruder)
-        found = np.zeros(len(time_s), dtype=bool)
-        if r.from_s <= r.horizon_s:
-            begin = r.detector.span(relative, time_s, time_s + 1.0).begin_s
-            found |= (time_s >= r.from_s) & nearly_equal(begin, time_s)
-        if r.before is not None:
-            begin = r.before.span(relative, time_s, time_s + 1.0).begin_s
-            found |= (time_s <= r.from_s) & nearly_equal(begin, time_s)
-        return found
+    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which flights meet it.
+
+        Parameters
+        ----------
+        from_s : float or (n, 1)
+            From when on it counts.
+        horizon_s : float or (n, 1)
+            How long after the climb began to be held, and after the level-off.
+
+        Returns
+        -------
+        (n, k) of bool
+        """
+        end_s = np.minimum(horizon_s + self._level_s, self._lookahead_s)
+        met = meets(self._level, np.maximum(from_s, self._level_s), end_s)
+        if not self._altitudes.instantaneous:
+            end_s = np.minimum(horizon_s + self._held_s, self._held_until_s)
+            met |= meets(self._held, np.maximum(from_s, self._held_s), end_s)
+        for instants in self._seconds:
+            met |= instants.inside & (instants.time_s >= from_s)
+        return self._altitudes.of_all(met & np.asarray(from_s <= horizon_s))
+
+    soon = unsafe
+
+    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
+        """Tell which flights meet it until a time (n, 1)."""
+        end_s = np.minimum(until_s, self._lookahead_s)
+        met = meets(self._level, self._level_s, end_s)
+        if not self._altitudes.instantaneous:
+            met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, end_s))
+        for instants in self._seconds:
+            met |= instants.inside & (instants.time_s <= until_s)
+        return self._altitudes.of_all(met)
+
+    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell nothing: flights to altitudes are looked at second by second on their way."""
+        return np.zeros(self._altitudes.values.shape, dtype=bool)

@@ -1,41 +1,26 @@
-"""Bands of guidance: values that lead to each region's volume, and those that lead out again."""
+"""Bands of guidance: values that lead to each region's volume, and those that lead out again.
 
-import math
-from collections.abc import Callable
+Many states are answered at once: all is arrays over (state, manoeuvre), and only what is painted in
+the end is written state by state.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from components.alert_configuration.configuration import REGIONS, Alerter, Configuration, Level
-from components.guidance.intervals import Band, Interval, clear_intervals, painted
-from components.guidance.kinds import Kind, kind_of
-from components.guidance.situation import Detector, Required, State
-from components.well_clear.nearly import surely_less
-from dsa_des.arrays.types import BoolArray
+from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
+from components.guidance.intervals import Band, Interval, painted
+from components.guidance.kinds import ManoeuvreKind, kind_of
+from components.guidance.recovery import Recovery, recover
+from components.guidance.regions import GuidedIntruders, Regions, intervals_of
+from components.guidance.situation import State
+from dsa_des.arrays.types import BoolArray, IntArray
 
 _PAINTED = ("NEAR", "MID", "FAR")
-# The search for the earliest recovery ends when it is known this well, s.
-_SEARCHED_S = 0.5
-
-
-class Recovery(NamedTuple):
-    """How a violation that cannot be avoided is left.
-
-    Parameters
-    ----------
-    time_s : float
-        From when on the volume is clear; minus infinity where nothing avoids a collision.
-    cylinder_m : (float, float)
-        Radius and half height that stay clear until then.
-    shrinks : int
-        How often the cylinder was made smaller.
-    """
-
-    time_s: float
-    cylinder_m: tuple[float, float]
-    shrinks: int
+# States taken together: their arrays stay in the cache.
+_MOST_AT_ONCE = {"hdir": 32, "hs": 64, "vs": 64, "alt": 128}
 
 
 class Guidance(NamedTuple):
@@ -85,154 +70,111 @@ def guidance(
     own : State
     intruders : list of GuidedIntruder
     """
-    kind = kind_of(kind_name, own, configuration)
-    corrective = REGIONS.index(configuration["corrective_region"])
-    layers: list[tuple[str, list[Interval], bool]] = []
-    saturated = False
-    for region in _PAINTED:
-        concerned = _concerned(configuration, kind, own, intruders, region)
-        if concerned is None:
-            continue
-        clear = np.ones(len(kind.values), dtype=bool)
-        for intruder, detector, horizon_s in concerned:
-            clear &= kind.clear(intruder.state, _required(configuration, detector, horizon_s))
-        intervals = _intervals(kind, clear)
-        layers.insert(0, (region, intervals, True))
-        if not intervals:
-            saturated = REGIONS.index(region) >= corrective
-            break
-    recovery: Recovery | None = None
-    found: list[Interval] = []
-    if saturated and configuration[f"recovery_{kind_name}"]:
-        recovery, found = _recover(configuration, kind, own, intruders)
-    if kind.instantaneous and recovery is None and _inside(configuration, own, intruders):
-        sizes = configuration["min_horizontal_recovery"], configuration["min_vertical_recovery"]
-        recovery = Recovery(0.0, sizes, 0)
-    if found:
-        layers.append(("RECOVERY", found, False))
-    bands = painted(layers, kind.least, kind.most)
-    if recovery is not None and recovery.time_s >= 0.0:
-        bands = _named_recovery(bands)
-    return Guidance(kind.own_value, bands, recovery)
+    alone = [
+        GuidedIntruders(_one(i.state), i.alerter, np.array([i.early_level])) for i in intruders
+    ]
+    return guidance_of_many(kind_name, configuration, _one(own), alone)[0]
 
 
-def _required(configuration: Configuration, detector: Detector, horizon_s: float) -> Required:
-    return Required(detector, horizon_s, configuration["lookahead_time"])
-
-
-def _intervals(kind: Kind, clear: BoolArray) -> list[Interval]:
-    return clear_intervals(kind.values, clear, kind.least, kind.most, kind.cyclic)
-
-
-def _level_of(alerter: Alerter, region: str) -> tuple[int, Level] | None:
-    for number, level in enumerate(alerter.levels, start=1):
-        if level.region == region:
-            return number, level
-    return None
-
-
-def _concerned(
+def guidance_of_many(
+    kind_name: str,
     configuration: Configuration,
-    kind: Kind,
     own: State,
-    intruders: list[GuidedIntruder],
-    region: str,
-) -> list[tuple[GuidedIntruder, Detector, float]] | None:
-    """Return who counts for a region, with detector and horizon; None if no level has it."""
-    lookahead_s = configuration["lookahead_time"]
-    found, known = [], False
-    for intruder in intruders:
-        numbered = _level_of(intruder.alerter, region)
-        if numbered is None:
-            continue
-        known = True
-        number, level = numbered
-        detector = Detector(level.volume)
-        begin_s = float(detector.span(own.less(intruder.state), 0.0, lookahead_s).begin_s)
-        early = number == intruder.early_level
-        due_s = level.early_alerting_time_s if early else level.alerting_time_s
-        horizon_s = min(level.alerting_time_s, lookahead_s)
-        if begin_s == 0.0 or bool(surely_less(begin_s, due_s)):
-            found.append((intruder, detector, lookahead_s))
-        elif kind.meets_within(intruder.state, detector, horizon_s, lookahead_s):
-            found.append((intruder, detector, horizon_s))
-    return found if known else None
+    intruders: Sequence[GuidedIntruders],
+) -> list[Guidance]:
+    """Return the bands of one kind for many states of ownships, each by itself.
+
+    Parameters
+    ----------
+    kind_name : {"hdir", "hs", "vs", "alt"}
+    configuration : Configuration
+    own : State of (n,)
+        Each ownship in its own plane, at its origin.
+    intruders : sequence of GuidedIntruders
+        One intruder of each ownship at a time, in that plane; intruders of several alerters are
+        several items.
+    """
+    made: list[Guidance] = []
+    at_once = _MOST_AT_ONCE[kind_name]
+    for start in range(0, len(own.up_m), at_once):
+        rows = np.arange(start, min(start + at_once, len(own.up_m)))
+        part = [intruder.rows(rows) for intruder in intruders]
+        made += _guidance_of(kind_name, configuration, own.rows(rows), part)
+    return made
 
 
-def _corrective(configuration: Configuration, intruder: GuidedIntruder) -> Detector | None:
-    level = configuration.corrective_level(intruder.alerter)
-    return None if level is None else Detector(level.volume)
+def _one(state: State) -> State:
+    return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
-def _inside(configuration: Configuration, own: State, intruders: list[GuidedIntruder]) -> bool:
-    """Tell whether the corrective volume of an intruder is violated now."""
-    for intruder in intruders:
-        detector = _corrective(configuration, intruder)
-        lookahead_s = configuration["lookahead_time"]
-        relative = own.less(intruder.state)
-        if detector is not None and float(detector.span(relative, 0.0, lookahead_s).begin_s) == 0.0:
-            return True
-    return False
+def _guidance_of(
+    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruders]
+) -> list[Guidance]:
+    kind = kind_of(kind_name, own, configuration)
+    regions = Regions(configuration, kind, own, intruders)
+    layers: list[tuple[str, BoolArray, BoolArray]] = []  # region, of whom, clear values
+    on = np.ones(len(own.up_m), dtype=bool)
+    saturated = np.zeros(len(on), dtype=bool)
+    corrective = REGIONS.index(configuration["corrective_region"])
+    for region in _PAINTED:
+        known, clear = regions.clear(region)
+        layers.append((region, on & known, clear))
+        stuck = on & known & ~regions.leads(clear)
+        if REGIONS.index(region) >= corrective:
+            saturated |= stuck
+        on = on & ~stuck
+    recoveries: dict[int, tuple[Recovery, list[Interval]]] = {}
+    rows = np.flatnonzero(saturated)
+    if len(rows) and configuration[f"recovery_{kind_name}"]:
+        theirs = [intruder.rows(rows) for intruder in intruders]
+        recovered = recover(kind_name, configuration, own.rows(rows), theirs)
+        recoveries = dict(zip(rows.tolist(), recovered, strict=True))
+    at_once: IntArray = np.zeros(0, dtype=np.int64)
+    if kind.instantaneous:
+        at_once = np.flatnonzero(regions.inside_corrective())
+    painter = _Painter(configuration, kind, layers)
+    return [painter.guidance(row, recoveries.get(row), row in at_once) for row in range(len(on))]
 
 
-def _recover(
-    configuration: Configuration, kind: Kind, own: State, intruders: list[GuidedIntruder]
-) -> tuple[Recovery, list[Interval]]:
-    """Return the earliest recovery, and the values that lead to it."""
-    concerned = _concerned(configuration, kind, own, intruders, configuration["corrective_region"])
-    lookahead_s = configuration["lookahead_time"]
+class _Painter:
+    """Writes the bands of one state after the other."""
 
-    def clear(detectors: list[Required]) -> list[Interval]:
-        both = np.ones(len(kind.values), dtype=bool)
-        for (intruder, _, _), required in zip(concerned or [], detectors, strict=True):
-            both &= kind.clear(intruder.state, required)
-        return _intervals(kind, both)
-
-    def with_cylinder(sizes: tuple[float, float]) -> list[Interval]:
-        cylinder = Detector(cylinder_m=sizes)
-        return clear([Required(cylinder, lookahead_s, lookahead_s)] * len(concerned or []))
-
-    def at(sizes: tuple[float, float], time_s: float) -> list[Interval]:
-        before = Detector(cylinder_m=sizes)
-        return clear(
-            [Required(d, lookahead_s, lookahead_s, time_s, before) for _, d, _ in concerned or []]
+    def __init__(
+        self,
+        configuration: Configuration,
+        kind: ManoeuvreKind,
+        layers: list[tuple[str, BoolArray, BoolArray]],
+    ) -> None:
+        self._kind, self._layers = kind, layers
+        sizes = configuration["min_horizontal_recovery"], configuration["min_vertical_recovery"]
+        self._now = Recovery(0.0, sizes, 0)
+        # The bands of a state where all is clear, which most are.
+        self._free = [Band(kind.least, kind.most, "NONE")]
+        several = kind.there.sum(axis=1) > 1
+        self._all_clear = several & np.logical_and.reduce(
+            [~of_whom | (clear | ~kind.there).all(axis=1) for _, of_whom, clear in layers]
         )
 
-    def leads_out(sizes: tuple[float, float], time_s: float) -> bool:
-        return bool(at(sizes, time_s))
-
-    nmac = configuration["horizontal_nmac"], configuration["vertical_nmac"]
-    sizes = configuration["min_horizontal_recovery"], configuration["min_vertical_recovery"]
-    shrinks = 0
-    if not with_cylinder(nmac):
-        return Recovery(-math.inf, nmac, shrinks), []
-    while True:
-        if with_cylinder(sizes):
-            time_s = _earliest(partial(leads_out, sizes), configuration)
-            found = at(sizes, time_s)
-            if found:
-                return Recovery(time_s, sizes, shrinks), found
-        if not configuration["ca_bands"] or sizes == nmac:
-            return Recovery(-math.inf, sizes, shrinks), []
-        factor = 1.0 - configuration["ca_factor"]
-        sizes = max(nmac[0], sizes[0] * factor), max(nmac[1], sizes[1] * factor)
-        shrinks += 1
-
-
-def _earliest(clear_at: Callable[[float], bool], configuration: Configuration) -> float:
-    """Return the earliest time from which on the volume is clear, with the time of stability."""
-    lookahead_s = configuration["lookahead_time"]
-    red, green = 0.0, lookahead_s + 1.0
-    probe = lookahead_s
-    while green - red > _SEARCHED_S:
-        if clear_at(probe):
-            green = probe
-        else:
-            red = probe
-        probe = 0.5 * (red + green)
-    if green <= lookahead_s:
-        return min(lookahead_s, green + configuration["recovery_stability_time"])
-    return red
+    def guidance(
+        self, row: int, recovered: tuple[Recovery, list[Interval]] | None, inside_at_once: bool
+    ) -> Guidance:
+        own_value = float(self._kind.own_value[row])
+        recovery, ways = recovered if recovered is not None else (None, [])
+        if recovery is None and inside_at_once:
+            recovery = self._now
+        if self._all_clear[row] and recovery is None:
+            return Guidance(own_value, list(self._free), None)
+        layers: list[tuple[str, list[Interval], bool]] = [
+            (region, intervals_of(self._kind, row, clear), True)
+            for region, of_whom, clear in reversed(self._layers)
+            if of_whom[row]
+        ]
+        if ways:
+            layers.append(("RECOVERY", ways, False))
+        bands = painted(layers, self._kind.least, self._kind.most)
+        if recovery is not None and recovery.time_s >= 0.0:
+            bands = _named_recovery(bands)
+        return Guidance(own_value, bands, recovery)
 
 
 def _named_recovery(bands: list[Band]) -> list[Band]:

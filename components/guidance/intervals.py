@@ -1,12 +1,12 @@
 """Intervals of guidance values: formed of clear values, wrapped or clipped, painted over."""
 
 import math
+import struct
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from components.well_clear.nearly import nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: Guidance values that are fewer doubles apart are one place, and so are a zero and one below
@@ -14,6 +14,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 _DOUBLES_APART = 2**40
 _TINY = 1e-5
 _TURN = 2.0 * math.pi
+# Doubles of one sign are in the order of their bits read as whole numbers.
+_DOUBLES, _AS_WHOLE_NUMBERS = struct.Struct("=2d"), struct.Struct("=2q")
 
 
 class Interval(NamedTuple):
@@ -24,8 +26,17 @@ class Interval(NamedTuple):
 
 
 def same_place(one: float, other: float) -> bool:
-    """Tell whether two guidance values are one place."""
-    return bool(nearly_equal(one, other, _DOUBLES_APART, _TINY))
+    """Tell whether two guidance values are one place.
+
+    As `components.well_clear.nearly.nearly_equal` has it, for two numbers at a time, which arrays
+    are ten times as slow for.
+    """
+    if one == 0.0 or other == 0.0:
+        return abs(one) < _TINY and abs(other) < _TINY
+    if (one > 0.0) != (other > 0.0):
+        return False
+    first, second = _AS_WHOLE_NUMBERS.unpack(_DOUBLES.pack(abs(one), abs(other)))
+    return abs(int(first) - int(second)) <= _DOUBLES_APART
 
 
 def clear_intervals(

@@ -5,24 +5,43 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.guidance.altitudes import Altitudes
-from components.guidance.situation import Detector, Required, State
-from components.guidance.step_bands import clear_steps, meets_within
+from components.guidance.altitudes import AltitudeConflicts, Altitudes
+from components.guidance.situation import Detector, State
+from components.guidance.step_bands import StepConflicts
 from components.guidance.steps import Steps, climb_steps, direction_steps, speed_steps
-from dsa_des.arrays.types import AnyArray, BoolArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 
 KINDS = ("hdir", "hs", "vs", "alt")
 FULL_TURN = 2.0 * math.pi
 
 
-class Kind(Protocol):
-    """Manoeuvres of one kind by the values that they lead to.
+class Conflicts(Protocol):
+    """When all manoeuvres of a kind meet a volume; see `StepConflicts`."""
+
+    def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which meet it after the manoeuvre."""
+
+    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which lie beyond one that meets it while it is flown."""
+
+    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which do either."""
+
+    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
+        """Tell which do either until a time."""
+
+
+class ManoeuvreKind(Protocol):
+    """Manoeuvres of one kind, of n ownships, by the k values that they lead to.
 
     Attributes
     ----------
-    values : (n,)
+    values : (n, k)
         Ascending; directions may lie outside of [0, 2 pi).
-    own_value, least, most : float
+    there : (n, k) of bool
+        Whether an ownship has that value.
+    own_value : (n,)
+    least, most : float
     cyclic : bool
         Whether values a full turn apart are the same.
     instantaneous : bool
@@ -30,75 +49,77 @@ class Kind(Protocol):
     """
 
     values: AnyArray
-    own_value: float
+    there: BoolArray
+    own_value: FloatArray
     least: float
     most: float
     cyclic: bool
     instantaneous: bool
 
-    def clear(self, intruder: State, required: Required) -> BoolArray:
-        """Tell which values lead clear of one intruder."""
-
-    def meets_within(
-        self, intruder: State, detector: Detector, horizon_s: float, lookahead_s: float
-    ) -> bool:
-        """Tell whether any value leads into a volume soon after its manoeuvre."""
+    def against(self, intruder: State, detector: Detector) -> Conflicts:
+        """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
 
 
 class _StepKind:
     def __init__(
-        self, steps: Steps, own_value: float, step: float, limits: tuple[float, float]
+        self,
+        steps: Steps,
+        own_value: FloatArray,
+        step: float,
+        limits: tuple[float, float],
+        lookahead_s: float,
     ) -> None:
-        self._steps = steps
+        self._steps, self._lookahead_s = steps, lookahead_s
         self.own_value = own_value
-        self.values: AnyArray = own_value + steps.number * step
+        self.values: AnyArray = own_value[:, np.newaxis] + steps.number * step
+        self.there = steps.there
         self.least, self.most = limits
         self.cyclic = False
-        self.instantaneous = steps.step_time_s == 0.0
+        self.instantaneous = not steps.step_time_s.any()
 
-    def clear(self, intruder: State, required: Required) -> BoolArray:
-        return clear_steps(self._steps, intruder, required)
-
-    def meets_within(
-        self, intruder: State, detector: Detector, horizon_s: float, lookahead_s: float
-    ) -> bool:
-        return meets_within(self._steps, intruder, detector, horizon_s, lookahead_s)
+    def against(self, intruder: State, detector: Detector) -> Conflicts:
+        return StepConflicts(self._steps, intruder, detector, self._lookahead_s)
 
 
 class _AltitudeKind:
     def __init__(self, own: State, values: Any) -> None:
         self._altitudes = Altitudes(own, values)
-        self.own_value = float(own.up_m)
+        self._lookahead_s = values["lookahead_time"]
+        self.own_value = own.up_m
         self.values: AnyArray = self._altitudes.values
+        self.there = np.ones(self.values.shape, dtype=bool)
         self.least, self.most = values["min_alt"], values["max_alt"]
         self.cyclic = False
         self.instantaneous = self._altitudes.instantaneous
-        self.clear = self._altitudes.clear
-        self.meets_within = self._altitudes.meets_within
+
+    def against(self, intruder: State, detector: Detector) -> Conflicts:
+        return AltitudeConflicts(self._altitudes, intruder, detector, self._lookahead_s)
 
 
-def kind_of(name: str, own: State, values: Any) -> Kind:
+def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
     """Return the manoeuvres of one kind.
 
     Parameters
     ----------
     name : {"hdir", "hs", "vs", "alt"}
         Direction over ground, ground speed, vertical speed, altitude.
-    own : State
-        Of the ownship, at the origin of its plane.
+    own : State of (n,)
+        Of the ownships, each at the origin of its plane.
     values : mapping
         Values of a configuration, by key.
     """
     if name == "alt":
         return _AltitudeKind(own, values)
+    lookahead_s = values["lookahead_time"]
     if name == "hdir":
-        track = float(np.arctan2(own.east_mps, own.north_mps)) % FULL_TURN
-        made = _StepKind(direction_steps(own, values), track, values["step_hdir"], (0.0, FULL_TURN))
+        track = np.arctan2(own.east_mps, own.north_mps) % FULL_TURN
+        steps, limits = direction_steps(own, values), (0.0, FULL_TURN)
+        made = _StepKind(steps, track, values["step_hdir"], limits, lookahead_s)
         made.cyclic = True
         return made
     if name == "hs":
-        speed = float(np.hypot(own.east_mps, own.north_mps))
+        speed = np.hypot(own.east_mps, own.north_mps)
         limits = values["min_hs"], values["max_hs"]
-        return _StepKind(speed_steps(own, values), speed, values["step_hs"], limits)
-    climb, limits = float(own.climb_mps), (values["min_vs"], values["max_vs"])
-    return _StepKind(climb_steps(own, values), climb, values["step_vs"], limits)
+        return _StepKind(speed_steps(own, values), speed, values["step_hs"], limits, lookahead_s)
+    climb, limits = own.climb_mps, (values["min_vs"], values["max_vs"])
+    return _StepKind(climb_steps(own, values), climb, values["step_vs"], limits, lookahead_s)

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.well_clear.cylinder import cylinder_span
+from components.well_clear.nearly import surely_less
 from components.well_clear.vertical_interval import Span
 from components.well_clear.violation import Relative, violation_span
 from components.well_clear.volume import Volume
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 
 
 class State(NamedTuple):
@@ -33,9 +34,13 @@ class State(NamedTuple):
         """Return these states less others."""
         return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))
 
-    def row(self, number: int) -> "State":
-        """Return the state of one aircraft."""
-        return State(*(part[number] for part in self))
+    def rows(self, which: AnyArray) -> "State":
+        """Return the states of some of the aircraft."""
+        return State(*(part[which] for part in self))
+
+    def columns(self) -> "State":
+        """Return states of shape (n, 1), to be compared with n manoeuvres in each row."""
+        return State(*(np.asarray(part)[:, np.newaxis] for part in self))
 
 
 @dataclass(frozen=True)
@@ -45,12 +50,12 @@ class Detector:
     Parameters
     ----------
     volume : Volume or None
-    cylinder_m : (float, float) or None
-        Radius and half of the height, where there is no volume.
+    cylinder_m : (radius, half height) or None
+        Where there is no volume; of floats, or of arrays that broadcast against the flights.
     """
 
     volume: Volume | None = None
-    cylinder_m: tuple[float, float] | None = None
+    cylinder_m: tuple[Any, Any] | None = None
 
     def span(self, relative: Relative, begin_s: Any, end_s: Any) -> Span:
         """Return from when to when flights meet it."""
@@ -59,32 +64,15 @@ class Detector:
         assert self.cylinder_m is not None
         return cylinder_span(*self.cylinder_m, relative, begin_s, end_s)
 
-    def meets(self, relative: Relative, begin_s: Any, end_s: Any) -> BoolArray:
-        """Tell whether flights meet it in an interval; never in an empty one."""
-        end_s = np.maximum(end_s, begin_s)
-        found = self.span(relative, begin_s, end_s)
-        return np.asarray(np.isfinite(found.begin_s) & (begin_s < end_s))
 
-
-class Required(NamedTuple):
-    """What flights must keep clear of, and when.
+def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
+    """Tell whether a volume is met in part of the time that was looked at; never in none.
 
     Parameters
     ----------
-    detector : Detector
-        From `from_s` on.
-    horizon_s : float
-        How long after a manoeuvre.
-    lookahead_s : float
-        Beyond it nothing is asked.
-    from_s : float
-        0 but in the search for a recovery.
-    before : Detector or None
-        What counts until `from_s`.
+    span : Span
+        When it is met, over a longer time: it is one interval, so that cutting it is enough.
+    begin_s, end_s : float or ndarray
     """
-
-    detector: Detector
-    horizon_s: float
-    lookahead_s: float
-    from_s: float = 0.0
-    before: Detector | None = None
+    found = surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
+    return np.asarray(found & (np.asarray(begin_s) < end_s))

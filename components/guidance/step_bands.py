@@ -1,83 +1,99 @@
-"""Which steps of a manoeuvre keep clear of intruders."""
+"""Which steps of a manoeuvre meet a volume, on the way or after it."""
 
-import math
+from typing import Any
 
 import numpy as np
 
-from components.guidance.situation import Detector, Required, State
+from components.guidance.situation import Detector, State, meets
 from components.guidance.steps import Steps
-from components.well_clear.violation import Relative
-from dsa_des.arrays.types import BoolArray
+from dsa_des.arrays.types import BoolArray, FloatArray
+
+_MOST = np.iinfo(np.int64).max
 
 
-def meets_within(
-    steps: Steps, intruder: State, detector: Detector, horizon_s: float, lookahead_s: float
-) -> bool:
-    """Tell whether any step meets a volume soon after its manoeuvre.
+class StepConflicts:
+    """When the flights after all steps meet a volume about one intruder of each ownship.
+
+    The times are found once, over all that may be asked; every question only cuts them.
 
     Parameters
     ----------
     steps : Steps
-    intruder : State
-        Of one.
+        Of n ownships.
+    intruder : State of (n, 1)
     detector : Detector
-    horizon_s, lookahead_s : float
+    lookahead_s : float
     """
-    relative = steps.flight.less(intruder)
-    end_s = np.minimum(lookahead_s, horizon_s + steps.time_s)
-    return bool(detector.meets(relative, steps.time_s, end_s).any())
 
+    def __init__(
+        self, steps: Steps, intruder: State, detector: Detector, lookahead_s: float
+    ) -> None:
+        self._steps = steps
+        self._lookahead_s = lookahead_s
+        self._count = np.abs(steps.number)
+        begin_s = np.minimum(steps.time_s, lookahead_s)  # later ones are not asked for
+        end_s = lookahead_s + steps.step_time_s
+        self._span = detector.span(steps.flight.less(intruder), begin_s, end_s)
+        self._takes_time = bool(steps.step_time_s.any())
+        lasts_s = steps.time_s + steps.step_time_s
+        self._while_flown = (
+            meets(self._span, steps.time_s, lasts_s) & steps.there
+            if self._takes_time
+            else np.zeros(steps.there.shape, dtype=bool)
+        )
 
-def clear_steps(steps: Steps, intruder: State, required: Required) -> BoolArray:
-    """Tell which steps keep clear of one intruder.
+    def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which steps meet it after the manoeuvre.
 
-    Parameters
-    ----------
-    steps : Steps
-    intruder : State
-        Of one.
-    required : Required
+        Parameters
+        ----------
+        from_s : float or (n, 1)
+            From when on it counts.
+        horizon_s : float or (n, 1)
+            How long after the manoeuvre.
 
-    Returns
-    -------
-    (n,) of bool
-        A step is clear if neither the manoeuvre nor the flight after it meets the volume.
-    """
-    relative = steps.flight.less(intruder)
-    clear = ~_met_after(steps, relative, required)
-    if steps.step_time_s > 0.0:
-        clear &= ~_lost_on_the_way(steps, relative, required)
-    return clear
+        Returns
+        -------
+        (n, k) of bool
+        """
+        time_s = self._steps.time_s
+        begin_s = np.maximum(from_s, time_s)
+        met = meets(self._span, begin_s, np.minimum(self._lookahead_s, horizon_s + time_s))
+        return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
+    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which steps meet it, or lie beyond one that meets it while it is flown."""
+        met = self.soon(from_s, horizon_s)
+        if self._takes_time:
+            met |= self.lost(from_s, horizon_s)
+        return met
 
-def _met_after(steps: Steps, relative: Relative, required: Required) -> BoolArray:
-    end_s = np.minimum(required.lookahead_s, required.horizon_s + steps.time_s)
-    if required.from_s <= required.horizon_s:
-        begin_s = np.maximum(required.from_s, steps.time_s)
-        met = required.detector.meets(relative, begin_s, end_s)
-    else:
-        met = np.zeros(len(steps.number), dtype=bool)
-    if required.before is not None:
-        until_s = np.full(len(steps.number), min(required.lookahead_s, required.from_s))
-        met = met | required.before.meets(relative, steps.time_s, until_s)
-    return np.asarray(met)
+    def lost(self, from_s: Any, horizon_s: Any) -> BoolArray:
+        """Tell which steps lie at or beyond the first that meets it while it is flown."""
+        if not self._takes_time:
+            return self._while_flown
+        first = np.ceil(from_s / self._steps.step_time_s)
+        last = np.floor(self._lookahead_s / self._steps.step_time_s)
+        due = (self._count >= first) & (self._count <= last)
+        due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
+        return self._beyond(self._while_flown & due)
 
+    def unsafe_before(self, until_s: FloatArray) -> BoolArray:
+        """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
+        met = meets(self._span, self._steps.time_s, np.minimum(self._lookahead_s, until_s))
+        met &= self._steps.there
+        if self._takes_time:
+            until_s = np.minimum(until_s, self._lookahead_s)
+            early = self._count <= np.floor(until_s / self._steps.step_time_s)
+            met |= self._beyond(self._while_flown & early)
+        return met
 
-def _lost_on_the_way(steps: Steps, relative: Relative, required: Required) -> BoolArray:
-    """Tell which steps lie at or beyond the first that meets the volume while it is flown."""
-    count = np.abs(steps.number)
-    lasts = steps.time_s + steps.step_time_s
-    met = np.zeros(len(count), dtype=bool)
-    step_s = steps.step_time_s
-    due = (count >= math.ceil(required.from_s / step_s)) & (
-        count <= math.floor(required.lookahead_s / step_s)
-    )
-    due &= (steps.time_s < required.lookahead_s) & (required.from_s <= required.horizon_s)
-    met |= due & required.detector.meets(relative, steps.time_s, lasts)
-    if required.before is not None:
-        early = count <= math.floor(min(required.from_s, required.lookahead_s) / step_s)
-        met |= early & required.before.meets(relative, steps.time_s, lasts)
-    lost = np.zeros(len(count), dtype=bool)
-    for side in (steps.number >= 0, steps.number <= 0):
-        lost |= side & (count >= np.min(count[met & side], initial=np.iinfo(np.int64).max))
-    return lost
+    def _beyond(self, met: BoolArray) -> BoolArray:
+        if not met.any():
+            return met
+        number = self._steps.number
+        lost = np.zeros(met.shape, dtype=bool)
+        for side in (number >= 0, number <= 0):
+            first = np.where(met & side, self._count, _MOST).min(axis=1, initial=_MOST)
+            lost |= side & (self._count >= first[:, np.newaxis])
+        return lost

@@ -6,19 +6,17 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from components.radar.clutter_parameters import ClutterParameters
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
 from components.radar.plausible import implausible
+from components.radar.resolution_parameters import ResolutionParameters
 from components.radar.time_parameters import TimeBudgetParameters
-from components.sensor.parameters import SensorParameters
 from dsa_des.block.component import Parameters
 
 
-class RadarParameters(SensorParameters):
+class RadarParameters(ResolutionParameters, ClutterParameters):
     """Parameters of every radar."""
 
-    range_resolution_m: float = Field(
-        default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
-    )
     beam_sweep: bool = Field(
         default=False,
         description="Whether a beam sweeps clockwise over the field of view once per scan: each "

@@ -65,3 +65,59 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
         f"false_alarm_probability is {pfa:g} per look ({whose}): half of the looks at a target "
         f"detect at an SNR of {snr_db:.1f} dB; with 1e-6, as radars have, it takes far more"
     ]
+
+
+def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
+    """Say that clutter raises detections where the threshold stays at the noise.
+
+    Parameters
+    ----------
+    parameters : ClutterParameters
+    terrain : Terrain or None
+    """
+    if terrain is None or parameters.clutter_threshold != "noise":
+        return []
+    return [
+        "clutter_threshold is 'noise': the echo of the ground counts as signal, so that clutter "
+        "raises detections; 'adaptive' keeps the probability of false alarm"
+    ]
+
+
+def many_false_alarms(parameters: Any, cells: int) -> list[str]:
+    """Say how many false alarms a scan has where a probability meant for one look makes many.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    cells : int
+        Resolution cells of a scan.
+    """
+    pfa = parameters.cell_pfa
+    if pfa < HIGH_FALSE_ALARM_PROBABILITY:
+        return []
+    key = "cell_false_alarm_probability"
+    if getattr(parameters, key) is None:
+        key = "false_alarm_probability"
+    by_default = key not in parameters.model_fields_set
+    whose = " (the thesis's, as the scene gives none)" if by_default else ""
+    return [
+        f"false_alarms is true and {key} is {pfa:g}{whose}: with {cells:,} resolution cells that "
+        f"makes {cells * pfa:,.3g} false alarms per scan, {pfa:.3g} in every cell; radars have "
+        "1e-6 per cell or less"
+    ]
+
+
+def two_thresholds(parameters: Any) -> list[str]:
+    """Say that false alarms and detections are counted at two thresholds, where they are.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    """
+    cell, look = parameters.cell_false_alarm_probability, parameters.false_alarm_probability
+    if cell is None or cell == look:
+        return []
+    return [
+        f"cell_false_alarm_probability is {cell:g} and false_alarm_probability is {look:g}: false "
+        "alarms cross another threshold than targets do; leave the first out for one threshold"
+    ]

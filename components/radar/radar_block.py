@@ -9,6 +9,7 @@ import numpy as np
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
+from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
 from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
@@ -22,15 +23,25 @@ class Radar(Sensor):
 
     mark = RADAR
     measures_range = True
-    hooks = {"SNR": "(cells) -> factor of each cell's SNR"}
+    hooks = {
+        "SNR": "(cells) -> factor of each cell's SNR",
+        "one report by cell": "(cells, power) -> power of the echo that stands for its "
+        "resolution cell, 0 of the others",
+    }
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
+        self._merging: Merging | None = None
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+        (self._merging,) = self.built("one report by cell") or [None]
+
+    def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
+        """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
+        return power if self._merging is None else self._merging(cells, power)
 
     @property
     def _sweep(self) -> Sweep | None:

@@ -19,7 +19,14 @@ WINDOW_S = 4.0
 SLOWEST_TRACK_MPS = 0.5
 """Below this ground speed a track is noise: yaw is held, pitch and roll are zero."""
 
+MEDIAN_AZIMUTH_ERROR_DEG = 4.2
+"""Median error in azimuth of targets seen in derived body axes, against the measured attitude of
+flown intercepts: wind, sideslip and angle of attack are not in a path."""
+
 _MOST_OFFSETS = 50
+# A sample that lies half a window away lies in the window, whatever its time was rounded to:
+# samples closer than a microsecond are one instant.
+_EDGE_S = 1e-6
 # Below this, the times in a window are too clumped to tell a curve from noise.
 _POOREST_CONDITION = 1e-3
 
@@ -147,7 +154,7 @@ def _fit(
     n = len(time_s)
     half = 0.5 * window_s
     reach = 1
-    while reach < n - 1 and np.any(time_s[reach + 1 :] - time_s[: -reach - 1] <= half):
+    while reach < n - 1 and np.any(time_s[reach + 1 :] - time_s[: -reach - 1] <= half + _EDGE_S):
         reach += 1
     step = -(-reach // _MOST_OFFSETS)
     offsets = sorted({1, *range(step, reach + 1, step)})
@@ -159,7 +166,7 @@ def _fit(
         ahead, behind = slice(0, n - size), slice(size, n)
         for i, j in ((ahead, behind), (behind, ahead)):
             tau = time_s[j] - time_s[i]
-            weight = np.where((np.abs(tau) <= half) | (size == 1), 1.0, 0.0)
+            weight = np.where((np.abs(tau) <= half + _EDGE_S) | (size == 1), 1.0, 0.0)
             components = difference(i, j)
             power = weight
             for order in range(5):

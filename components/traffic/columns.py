@@ -22,5 +22,5 @@ def daa_columns() -> list[Row]:
     """Return quantity, accepted names, and unit by default."""
     return [
         (quantity, ", ".join(names), daa_file.DEFAULT_UNITS.get(quantity, ""))
-        for quantity, names in daa_file.HEADERS.items()
+        for quantity, names in (*daa_file.HEADERS.items(), ("yaw", daa_file.EXTRA_HEADERS["yaw"]))
     ]

@@ -45,9 +45,11 @@ HEADERS = {
     "vy": ("vy",),
     "vz": ("vz",),
 }
-# What alerting reads besides: which alerter an intruder belongs to, and standard deviations; those
-# of "en" are signed square roots of the covariances of east and north.
+# Where the nose points, which the track does not say in wind; and what alerting reads besides:
+# which alerter an intruder belongs to, and standard deviations; those of "en" are signed square
+# roots of the covariances of east and north.
 EXTRA_HEADERS = {
+    "yaw": ("heading", "hdg", "true_heading", "trueheading", "yaw"),
     "alerter": ("alerter",),
     **{
         name: (name,)
@@ -70,10 +72,13 @@ DEFAULT_UNITS = {
     "vx": "knot",
     "vy": "knot",
     "vz": "fpm",
+    "yaw": "deg",
     "alerter": "",
     **{f"{name}_std": "m" for name in ("s_ew", "s_ns", "s_en", "sz")},
     **{f"{name}_std": "m/s" for name in ("v_ew", "v_ns", "v_en", "vz")},
 }
+# Extras that are no error where they cannot be read: files in the wild hold gaps there.
+_OPTIONAL = frozenset({"yaw"})
 _VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
 
 
@@ -108,12 +113,14 @@ def read_daa(
     Notes
     -----
     Columns may come in any order; only name, time and position are required. Velocity is taken
-    from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there; all other columns
-    are ignored. Commas, semicolons, tabs and blanks separate, also mixed. A file without a row
-    of units is read with those of DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the
-    notes. Altitudes are taken as heights above the ellipsoid.
+    from `vx vy vz` (east, north, up) or `trk gs vs` where all three are there. A column `heading`
+    is where the nose points, from true north; an aircraft whose column has gaps, or a column that
+    is in no unit of angle, is read without it. All other columns are ignored. Commas, semicolons,
+    tabs and blanks separate, also mixed. A file without a row of units is read with those of
+    DAIDALUS (deg, ft, knot, fpm, s; nmi for sx, sy), said in the notes. Altitudes are taken as
+    heights above the ellipsoid.
     """
-    table, columns = _table(path, ())
+    table, columns = _table(path, ("yaw",))
     notes = table.notes
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
     if "sx" in columns:
@@ -167,6 +174,9 @@ def _table(
     for quantity in [*_wanted(places), *(q for q in extra if q in places)]:
         index = places[quantity]
         line, token = units[quantity]
+        if quantity in _OPTIONAL and clean_token(token) not in UNITS[quantity]:
+            notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
+            continue
         factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
         columns[quantity] = Column(index, headers[index], factor)
     ignored = [
@@ -176,7 +186,7 @@ def _table(
     ]
     if ignored:
         notes.append(f"columns ignored: {', '.join(ignored)}")
-    table = SampleTable(problems, places["name"], columns)
+    table = SampleTable(problems, places["name"], columns, optional=_OPTIONAL)
     table.notes = notes
     for number, text in body:
         row = cells(text, len(headers), places["name"])
@@ -264,6 +274,7 @@ def _geodetic(
     velocity = enu_velocity(samples)
     if "sx" not in samples:
         return {**samples, **velocity}
+    attitude = {}
     lat, lon, _ = enu_to_geodetic(
         samples["sx"],
         samples["sy"],
@@ -284,6 +295,15 @@ def _geodetic(
             key: x * axis[0] + y * axis[1] + z * axis[2]
             for key, axis in zip(("ve", "vn", "vu"), local_axes(lat, lon), strict=True)
         }
+    if "yaw" in samples:
+        # A heading counts from the reference point's north as well.
+        nose = np.radians(samples["yaw"])
+        origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
+        ahead = [np.sin(nose) * origin[0][i] + np.cos(nose) * origin[1][i] for i in range(3)]
+        east, north = (
+            sum(part * axis[i] for i, part in enumerate(ahead)) for axis in local_axes(lat, lon)[:2]
+        )
+        attitude = {"yaw": np.degrees(np.arctan2(east, north))}
     # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
     alt = samples["sz"] + reference[2]
-    return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity}
+    return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity, **attitude}

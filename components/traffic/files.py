@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft
+from components.traffic.attitude_from_path import MEDIAN_AZIMUTH_ERROR_DEG
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
@@ -18,6 +19,29 @@ from components.traffic.suspicious import suspicions
 from components.traffic.traffic_file import TrafficFile
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
+
+
+def derived_attitude(content: TrafficFile) -> dict[str, Any]:
+    """Say whose attitude was derived from the path, and how wrong that is known to be.
+
+    Parameters
+    ----------
+    content : TrafficFile
+
+    Returns
+    -------
+    dict
+        ``yaw``, ``pitch`` and ``roll``, each the names of aircraft without it in the file, and
+        ``median_azimuth_error_deg`` where yaw is among them; empty where all was measured.
+    """
+    names: dict[str, Any] = {}
+    for angle in ("yaw", "pitch", "roll"):
+        of = [craft.name for craft in content.aircraft if angle in craft.derived_attitude]
+        if of:
+            names[angle] = of
+    if "yaw" in names:
+        names["median_azimuth_error_deg"] = MEDIAN_AZIMUTH_ERROR_DEG
+    return names
 
 
 class FileParameters(SourceParameters):
@@ -101,7 +125,12 @@ class RecordedTraffic(TrafficSource):
 
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and what the file's own clock said at time 0."""
-        source = {"start_time_s": self.content.start_time_s, "notes": self.content.notes}
+        source: dict[str, Any] = {
+            "start_time_s": self.content.start_time_s,
+            "notes": self.content.notes,
+        }
+        if derived := derived_attitude(self.content):
+            source["derived_attitude"] = derived
         return {**super().report(), "traffic": source}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -110,6 +110,9 @@ class SampleTable:
         The quantities to read.
     parse_time : callable, optional
         Turns a time cell into seconds where a plain number will not do.
+    optional : collection of str
+        Quantities whose bad cells are no error: an aircraft that has one goes without the whole
+        column, and a note says so.
     """
 
     def __init__(
@@ -118,7 +121,9 @@ class SampleTable:
         name_column: int,
         columns: dict[str, Column],
         parse_time: Callable[[str], float] | None = None,
+        optional: Collection[str] = (),
     ) -> None:
+        self._optional = frozenset(optional)
         self._problems, self._name_column, self._columns = problems, name_column, columns
         self._parse_time = parse_time
         self._aircraft: dict[str, _Rows] = {}
@@ -131,7 +136,9 @@ class SampleTable:
             self._problems.add("the aircraft has no name", line=line)
             return
         numbers = {
-            quantity: self._number(line, quantity, column, row[column.index])
+            quantity: _number_or_nan(column, row[column.index])
+            if quantity in self._optional
+            else self._number(line, quantity, column, row[column.index])
             for quantity, column in self._columns.items()
         }
         # An aircraft counts as named even if its row is bad: it is there, only not usable.
@@ -253,6 +260,14 @@ class SampleTable:
     def _sorted(self, name: str, rows: _Rows) -> dict[str, FloatArray]:
         """Put an aircraft's samples in the order of time; two at one time are a problem."""
         columns = {key: np.array(values) for key, values in rows.values.items()}
+        for key in sorted(self._optional & columns.keys()):
+            if missing := int(np.count_nonzero(np.isnan(columns[key]))):
+                header = self._columns[key].header
+                self.notes.append(
+                    f"{name}: column {header} has no number in {missing} of its "
+                    f"{len(columns[key])} samples and is ignored"
+                )
+                del columns[key]
         if not columns:
             # All its rows were bad, which has been noted row by row.
             return columns
@@ -327,6 +342,15 @@ class SampleTable:
                     "are interpolated"
                 )
         return trajectory
+
+
+def _number_or_nan(column: Column, cell: str) -> float:
+    """Read a cell of an optional column; what is no finite number of sense is NaN."""
+    try:
+        value = math.nan if "_" in cell else float(cell) * column.factor
+    except ValueError:
+        return math.nan
+    return value if abs(value) <= 1e12 else math.nan
 
 
 def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:

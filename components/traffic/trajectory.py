@@ -107,6 +107,10 @@ class SampledTrajectory:
             )
             self.velocity_was_ignored = not _agrees_with_path(velocity, fit_path(*path)[0])
             self.velocity_enu_mps = None if self.velocity_was_ignored else velocity
+        #: Which of yaw, pitch and roll were derived from the path, not given.
+        self.derived_attitude = tuple(
+            angle for angle in ("yaw", "pitch", "roll") if f"{angle}_rad" not in given
+        )
         attitude = attitude_from_path(*path, velocity_enu_mps=self.velocity_enu_mps)
         yaw, pitch, roll = (
             given.get(key, derived)

@@ -14,6 +14,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 DOUBLES_APART = 16_348
 #: A number nearly equals zero below this.
 TINY = 1e-13
+# More than `DOUBLES_APART` doubles are apart by this part of their size.
+_CLOSE = DOUBLES_APART * 2.0**-52
 
 
 def nearly_equal(
@@ -46,7 +48,15 @@ def nearly_equal(
 
 def surely_less(first: Any, second: Any) -> BoolArray:
     """Tell whether one number lies below another, and not only by rounding."""
-    return np.asarray((np.asarray(first) < np.asarray(second)) & ~nearly_equal(first, second))
+    first, second = np.asarray(first), np.asarray(second)
+    less = np.asarray(first < second)
+    with np.errstate(invalid="ignore"):  # of infinities of one sign, neither is less
+        gap = second - first
+    # Few pairs are so close that their doubles have to be counted; no infinite gap is.
+    close = less & (gap < _CLOSE * (np.abs(first) + np.abs(second)) + 2.0 * TINY)
+    if close.any():
+        less = less & ~(close & nearly_equal(first, second))
+    return less
 
 
 def nearly_zero(values: FloatArray) -> BoolArray:

@@ -4,13 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from components.alert_configuration.conf_file import default_values
 from components.guidance.altitudes import Altitudes
 from components.guidance.intervals import Band, Interval, clear_intervals, painted, same_place
 from components.guidance.kinds import kind_of
 from components.guidance.resolution import resolution
-from components.guidance.situation import Detector, Required, State
+from components.guidance.situation import Detector, State
+from components.well_clear.nearly import nearly_equal
 from components.well_clear.violation import violates
 from components.well_clear.volume import Volume
 
@@ -21,6 +24,10 @@ SIZES = (900.0, 140.0, 20.0, 5.0)
 
 def state(*parts):
     return State(*(np.float64(part) for part in parts))
+
+
+def one_row(one):
+    return State(*(np.array([part]) for part in one))
 
 
 #: Heading 217 deg and climbing; the intruder crosses from the right and descends.
@@ -70,9 +77,11 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
     larger, smaller = (Volume(*(size * k for size in SIZES), variable) for k in (1.02, 0.98))
     edges = 0
     for intruder in (CROSSING, BELOW, NEAR):
-        made = kind_of(kind, OWN, VALUES)
-        clear = made.clear(intruder, Required(Detector(volume), HORIZON_S, LOOKAHEAD_S))
-        zero = int(np.argmin(np.abs(made.values - made.own_value)))
+        values = {**VALUES, "lookahead_time": LOOKAHEAD_S}
+        made = kind_of(kind, one_row(OWN), values)
+        conflicts = made.against(one_row(intruder).columns(), Detector(volume))
+        clear = ~conflicts.unsafe(0.0, HORIZON_S)[0]
+        zero = int(np.argmin(np.abs(made.values[0] - made.own_value)))
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
             for at in (place, place + 1):
                 if clear[at]:
@@ -86,25 +95,43 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
 def test_flights_to_altitudes_are_smooth_and_end_there():
     for climb in (-9.0, -1.0, 0.0, 2.0, 9.0):
         own = State(*OWN[:5], np.float64(climb))
-        made = Altitudes(own, VALUES)
-        assert (made.accelerated_s <= made.held_s + 1e-12).all()
+        made = Altitudes(one_row(own), {**VALUES, "lookahead_time": 1e6})
+        targets = made.chosen(made.values)[0]
+        assert targets == pytest.approx(made.values[0])  # within so long a time, all differ
+        t1, t2, t3 = (part[0] for part in (made.accelerated_s, made.held_s, made.level_s))
+        assert (t1 <= t2 + 1e-12).all()
         most = VALUES["vertical_accel"]
-        for place in range(0, len(made.values), 7):
-            time_s = np.linspace(0.0, made.level_s[place] + 1.0, 4001)
-            flights = [made._flight_at(np.full(len(made.values), t)) for t in time_s[::100]]
+        for place in range(0, len(targets), 7):
+            time_s = np.linspace(0.0, t3[place] + 1.0, 4001)
+            flights = [made.flight_at(np.full((1, len(targets)), t)) for t in time_s[::100]]
             up = np.array(
                 [
-                    f.up_m[place] + f.climb_mps[place] * t
+                    f.up_m[0, place] + f.climb_mps[0, place] * t
                     for f, t in zip(flights, time_s[::100], strict=True)
                 ]
             )
-            rate = np.array([f.climb_mps[place] for f in flights])
+            rate = np.array([f.climb_mps[0, place] for f in flights])
             step_s = time_s[100]
             assert up[0] == pytest.approx(900.0) and rate[0] == pytest.approx(climb)
-            assert up[-1] == pytest.approx(made.values[place]) and rate[-1] == 0.0
+            assert up[-1] == pytest.approx(targets[place]) and rate[-1] == 0.0
             assert (np.abs(np.diff(rate)) <= most * step_s + 1e-9).all()
             mean = 0.5 * (rate[1:] + rate[:-1]) * step_s
             assert np.abs(np.diff(up) - mean).max() <= most * step_s**2 / 4 + 1e-6
+
+
+@pytest.mark.parametrize("climb", [-9.0, -2.0, 0.0, 4.0])
+@pytest.mark.parametrize("up", [40.0, 900.0, 1990.0, 2500.0])
+def test_altitudes_that_others_stand_for_are_flown_like_them(climb, up):
+    own = State(*(np.array([part]) for part in (0.0, 0.0, up, 30.0, -40.0, climb)))
+    made = Altitudes(own, {**VALUES, "lookahead_time": 60.0})
+    every = Altitudes(own, {**VALUES, "lookahead_time": 1e6})
+    assert made.of_all(np.ones((1, made.chosen(made.values).shape[1]), dtype=bool)).all()
+    assert made.chosen(made.values).shape[1] < every.chosen(every.values).shape[1]
+    for time_s in (0.0, 0.7, 5.0, 31.0, 60.0):
+        few = made.flight_at(np.full((1, 1), time_s))
+        all_of_them = every.flight_at(np.full((1, 1), time_s))
+        for name in ("up_m", "climb_mps"):
+            assert made.of_all(getattr(few, name)) == pytest.approx(getattr(all_of_them, name))
 
 
 def test_a_clear_value_alone_makes_no_band():
@@ -152,3 +179,13 @@ def test_the_nearer_way_out_is_preferred_and_right_where_they_are_equal():
 )
 def test_places_are_the_same_within_a_tolerance(one, other, same):
     assert same_place(one, other) is same
+
+
+@given(
+    one=st.floats(-1e4, 1e4) | st.just(0.0),
+    part=st.floats(-4e-4, 4e-4),
+    away=st.sampled_from([0.0, 1e-6, -1e-6, 2e-5]),
+)
+def test_places_of_two_numbers_are_those_of_arrays(one, part, away):
+    other = one * (1.0 + part) + away
+    assert same_place(one, other) is bool(nearly_equal(one, other, 2**40, 1e-5))

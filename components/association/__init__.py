@@ -1,0 +1,1 @@
+"""Association: which detection belongs to which track, by distance alone."""

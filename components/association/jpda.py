@@ -1,0 +1,119 @@
+"""Joint probabilistic data association: how likely each detection is of each track.
+
+A joint event gives every track at most one detection and every detection at most one track; its
+weight is the product of the weights of its pairs, where a track left out weighs 1. Marginals are
+exact in clusters of up to a stated number of detections (a sum over sets of used detections, not
+over events); in larger ones they come from loopy belief propagation, which converges and is close.
+
+Sources: Fortmann, Bar-Shalom, Scheffe, IEEE J. Oceanic Eng. 8 (1983); Williams, Lau,
+*Approximate evaluation of marginal association probabilities with belief propagation*, IEEE Trans.
+AES 50 (2014).
+"""
+
+import numpy as np
+
+from components.association.clusters import groups, labels
+from dsa_des.arrays.types import FloatArray, IntArray
+
+#: Detections in a cluster up to which marginals are exact: a sum over 2^10 sets for each track.
+EXACT_UP_TO = 10
+
+_SETTLED = 1e-12
+_MOST_ROUNDS = 10_000
+
+
+def marginals(
+    track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
+) -> FloatArray:
+    """Return the probability of each pair; what a track's pairs leave to 1 is that it was missed.
+
+    Parameters
+    ----------
+    track, detection : (pairs,)
+        Pairs in the gate.
+    weight : (pairs,)
+        Pd N(z; ẑ, S) / (λ (1 - Pd Pg)): how much likelier the pair is than both apart.
+    exact_up_to : int
+        Detections in a cluster up to which sums are exact.
+
+    Returns
+    -------
+    ndarray of shape (pairs,)
+    """
+    found = np.empty(len(track))
+    if len(track) == 0:
+        return found
+    # A detection in one gate only ties no tracks together: its track is decided in closed form.
+    shared = np.bincount(detection)[detection] > 1
+    mixed_up = np.zeros(int(track.max()) + 1, dtype=bool)
+    mixed_up[track[shared]] = True
+    simple = ~mixed_up[track]
+    total = 1.0 + np.bincount(track[simple], weights=weight[simple], minlength=len(mixed_up))
+    found[simple] = weight[simple] / total[track[simple]]
+    left = np.flatnonzero(~simple)
+    for part in groups(labels(track[left], detection[left])):
+        pairs = left[part]
+        tracks, row = np.unique(track[pairs], return_inverse=True)
+        detections, column = np.unique(detection[pairs], return_inverse=True)
+        weights = np.zeros((len(tracks), len(detections)))
+        weights[row, column] = weight[pairs]
+        solve = exact if len(detections) <= exact_up_to else propagated
+        found[pairs] = solve(weights)[row, column]
+    return found
+
+
+def exact(weights: FloatArray) -> FloatArray:
+    """Return exact marginals of one cluster.
+
+    Parameters
+    ----------
+    weights : (tracks, detections)
+        0 for what is not in the gate.
+
+    Returns
+    -------
+    ndarray of the same shape
+    """
+    many, count = weights.shape
+    sets = 1 << count
+    free = [np.flatnonzero((np.arange(sets) >> j & 1) == 0) for j in range(count)]
+    # Each track's largest factor is taken out: products of many stay in range.
+    scale = np.maximum(weights.max(axis=1), 1.0)
+    scaled, nothing = weights / scale[:, np.newaxis], 1.0 / scale
+    before = np.zeros((many + 1, sets))
+    before[0, 0] = 1.0
+    for i in range(many):
+        before[i + 1] = before[i] * nothing[i]
+        for j in np.flatnonzero(scaled[i]).tolist():
+            before[i + 1, free[j] | 1 << j] += before[i, free[j]] * scaled[i, j]
+    after = np.ones((many + 1, sets))
+    for i in range(many - 1, -1, -1):
+        after[i] = after[i + 1] * nothing[i]
+        for j in np.flatnonzero(scaled[i]).tolist():
+            after[i, free[j]] += after[i + 1, free[j] | 1 << j] * scaled[i, j]
+    found = np.zeros_like(weights)
+    for i in range(many):
+        for j in np.flatnonzero(scaled[i]).tolist():
+            together = before[i, free[j]] * after[i + 1, free[j] | 1 << j]
+            found[i, j] = scaled[i, j] * together.sum() / after[0, 0]
+    return found
+
+
+def propagated(weights: FloatArray) -> FloatArray:
+    """Return approximate marginals of one cluster, by belief propagation.
+
+    Parameters
+    ----------
+    weights : (tracks, detections)
+    """
+    message = np.ones_like(weights)
+    for _ in range(_MOST_ROUNDS):
+        product = weights * message
+        out = weights / (1.0 + product.sum(axis=1, keepdims=True) - product)
+        new = 1.0 / (1.0 + out.sum(axis=0, keepdims=True) - out)
+        settled = float(np.abs(new - message).max()) < _SETTLED
+        message = new
+        if settled:
+            break
+    product = weights * message
+    return np.asarray(product / (1.0 + product.sum(axis=1, keepdims=True)))

@@ -1,0 +1,1 @@
+"""Estimation: motion, measurements and Kalman filters, over many tracks at once."""

@@ -1,0 +1,103 @@
+"""Small dense algebra over many tracks at once: components first, tracks last.
+
+A vector of every track is an array (d, n), a matrix (a, b, n). Every operation is an elementwise
+one over the last axis, so that a track's result is the same to the bit however many others are
+computed with it; sums run over components in a fixed order.
+"""
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+
+
+def product(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return left · right for matrices (a, k, n) and (k, b, n)."""
+    total = left[:, 0, np.newaxis] * right[np.newaxis, 0]
+    for k in range(1, left.shape[1]):
+        total += left[:, k, np.newaxis] * right[np.newaxis, k]
+    return total
+
+
+def product_transposed(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return left · rightᵀ for matrices (a, k, n) and (b, k, n)."""
+    return product(left, right.swapaxes(0, 1))
+
+
+def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return matrix · vector for (a, k, n) and (k, n)."""
+    total = matrix[:, 0] * vector[0]
+    for k in range(1, matrix.shape[1]):
+        total += matrix[:, k] * vector[k]
+    return total
+
+
+def symmetric(matrix: FloatArray) -> FloatArray:
+    """Return the mean of matrices (d, d, n) and their transposes."""
+    return 0.5 * (matrix + matrix.swapaxes(0, 1))
+
+
+def cholesky(matrix: FloatArray) -> FloatArray:
+    """Return the lower triangular roots of positive definite matrices.
+
+    Parameters
+    ----------
+    matrix : (d, d, n)
+
+    Returns
+    -------
+    ndarray of shape (d, d, n)
+        NaN from the first pivot on that is not positive.
+    """
+    size = len(matrix)
+    root = np.zeros_like(matrix)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for j in range(size):
+            pivot = matrix[j, j].copy()
+            for k in range(j):
+                pivot -= root[j, k] * root[j, k]
+            root[j, j] = np.sqrt(np.where(pivot > 0.0, pivot, np.nan))
+            for i in range(j + 1, size):
+                value = matrix[i, j].copy()
+                for k in range(j):
+                    value -= root[i, k] * root[j, k]
+                root[i, j] = value / root[j, j]
+    return root
+
+
+def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
+    """Return root⁻¹ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
+    found = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    for i in range(len(root)):
+        value = right[i]
+        for k in range(i):
+            value = value - root[i, k] * found[k]
+        found[i] = value / root[i, i]
+    return found
+
+
+def solve_upper(root: FloatArray, right: FloatArray) -> FloatArray:
+    """Return root⁻ᵀ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
+    size = len(root)
+    found = np.empty(np.broadcast_shapes(right.shape, right.shape[:-1] + root.shape[-1:]))
+    for i in range(size - 1, -1, -1):
+        value = right[i]
+        for k in range(i + 1, size):
+            value = value - root[k, i] * found[k]
+        found[i] = value / root[i, i]
+    return found
+
+
+def squared_length(vector: FloatArray) -> FloatArray:
+    """Return the sum of squares over components, (d, n) → (n,)."""
+    total = vector[0] * vector[0]
+    for value in vector[1:]:
+        total += value * value
+    return total
+
+
+def log_determinant(root: FloatArray) -> FloatArray:
+    """Return the logarithm of the determinant of the matrices whose roots these are."""
+    total = np.log(root[0, 0])
+    for i in range(1, len(root)):
+        total = total + np.log(root[i, i])
+    return 2.0 * total

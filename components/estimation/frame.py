@@ -1,0 +1,80 @@
+"""The frame of tracks: north, east, down at a point that is written down, and poses in it.
+
+The frame is Cartesian: its axes are those of the horizon at the origin and stay parallel to
+themselves, so that straight flight stays straight and the Earth's curvature enters exactly, by the
+place and the axes of the sensor in the frame. Level flight away from the origin sinks in it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.geometry.attitude import ned_to_body_unchecked
+from components.geometry.ellipsoid import north_east_up
+from components.geometry.normals import local_axes
+from dsa_des.arrays.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where sensors are and how they are turned, in frames.
+
+    Parameters
+    ----------
+    position_m : (3, n)
+        Of the sensor in the frame.
+    to_body : (3, 3, n)
+        Turns a vector of the frame into body axes: nose, right wing, floor.
+    velocity_m_s : (3, n) or None
+        Of the sensor in the frame; needed where range rates are measured.
+    """
+
+    position_m: FloatArray
+    to_body: FloatArray
+    velocity_m_s: FloatArray | None = None
+
+    def take(self, which: IntArray) -> "Place":
+        """Return some of the places."""
+        velocity = None if self.velocity_m_s is None else self.velocity_m_s[:, which]
+        return Place(self.position_m[:, which], self.to_body[:, :, which], velocity)
+
+
+def place_in_frame(
+    origin_deg_m: tuple[FloatArray, FloatArray, FloatArray],
+    position_deg_m: tuple[FloatArray, FloatArray, FloatArray],
+    attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
+) -> Place:
+    """Return where poses are in frames.
+
+    Parameters
+    ----------
+    origin_deg_m : three arrays (n,)
+        Latitude and longitude (deg) and height above the ellipsoid (m) of each frame's origin.
+    position_deg_m : three arrays (n,)
+        The same of the aircraft that bears the sensor.
+    attitude_rad : three arrays (n,)
+        Its heading, pitch and roll, in the north, east, down of its own place.
+
+    Returns
+    -------
+    Place
+    """
+    lat, lon, alt = position_deg_m
+    north, east, up = north_east_up(*origin_deg_m, lat, lon, alt)
+    there, here = _ned_axes(lat, lon), _ned_axes(origin_deg_m[0], origin_deg_m[1])
+    turned = np.empty((3, 3, np.size(lat)))
+    for j in range(3):
+        # Axis j of the frame, along the axes of the aircraft's own horizon.
+        n, e, d = (_dot(axis, here[j]) for axis in there)
+        turned[:, j] = np.stack(ned_to_body_unchecked(n, e, d, *attitude_rad))
+    return Place(np.stack([north, east, -up]), turned)
+
+
+def _ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
+    """Return north, east and down of places, in Earth-centred axes, each (3, n)."""
+    east, north, up = (np.stack(axis) for axis in local_axes(lat_deg, lon_deg))
+    return [north, east, -up]
+
+
+def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

@@ -1,0 +1,141 @@
+"""The extended Kalman filter's update, and how far a measurement lies from a track.
+
+Sources: Bar-Shalom, Li, Kirubarajan (2001), §10.3; the Joseph form is eq. 7.3.4-4 of Bucy, Joseph
+(1968) and keeps a covariance symmetric and positive whatever the gain's rounding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.estimation.batched import (
+    cholesky,
+    log_determinant,
+    product,
+    product_transposed,
+    solve_lower,
+    solve_upper,
+    squared_length,
+    symmetric,
+)
+from dsa_des.arrays.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Innovation:
+    """What a filter expects of a measurement, and how its covariance relates to it.
+
+    Parameters
+    ----------
+    expected : (m, n)
+    root : (m, m, n)
+        Lower triangular root of the covariance of the residual.
+    cross : (d, m, n)
+        Covariance of the state with the measurement.
+    jacobian : (m, d, n)
+        Of the measurement by the state; for an unscented filter the regression's slope.
+    spread : (m, n) or (m, m, n)
+        Variances of the measurement's own errors; for an unscented filter with what the
+        regression leaves over, which makes it a matrix.
+    """
+
+    expected: FloatArray
+    root: FloatArray
+    cross: FloatArray
+    jacobian: FloatArray
+    spread: FloatArray
+
+    def take(self, which: IntArray) -> "Innovation":
+        """Return those of some tracks."""
+        return Innovation(
+            self.expected[..., which], self.root[..., which], self.cross[..., which],
+            self.jacobian[..., which], self.spread[..., which],
+        )  # fmt: skip
+
+
+def innovation(
+    expected: FloatArray, jacobian: FloatArray, covariance: FloatArray, variance: FloatArray
+) -> Innovation:
+    """Return the innovation of an extended Kalman filter.
+
+    Parameters
+    ----------
+    expected : (m, n)
+    jacobian : (m, k, n)
+        By the first k components of the state; the others do not enter.
+    covariance : (d, d, n)
+        Of the predicted state.
+    variance : (m, n)
+        Of the measurement's errors, which are independent of each other.
+    """
+    known = jacobian.shape[1]
+    cross = product_transposed(covariance[:, :known], jacobian)
+    total = product(jacobian, cross[:known])
+    for i in range(len(total)):
+        total[i, i] += variance[i]
+    return Innovation(expected, cholesky(total), cross, jacobian, variance)
+
+
+def updated(
+    state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return state and covariance after a measurement, in Joseph form.
+
+    Parameters
+    ----------
+    state : (d, n)
+    covariance : (d, d, n)
+    found : Innovation
+    residual : (m, n)
+        Measured less expected.
+
+    Returns
+    -------
+    state, covariance : arrays of the same shapes
+    """
+    gain = gain_of(found)
+    moved = state.copy()
+    for k in range(len(residual)):
+        moved += gain[:, k] * residual[k]
+    return moved, joseph(covariance, gain, found)
+
+
+def gain_of(found: Innovation) -> FloatArray:
+    """Return the gain, (d, m, n)."""
+    weighted = solve_upper(found.root, solve_lower(found.root, found.cross.swapaxes(0, 1)))
+    return weighted.swapaxes(0, 1)
+
+
+def joseph(covariance: FloatArray, gain: FloatArray, found: Innovation) -> FloatArray:
+    """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n)."""
+    known = found.jacobian.shape[1]
+    left = -product(gain, found.jacobian)
+    for i in range(known):
+        left[i, i] += 1.0
+    shrunk = _applied(left, covariance)
+    spread = _applied(left, shrunk.swapaxes(0, 1))
+    if found.spread.ndim == 2:
+        weighted = gain * np.sqrt(found.spread)
+    else:
+        weighted = product(gain, cholesky(found.spread))
+    spread += product_transposed(weighted, weighted)
+    return symmetric(spread)
+
+
+def _applied(left: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return (left beside the rest of the identity) · matrix."""
+    known = left.shape[1]
+    found = product(left, matrix[:known])
+    found[known:] += matrix[known:]
+    return found
+
+
+def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:
+    """Return the squared Mahalanobis distance of residuals (m, n), shape (n,)."""
+    return squared_length(solve_lower(found.root, residual))
+
+
+def log_likelihood(found: Innovation, distance: FloatArray) -> FloatArray:
+    """Return the logarithm of the density of measurements at squared distances, (n,)."""
+    many = len(found.root)
+    return -0.5 * (distance + log_determinant(found.root) + many * np.log(2.0 * np.pi))

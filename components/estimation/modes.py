@@ -1,0 +1,169 @@
+"""Several motion models at once: interacting multiple models (IMM) over many tracks.
+
+Between looks a target may change its model, as a Markov chain in continuous time: rates per second,
+so that the mixing follows the time between looks whatever the sensors' scan rates.
+
+Sources: Blom, Bar-Shalom, IEEE Trans. AC 33 (1988); Bar-Shalom, Li, Kirubarajan (2001), §11.6.6.
+Models of different states are mixed by the components they share; what a model has alone keeps its
+own mean and spread (Granström, Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal
+dimension states*, IEEE Trans. AES 51 (2015), the unbiased choice).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from components.estimation.batched import symmetric
+from dsa_des.arrays.types import FloatArray
+
+# Terms of the exponential's series, exact to a double for |rate · time| of at most 1/8.
+_TERMS = 12
+# No mode is less likely than this before a look: its chance to come back is not lost to underflow.
+_LEAST = 1e-250
+
+
+def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
+    """Return the probabilities to go from one model to another within a time.
+
+    Parameters
+    ----------
+    rates_per_s : (modes, modes)
+        Rates from the row's model to the column's; the diagonal is not read.
+    dt_s : (n,)
+
+    Returns
+    -------
+    ndarray of shape (modes, modes, n)
+        The exponential of the generator; rows sum to 1.
+    """
+    generator = np.array(rates_per_s, dtype=float)
+    np.fill_diagonal(generator, 0.0)
+    np.fill_diagonal(generator, -generator.sum(axis=1))
+    size = len(generator)
+    fastest = float(np.max(-np.diag(generator), initial=0.0))
+    most = fastest * float(np.max(dt_s, initial=0.0))
+    # The number of squarings must not depend on who else is in the batch: one for each octave.
+    with np.errstate(divide="ignore"):
+        octave = np.ceil(np.log2(np.maximum(8.0 * fastest * dt_s, 1.0)))
+    squarings = octave.astype(np.int64) if most > 0 else np.zeros(len(dt_s), dtype=np.int64)
+    # Uniformised: exp(A) = exp(-u) exp(A + u I), every term positive, so that nothing cancels.
+    short = dt_s / np.exp2(squarings)
+    positive = (generator + fastest * np.eye(size))[:, :, np.newaxis] * short
+    identity = np.repeat(np.eye(size)[:, :, np.newaxis], len(dt_s), axis=2)
+    total = identity.copy()
+    for term in range(_TERMS, 0, -1):
+        total = identity + _product(positive, total) / term
+    total = total * np.exp(-fastest * short)
+    for done in range(int(squarings.max(initial=0))):
+        total = np.where(squarings > done, _product(total, total), total)
+    sums = total.sum(axis=1, keepdims=True)
+    return total / sums
+
+
+def mixed(
+    states: Sequence[FloatArray],
+    covariances: Sequence[FloatArray],
+    probabilities: FloatArray,
+    transitions: FloatArray,
+) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+    """Return what each model starts from, and the models' probabilities before the look.
+
+    Parameters
+    ----------
+    states : sequence of (d_i, n)
+        Position and velocity first; components after the sixth are shared by models of the same
+        size only.
+    covariances : sequence of (d_i, d_i, n)
+    probabilities : (modes, n)
+    transitions : (modes, modes, n)
+
+    Returns
+    -------
+    states, covariances, probabilities
+    """
+    many = len(states)
+    predicted = np.stack(
+        [_sum([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+    )
+    predicted = np.maximum(predicted, _LEAST)
+    new_states, new_covariances = [], []
+    for j in range(many):
+        weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
+        sizes = [_shared(states[i], states[j]) for i in range(many)]
+        given = [_filled(states[i], states[j], sizes[i]) for i in range(many)]
+        state = _sum([w * x for w, x in zip(weights, given, strict=True)])
+        covariance = np.zeros_like(covariances[j])
+        for i in range(many):
+            apart = given[i] - state
+            whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
+            covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
+        new_states.append(state)
+        new_covariances.append(symmetric(covariance))
+    return new_states, new_covariances, predicted
+
+
+def combined(
+    states: Sequence[FloatArray], covariances: Sequence[FloatArray], probabilities: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and covariance of position and velocity over the models.
+
+    Returns
+    -------
+    state : (6, n)
+    covariance : (6, 6, n)
+    """
+    many = len(states)
+    state = _sum([probabilities[i] * states[i][:6] for i in range(many)])
+    covariance = np.zeros((6, 6, state.shape[1]))
+    for i in range(many):
+        apart = states[i][:6] - state
+        covariance += probabilities[i] * (
+            covariances[i][:6, :6] + apart[:, np.newaxis] * apart[np.newaxis]
+        )
+    return state, symmetric(covariance)
+
+
+def reweighted(probabilities: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
+    """Return the models' probabilities after a look, (modes, n), from those before it."""
+    with np.errstate(divide="ignore"):
+        logs = np.log(probabilities) + log_likelihoods
+    weights = np.exp(logs - logs.max(axis=0))
+    return weights / _sum(list(weights))
+
+
+def _shared(one: FloatArray, other: FloatArray) -> int:
+    return len(one) if len(one) == len(other) else 6
+
+
+def _filled(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
+    return given[:shared] if shared == len(own) else np.concatenate([given[:6], own[6:]])
+
+
+def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
+    if shared == len(own):
+        return given[:shared, :shared]
+    whole = np.zeros_like(own)
+    whole[:6, :6] = given[:6, :6]
+    whole[6:, 6:] = own[6:, 6:]
+    return whole
+
+
+def _product(left: FloatArray, right: FloatArray) -> FloatArray:
+    return np.stack(
+        [
+            np.stack(
+                [
+                    _sum([left[i, k] * right[k, j] for k in range(len(left))])
+                    for j in range(len(left))
+                ]
+            )
+            for i in range(len(left))
+        ]
+    )
+
+
+def _sum(parts: list[FloatArray]) -> FloatArray:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total

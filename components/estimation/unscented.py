@@ -1,0 +1,125 @@
+"""The unscented Kalman filter: the same update with moments taken from sigma points.
+
+Source: Julier, Uhlmann, *Unscented filtering and nonlinear estimation*, Proc. IEEE 92 (2004);
+weights of Wan, van der Merwe (2000). Means of angles are those of unit vectors.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.estimation.batched import (
+    cholesky,
+    product,
+    product_transposed,
+    solve_lower,
+    solve_upper,
+    symmetric,
+)
+from components.estimation.frame import Place
+from components.estimation.kalman import Innovation
+from components.estimation.measurement import Kind, expected, residual
+from components.estimation.motion import Motion
+from dsa_des.arrays.types import FloatArray
+
+
+@dataclass(frozen=True)
+class SigmaPoints:
+    """How sigma points are spread and weighted.
+
+    Parameters
+    ----------
+    alpha, beta, kappa : float
+        Spread, knowledge of the distribution (2 for a Gaussian), and second spread. With the
+        defaults no weight is negative, so that no covariance can lose its sign.
+    """
+
+    alpha: float = 1.0
+    beta: float = 2.0
+    kappa: float = 0.0
+
+    def weights(self, size: int) -> tuple[FloatArray, FloatArray, float]:
+        """Return weights of means and covariances, (2 d + 1,), and the spread d + lambda."""
+        spread = self.alpha**2 * (size + self.kappa)
+        mean = np.full(2 * size + 1, 0.5 / spread)
+        mean[0] = (spread - size) / spread
+        covariance = mean.copy()
+        covariance[0] += 1.0 - self.alpha**2 + self.beta
+        return mean, covariance, spread
+
+    def of(self, state: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Return the points of states (d, n), shape (d, 2 d + 1, n)."""
+        size = len(state)
+        apart = cholesky(covariance) * np.sqrt(self.weights(size)[2])
+        points = np.repeat(state[:, np.newaxis], 2 * size + 1, axis=1)
+        points[:, 1 : size + 1] += apart
+        points[:, size + 1 :] -= apart
+        return points
+
+
+def predict_unscented(
+    model: Motion,
+    state: FloatArray,
+    covariance: FloatArray,
+    dt_s: FloatArray,
+    sigma: SigmaPoints,
+) -> tuple[FloatArray, FloatArray]:
+    """Return state and covariance after a time, with moments of moved sigma points."""
+    size, count = state.shape
+    of_mean, of_covariance, _ = sigma.weights(size)
+    points = sigma.of(state, covariance)
+    many = points.shape[1]
+    moved = model.move(points.reshape(size, -1), np.tile(dt_s, many)).reshape(size, many, count)
+    mean = _weighted(moved, of_mean)
+    apart = moved - mean[:, np.newaxis]
+    spread = product_transposed(apart * of_covariance[:, np.newaxis], apart)
+    return mean, symmetric(spread + model.noise(dt_s))
+
+
+def unscented_innovation(
+    kind: Kind,
+    state: FloatArray,
+    covariance: FloatArray,
+    place: Place,
+    variance: FloatArray,
+    sigma: SigmaPoints,
+) -> Innovation:
+    """Return the innovation with the moments of sigma points.
+
+    The slope that it bears is that of statistical linearisation, Cᵀ P⁻¹, and its spread what the
+    slope leaves over: with both, the Joseph form gives P - K S Kᵀ and stays positive.
+    """
+    size, count = state.shape
+    of_mean, of_covariance, _ = sigma.weights(size)
+    points = sigma.of(state, covariance)
+    many = points.shape[1]
+    places = Place(
+        np.tile(place.position_m, many),
+        np.tile(place.to_body, many),
+        None if place.velocity_m_s is None else np.tile(place.velocity_m_s, many),
+    )
+    seen = expected(kind, points.reshape(size, -1), places).reshape(kind.size, many, count)
+    mean = _weighted(seen, of_mean)
+    for angle in range(2):
+        sin = _weighted(np.sin(seen[angle])[np.newaxis], of_mean)[0]
+        cos = _weighted(np.cos(seen[angle])[np.newaxis], of_mean)[0]
+        mean[angle] = np.arctan2(sin, cos)
+    flat = np.repeat(mean[:, np.newaxis], many, axis=1).reshape(kind.size, -1)
+    apart = residual(seen.reshape(kind.size, -1), flat).reshape(seen.shape)
+    weighted = apart * of_covariance[:, np.newaxis]
+    total = product_transposed(weighted, apart)
+    cross = product_transposed(points - state[:, np.newaxis], weighted)
+    root = cholesky(covariance)
+    slope = solve_upper(root, solve_lower(root, cross)).swapaxes(0, 1)
+    left_over = symmetric(total - product(slope, cross))
+    for i in range(kind.size):
+        total[i, i] += variance[i]
+        left_over[i, i] += variance[i]
+    return Innovation(mean, cholesky(symmetric(total)), cross, slope, left_over)
+
+
+def _weighted(points: FloatArray, weights: FloatArray) -> FloatArray:
+    total = weights[0] * points[:, 0]
+    for k in range(1, points.shape[1]):
+        total += weights[k] * points[:, k]
+    return total

@@ -1,0 +1,145 @@
+"""The earliest way out of a violation that cannot be avoided."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.configuration import Configuration
+from components.guidance.intervals import Interval
+from components.guidance.kinds import Conflicts, kind_of
+from components.guidance.regions import GuidedIntruders, Regions, any_interval, intervals_of
+from components.guidance.situation import Detector, State
+from dsa_des.arrays.types import BoolArray, FloatArray
+
+# The search for the earliest recovery ends when it is known this well, s.
+_SEARCHED_S = 0.5
+
+
+class Recovery(NamedTuple):
+    """How a violation that cannot be avoided is left.
+
+    Parameters
+    ----------
+    time_s : float
+        From when on the volume is clear; minus infinity where nothing avoids a collision.
+    cylinder_m : (float, float)
+        Radius and half height that stay clear until then.
+    shrinks : int
+        How often the cylinder was made smaller.
+    """
+
+    time_s: float
+    cylinder_m: tuple[float, float]
+    shrinks: int
+
+
+def recover(
+    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruders]
+) -> list[tuple[Recovery, list[Interval]]]:
+    """Return the earliest recovery of each of r ownships, and the values that lead to it.
+
+    Parameters
+    ----------
+    kind_name : str
+        As in `components.guidance.kinds.kind_of`.
+    configuration : Configuration
+    own : State of (r,)
+    intruders : list of GuidedIntruders
+    """
+    return _Search(kind_name, configuration, own, intruders).run()
+
+
+class _Search:
+    """The search of r ownships; rows for whom it has ended are left as they are."""
+
+    def __init__(
+        self,
+        kind_name: str,
+        configuration: Configuration,
+        own: State,
+        intruders: list[GuidedIntruders],
+    ) -> None:
+        self._configuration = configuration
+        self._lookahead_s: float = configuration["lookahead_time"]
+        self._kind = kind_of(kind_name, own, configuration)
+        self._intruders = intruders
+        regions = Regions(configuration, self._kind, own, intruders)
+        _, self._concerned = regions.concerned(configuration["corrective_region"])
+        self._volumes = [regions.conflicts(one.place, one.volume) for one in self._concerned]
+        # Cylinder about each intruder that counts, of the sizes that are tried.
+        self._cylinders: list[Conflicts] = []
+
+    def run(self) -> list[tuple[Recovery, list[Interval]]]:
+        """Make the cylinder smaller until it leaves a way, and find from when on."""
+        values = self._configuration
+        nmac = values["horizontal_nmac"], values["vertical_nmac"]
+        count = len(self._kind.own_value)
+        found: list[tuple[Recovery, list[Interval]] | None] = [None] * count
+        self._try(nmac)
+        on = self._leads(self._clear_of_cylinder())
+        for row in np.flatnonzero(~on).tolist():
+            found[row] = Recovery(-math.inf, nmac, 0), []
+        sizes = values["min_horizontal_recovery"], values["min_vertical_recovery"]
+        shrinks = 0
+        while on.any():
+            self._try(sizes)
+            leads = on & self._leads(self._clear_of_cylinder())
+            if leads.any():
+                time_s = self._earliest(leads)
+                clear = self._clear_at(time_s[:, np.newaxis])
+                leads &= self._leads(clear)
+                for row in np.flatnonzero(leads).tolist():
+                    recovery = Recovery(float(time_s[row]), sizes, shrinks)
+                    found[row] = recovery, intervals_of(self._kind, row, clear)
+                on &= ~leads
+            if not values["ca_bands"] or sizes == nmac:
+                for row in np.flatnonzero(on).tolist():
+                    found[row] = Recovery(-math.inf, sizes, shrinks), []
+                break
+            factor = 1.0 - values["ca_factor"]
+            sizes = max(nmac[0], sizes[0] * factor), max(nmac[1], sizes[1] * factor)
+            shrinks += 1
+        return [one for one in found if one is not None]
+
+    def _try(self, sizes: tuple[float, float]) -> None:
+        self._cylinders = [
+            self._kind.against(
+                self._intruders[one.place].state.columns(), Detector(cylinder_m=sizes)
+            )
+            for one in self._concerned
+        ]
+
+    def _leads(self, clear: BoolArray) -> BoolArray:
+        return any_interval(self._kind, clear)
+
+    def _clear_of_cylinder(self) -> BoolArray:
+        """Tell which values keep clear of the cylinder alone."""
+        clear = self._kind.there.copy()
+        for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
+            unsafe = cylinder.unsafe(0.0, self._lookahead_s)
+            clear &= ~(unsafe & one.of_whom[:, np.newaxis])
+        return clear
+
+    def _clear_at(self, time_s: FloatArray) -> BoolArray:
+        """Tell which values keep clear of the cylinder until a time (r, 1), and of all then."""
+        clear = self._kind.there.copy()
+        of_all = zip(self._concerned, self._volumes, self._cylinders, strict=True)
+        for one, volume, cylinder in of_all:
+            unsafe = volume.unsafe(time_s, self._lookahead_s) | cylinder.unsafe_before(time_s)
+            clear &= ~(unsafe & one.of_whom[:, np.newaxis])
+        return clear
+
+    def _earliest(self, on: BoolArray) -> FloatArray:
+        """Return the earliest time from which on the volume is clear, with that of stability."""
+        count = len(on)
+        red, green = np.zeros(count), np.full(count, self._lookahead_s + 1.0)
+        probe = np.full(count, self._lookahead_s)
+        while on.any():
+            leads = self._leads(self._clear_at(probe[:, np.newaxis]))
+            green = np.where(on & leads, probe, green)
+            red = np.where(on & ~leads, probe, red)
+            probe = 0.5 * (red + green)
+            on = on & (green - red > _SEARCHED_S)
+        stable = green + self._configuration["recovery_stability_time"]
+        return np.where(green <= self._lookahead_s, np.minimum(self._lookahead_s, stable), red)

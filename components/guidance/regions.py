@@ -1,0 +1,182 @@
+"""Which values lead clear of the volumes of a region, and whose volumes count."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from components.alert_configuration.configuration import Alerter, Configuration, Level
+from components.guidance.intervals import Interval, clear_intervals
+from components.guidance.kinds import Conflicts, ManoeuvreKind
+from components.guidance.situation import Detector, State
+from components.well_clear.nearly import surely_less
+from components.well_clear.volume import Volume
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+
+class GuidedIntruders(NamedTuple):
+    """One intruder of each of n ownships.
+
+    Parameters
+    ----------
+    state : State of (n,)
+        In the plane of its ownship.
+    alerter : Alerter
+        Of all of them.
+    early_level : (n,) of int
+        The level whose early alerting time counts; 0 for none.
+    present : (n,) of bool, optional
+        Where there is such an intruder; by default everywhere.
+    """
+
+    state: State
+    alerter: Alerter
+    early_level: IntArray
+    present: BoolArray | None = None
+
+    def rows(self, which: AnyArray) -> "GuidedIntruders":
+        """Return those of some ownships."""
+        present = None if self.present is None else self.present[which]
+        return GuidedIntruders(
+            self.state.rows(which), self.alerter, self.early_level[which], present
+        )
+
+    def is_there(self) -> BoolArray:
+        """Return where there is an intruder."""
+        if self.present is None:
+            return np.ones(len(self.early_level), dtype=bool)
+        return self.present
+
+
+class Concerned(NamedTuple):
+    """An intruder whose volume of a region counts, of some ownships.
+
+    Parameters
+    ----------
+    place : int
+        Which of the intruders.
+    volume : Volume
+    of_whom : (n,) of bool
+    horizon_s : (n, 1)
+        How long after a manoeuvre.
+    """
+
+    place: int
+    volume: Volume
+    of_whom: BoolArray
+    horizon_s: FloatArray
+
+
+class Regions:
+    """Regions of guidance around n ownships.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    kind : ManoeuvreKind
+        Of the ownships.
+    own : State of (n,)
+    intruders : list of GuidedIntruders
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        kind: ManoeuvreKind,
+        own: State,
+        intruders: list[GuidedIntruders],
+    ) -> None:
+        self._configuration, self._kind, self._own = configuration, kind, own
+        self._intruders = intruders
+        self._lookahead_s = configuration["lookahead_time"]
+        # Levels often share a volume; what it is met by is found once.
+        self._conflicts: dict[tuple[int, Volume], Conflicts] = {}
+        self._begins: dict[tuple[int, Volume], FloatArray] = {}
+        self._concerned: dict[str, tuple[BoolArray, list[Concerned]]] = {}
+
+    def conflicts(self, place: int, volume: Volume) -> Conflicts:
+        """Return when the manoeuvres meet a volume about an intruder."""
+        if (place, volume) not in self._conflicts:
+            state = self._intruders[place].state.columns()
+            self._conflicts[place, volume] = self._kind.against(state, Detector(volume))
+        return self._conflicts[place, volume]
+
+    def concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
+        """Return for whom any level has the region, and whose volumes count."""
+        if region not in self._concerned:
+            self._concerned[region] = self._find_concerned(region)
+        return self._concerned[region]
+
+    def clear(self, region: str) -> tuple[BoolArray, BoolArray]:
+        """Return for whom any level has the region, and which values (n, k) lead clear of it."""
+        known, concerned = self.concerned(region)
+        clear = self._kind.there.copy()
+        for one in concerned:
+            unsafe = self.conflicts(one.place, one.volume).unsafe(0.0, one.horizon_s)
+            clear &= ~(unsafe & one.of_whom[:, np.newaxis])
+        return known, clear
+
+    def leads(self, clear: BoolArray) -> BoolArray:
+        """Tell of whom any interval of values is clear: two neighbours within the limits."""
+        return any_interval(self._kind, clear)
+
+    def inside_corrective(self) -> BoolArray:
+        """Tell who is inside the corrective volume of an intruder now."""
+        inside = np.zeros(len(self._own.up_m), dtype=bool)
+        for place, intruder in enumerate(self._intruders):
+            level = self._configuration.corrective_level(intruder.alerter)
+            if level is not None:
+                inside |= (self._begin_s(place, level.volume) == 0.0) & intruder.is_there()
+        return inside
+
+    def _begin_s(self, place: int, volume: Volume) -> FloatArray:
+        """Return when the flights as they are meet a volume, within the lookahead."""
+        if (place, volume) not in self._begins:
+            relative = self._own.less(self._intruders[place].state)
+            span = Detector(volume).span(relative, 0.0, self._lookahead_s)
+            self._begins[place, volume] = span.begin_s
+        return self._begins[place, volume]
+
+    def _find_concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
+        known = np.zeros(len(self._own.up_m), dtype=bool)
+        found = []
+        for place, intruder in enumerate(self._intruders):
+            numbered = _level_of(intruder.alerter, region)
+            if numbered is None:
+                continue
+            number, level = numbered
+            there = intruder.is_there()
+            known |= there
+            begin_s = self._begin_s(place, level.volume)
+            early = intruder.early_level == number
+            due_s = np.where(early, level.early_alerting_time_s, level.alerting_time_s)
+            ahead = (begin_s == 0.0) | surely_less(begin_s, due_s)
+            soon_s = min(level.alerting_time_s, self._lookahead_s)
+            horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
+            met = self.conflicts(place, level.volume).soon(0.0, horizon_s).any(axis=1)
+            of_whom = there & (ahead | met)
+            if of_whom.any():
+                found.append(Concerned(place, level.volume, of_whom, horizon_s))
+        return known, found
+
+
+def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
+    """Tell in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
+    both = clear[:, :-1] & clear[:, 1:]
+    if not kind.cyclic:
+        low = np.maximum(kind.values[:, :-1], kind.least)
+        both &= low < np.minimum(kind.values[:, 1:], kind.most)
+    return np.asarray(both.any(axis=1))
+
+
+def intervals_of(kind: ManoeuvreKind, row: int, clear: BoolArray) -> list[Interval]:
+    """Return the intervals of values of one ownship that are clear."""
+    there = kind.there[row]
+    values = kind.values[row][there]
+    return clear_intervals(values, clear[row][there], kind.least, kind.most, kind.cyclic)
+
+
+def _level_of(alerter: Alerter, region: str) -> tuple[int, Level] | None:
+    for number, level in enumerate(alerter.levels, start=1):
+        if level.region == region:
+            return number, level
+    return None
