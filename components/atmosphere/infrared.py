@@ -168,7 +168,7 @@ def continuum_per_km(
 
 
 def _continuum(
-    wavelength_um: FloatArray, density: FloatArray, temperature: FloatArray, pressure: FloatArray
+    wavelength_um: Any, density: FloatArray, temperature: FloatArray, pressure: FloatArray
 ) -> FloatArray:
     wavenumber = 1e4 / wavelength_um
     strength = 4.18 + 5578.0 * np.exp(-7.87e-3 * wavenumber)
@@ -211,15 +211,15 @@ def long_wave_transmission(
         own_alt_m=finite("own_alt_m", own_alt_m),
         target_alt_m=finite("target_alt_m", target_alt_m),
     )
-    low, high = BANDS["lwir"]
-    wavelengths = 0.5 * (low + high) + 0.5 * (high - low) * _NODES
+    first, last = BANDS["lwir"]
+    wavelengths = (0.5 * (first + last) + 0.5 * (last - first) * _NODES).tolist()
     depth = np.zeros((len(wavelengths), len(distance)))
-    for node, weight in zip(_ALONG, _ALONG_WEIGHTS, strict=True):
+    for node, weight in zip(_ALONG.tolist(), _ALONG_WEIGHTS.tolist(), strict=True):
         altitude = np.clip(own + (0.5 + 0.5 * node) * (target - own), -5e3, 8e4)
         pressure, temperature, density = standard_atmosphere(
             altitude, sea_level_vapour_density_g_m3=sea_level_vapour_density_g_m3
         )
-        for row, wavelength in enumerate(wavelengths.tolist()):
+        for row, wavelength in enumerate(wavelengths):
             depth[row] += 0.5 * weight * _continuum(wavelength, density, temperature, pressure)
     with np.errstate(under="ignore"):
         left = np.exp(-depth * (1e-3 * distance))
@@ -268,7 +268,7 @@ def haze_share(visibility_m: ArrayLike, band: str) -> Any:
 
 
 def band_extinction_per_m(
-    band: str, *, haze_visibility_m: float | None = None, rain_extinction_per_m: float = 0.0
+    band: str, haze_visibility_m: float | None = None, rain_extinction_per_m: float = 0.0
 ) -> float:
     """Return what haze, fog and rain take from a band, per metre.
 

@@ -85,7 +85,7 @@ class BandExtinction(Effect):
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
         density = weather.vapour_density_g_m3
-        extinction = band_extinction_per_m(band, **_obscuration(weather))
+        extinction = band_extinction_per_m(band, *_obscuration(weather))
 
         def factor(cells: Cells) -> FloatArray:
             path = cells.range_m, cells.of_row("own_alt_m"), cells.alt_m
@@ -126,20 +126,16 @@ def own_band(block: Any) -> str | None:
     return band if band in BANDS else None
 
 
-def _obscuration(weather: Weather) -> dict[str, float | None]:
-    """Return the visibility in haze or fog alone, and the extinction by rain."""
+def _obscuration(weather: Weather) -> tuple[float | None, float]:
+    """Return the visibility in haze or fog alone (m), and the extinction by rain (1/m)."""
     rain = float(rain_extinction_per_m(weather.rain_rate_mm_h))
     if weather.visibility_km is not None:
         # The scene's visibility is that of all together: what rain does not take is haze.
-        haze = KOSCHMIEDER / (weather.visibility_km * 1000.0) - rain
-        if haze <= 0.0:
-            total = KOSCHMIEDER / (weather.visibility_km * 1000.0)
-            return {"haze_visibility_m": None, "rain_extinction_per_m": total}
-        return {"haze_visibility_m": KOSCHMIEDER / haze, "rain_extinction_per_m": rain}
+        total = KOSCHMIEDER / (weather.visibility_km * 1000.0)
+        return (KOSCHMIEDER / (total - rain), rain) if total > rain else (None, total)
     if weather.fog_water_g_m3 > 0:
-        fog_m = float(fog_visibility_m(weather.fog_water_g_m3))
-        return {"haze_visibility_m": fog_m, "rain_extinction_per_m": rain}
-    return {"haze_visibility_m": None, "rain_extinction_per_m": rain}
+        return float(fog_visibility_m(weather.fog_water_g_m3)), rain
+    return None, rain
 
 
 def scene_visibility_m(weather: Weather) -> float | None:
