@@ -36,6 +36,7 @@ def recorded_tables() -> dict[str, Mapping[str, str]]:
     messages: list[type[Message]] = [Processing]
     for name in registered():
         messages += [output.message for output in find(name).outputs.values()]
+        messages += find(name).also_records
     return {table: columns for m in messages for table, columns in sorted(m.recorded.items())}
 
 

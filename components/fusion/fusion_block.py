@@ -42,6 +42,7 @@ class Fusion(Component):
     mark = FUSION
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
+    also_records = (FusedWithPose,)
     windowed = True
     rewindable = True
 

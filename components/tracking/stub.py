@@ -47,6 +47,7 @@ class TrackerStub(Component):
     mark = TRACKER
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
     outputs = {"tracks": Output(Tracks, "What is held of every target.")}
+    also_records = (TracksWithPose,)
     Parameters = StubParameters
     windowed = True
     lockstep = True

@@ -216,6 +216,8 @@ class Component:
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.block.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: Message types that `records` may name beside those of the outputs.
+    also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
     #: How figures mark it; a neutral one by default.
