@@ -37,7 +37,11 @@ def recorded_tables() -> dict[str, Mapping[str, str]]:
     for name in registered():
         messages += [output.message for output in find(name).outputs.values()]
         messages += find(name).also_records
-    return {table: columns for m in messages for table, columns in sorted(m.recorded.items())}
+    found: dict[str, dict[str, str]] = {}
+    for message in messages:
+        for table, columns in sorted(message.recorded.items()):
+            found.setdefault(table, {}).update(columns)
+    return found
 
 
 def page() -> str:
