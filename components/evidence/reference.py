@@ -5,7 +5,7 @@
 
 import inspect
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ scenes that extend others (`[blocks.traffic.intruders.head_on]`).
 """
 
 
-def recorded_tables() -> dict[str, Mapping[str, str]]:
+def recorded_tables() -> dict[str, dict[str, str]]:
     """Return table → column → type of all that registered blocks and processors record."""
     messages: list[type[Message]] = [Processing]
     for name in registered():
