@@ -8,6 +8,7 @@ from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.range_rate import RangeRate
 from components.radar.resolution_effects import OneReportByCell
 from components.sensor.look import Cells, Look
 
@@ -30,7 +31,7 @@ class RangeBoundary(Radar):
 
     Parameters = RangeBoundaryParameters
     lockstep = True
-    effects = (BlindRange(), OneReportByCell(), BeamSweep())
+    effects = (RangeRate(), BlindRange(), OneReportByCell(), BeamSweep())
     ladders = (DETECTION,)
 
     def look(self, cells: Cells) -> Look:
