@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 import sys
 import tempfile
@@ -64,3 +65,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         file, _, rest = item.nodeid.partition("::")
         if file in slow or f"{file}::{rest.split('[')[0]}" in slow:
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish() -> None:
+    """Do not look through what stays anyhow, tests and modules, for garbage at every turn."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)

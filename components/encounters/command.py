@@ -49,3 +49,40 @@ def risk(**options: Any) -> None:
     from components.encounters.risk_table import show_risk
 
     show_risk(**options)
+
+
+@encounters.command()
+@click.option("--model", required=True, metavar="FILE", help="Text file of an encounter model.")
+@click.option("--count", required=True, type=click.IntRange(1, 100_000_000), help="Tracks.")
+@click.option(
+    "--first",
+    type=click.IntRange(0, 2**53),
+    default=0,
+    show_default=True,
+    help="Number of the first track; a track is the same whichever others are made.",
+)
+@click.option(
+    "--duration-s",
+    required=True,
+    type=click.IntRange(0, 86_400),
+    metavar="T",
+    help="Length of each; rows at 0, 1, ... T seconds.",
+)
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option(
+    "--raw", is_flag=True, help="What the network gives: nothing is rejected, nothing flown."
+)
+@click.option(
+    "--dynamics",
+    type=click.Choice(["euler", "point_mass"]),
+    default="euler",
+    show_default=True,
+    help="Steps of 1 s, or a point mass with limits at 0.1 s; without --raw.",
+)
+@click.option("--out", required=True, metavar="TRACKS.csv", help="The table.")
+@plain_errors
+def sample(**options: Any) -> None:
+    """Tracks of one aircraft each, sampled from an encounter model."""
+    from components.encounters.sample_command import sample_tracks
+
+    sample_tracks(**options)

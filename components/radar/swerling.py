@@ -11,6 +11,7 @@ from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability, probability_of_cells
 from components.radar.detection_rung import ExactDetection, picked_method
+from components.radar.fading import Fading, LastingFluctuation
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
@@ -19,6 +20,7 @@ from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
+from dsa_des.time.gauss_markov import LONGEST_S
 
 
 class SwerlingParameters(LinkBudgetParameters):
@@ -31,6 +33,13 @@ class SwerlingParameters(LinkBudgetParameters):
         default="probability",
         description="Fluctuation inside Pd, or a sampled RCS (per scan for I and III, per pulse "
         "for II and IV) and a steady target's Pd at it; the same share of detections.",
+    )
+    fluctuation_correlation_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=LONGEST_S,
+        description="How long a sampled RCS lasts, s: the correlation of its power falls as "
+        "exp(-2 |dt| / it), whenever it is looked at. By default each scan draws its own.",
     )
     model: Literal["auto"] | None = Field(
         default=None,
@@ -56,7 +65,12 @@ class SwerlingParameters(LinkBudgetParameters):
             raise ValueError(
                 f"model is 'auto' and detection is {self.detection!r}: leave one of them out"
             )
-        steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
+        if self.cfar_reference_cells is not None and self.detection != "exact":
+            raise ValueError(
+                f"cfar_reference_cells is {self.cfar_reference_cells} and detection is "
+                f"{self.detection!r}: Pd with CFAR is computed exactly; leave one of them out"
+            )
+        steady = self.samples_rcs or self.swerling in (0, 5)
         if self.detection == "gram_charlier" and not steady:
             raise ValueError(
                 f"detection is 'gram_charlier' and swerling is {self.swerling}: the series covers "
@@ -64,14 +78,22 @@ class SwerlingParameters(LinkBudgetParameters):
             )
         return self
 
+    @property
+    def samples_rcs(self) -> bool:
+        """Whether each look has an RCS of its own and a steady target's Pd at it."""
+        return self.fluctuation == "sampled" or self.fluctuation_correlation_s is not None
+
 
 class SwerlingRadar(LinkBudgetRadar):
     """Detects each target with its probability of detection for a fluctuating cross-section.
 
+    Ground clutter raises the threshold with it (or counts as signal: ``clutter_threshold``).
+
     One keyed uniform draw per target and scan decides. With fluctuation 'probability' Pd is that
     of the fluctuating target at its mean SNR; with 'sampled' further keyed draws sample the RCS of
-    the scan, and Pd is a steady target's at the SNR it gives. Confidence is the SNR (mean, or of
-    the scan) above the SNR at which that Pd is `reference_pd`, in dB.
+    the scan, and Pd is a steady target's at the SNR it gives. So it is where fluctuation lasts
+    (`components.radar.fading`). Confidence is the SNR (mean, or of the scan) above the SNR at which
+    that Pd is `reference_pd`, in dB.
 
     The approximations of Shnidman and Albersheim are no choice for `detection`: they hold for part
     of the SNR of an encounter only and refuse the rest.
@@ -81,9 +103,10 @@ class SwerlingRadar(LinkBudgetRadar):
     lockstep = True
     hooks = {
         "RCS": "which Swerling model each cell has",
+        "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",
         "method of Pd": "name of the method that gives the probability of detection",
     }
-    effects = (RcsFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
+    effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -92,12 +115,14 @@ class SwerlingRadar(LinkBudgetRadar):
         self._method: str = parameters.detection
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
+        self._fading: Fading | None = None
         self._reference_db: dict[int, float] = {}
 
     def setup(self) -> None:
         """Take the scene's effects; without fluctuation every target is steady."""
         super().setup()
         (self._models,) = self.built("RCS") or [steady]
+        (self._fading,) = self.built("fading") or [None]
         if self.p.detection == "exact":
             (self._method,) = self.built("method of Pd") or ["table"]
 
@@ -129,10 +154,9 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
-        snr = self.resolved(cells, self.snr(cells))
+        snr, cnr = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
-        cnr = self.clutter_cnr(cells)
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
@@ -144,11 +168,14 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
-        if self.p.fluctuation == "probability" or self._models is steady:
+        if not self.p.samples_rcs or self._models is steady:
             return super().snr(cells)
         rcs = self.mean_rcs_m2(cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
+            if self._fading is not None and self._lasts(model):
+                rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
+                continue
             target, scan = keys[chosen], cells.scan[chosen]
 
             def draw(number: int, target: Any = target, scan: Any = scan) -> FloatArray:
@@ -159,11 +186,22 @@ class SwerlingRadar(LinkBudgetRadar):
             )
         return self.echo_snr(cells, rcs)
 
+    def _lasts(self, model: int) -> bool:
+        """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
+        return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
+
     def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
-        p = self.p
+        p, name = self.p, f"swerling{model}"
+        kind = "" if cnr is None else self.context.sections["terrain"].clutter_mean
+        adaptive = p.clutter_threshold == "adaptive"
+        if cnr is not None and adaptive and kind == "fluctuating":
+            # Clutter that fluctuates like noise is more noise to a threshold that follows it.
+            snr, cnr = snr / (1.0 + cnr), None
+        if self.cfar is not None:
+            return self.cfar.probability(snr, name)
         pd = probability_of_cells(
-            snr, p.pulses_summed, p.false_alarm_probability, f"swerling{model}", self._method
+            snr, p.pulses_summed, p.false_alarm_probability, name, self._method
         )
         if cnr is None or not cnr.any():
             return pd
@@ -171,31 +209,35 @@ class SwerlingRadar(LinkBudgetRadar):
         pd[cluttered] = clutter_detection_probability(
             snr[cluttered],
             cnr[cluttered],
-            false_alarm_probability=self.p.false_alarm_probability,
-            model=f"swerling{model}",
-            clutter=self.context.sections["terrain"].clutter_mean,
+            false_alarm_probability=p.false_alarm_probability,
+            model=name,
+            clutter=kind,
+            threshold=p.clutter_threshold,
         )
         return pd
 
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
 
-        None where there is ground clutter, which the same loss takes as well.
+        None where there is ground clutter, which the same loss takes as well, and with CFAR.
         """
-        if terrain_of(self) is not None:
+        if terrain_of(self) is not None or self.p.cfar_reference_cells is not None:
             return None
         return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
-        if self.p.fluctuation == "sampled":
+        if self.p.samples_rcs:
             return [(0, slice(None))]
         return self._models(cells)
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:
-            self._reference_db[model] = self.required_snr_db(
-                self.p.reference_pd, f"swerling{model}"
+            pd, name = self.p.reference_pd, f"swerling{model}"
+            self._reference_db[model] = (
+                self.required_snr_db(pd, name)
+                if self.cfar is None
+                else 10.0 * math.log10(self.cfar.required_snr(pd, name))
             )
         return self._reference_db[model]
 

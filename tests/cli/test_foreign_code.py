@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import warm_process
+
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
 SCENE = CONFIGS / "first_light.toml"
 LEAVE = {
@@ -60,7 +62,14 @@ class Table(Plain):
 
 
 def call(home: Path, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a user does, in a folder of somebody's files."""
+    """Run the command as a user does, in a folder of somebody's files.
+
+    With an environment of its own it starts from nothing: what Python imports first may matter.
+    """
+    if not environment:
+        words = ["-P", "-c", "from dsa_des.cli import main; main()", *arguments]
+        safe = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+        return warm_process.run(words, cwd=home, env=safe, timeout=60)
     return subprocess.run(
         [sys.executable, "-P", "-c", "from dsa_des.cli import main; main()",
          *map(str, arguments)],

@@ -2,12 +2,12 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from dsa_des import read_run
+from tests import warm_process
 
 CODE = """
 import resource, signal, sys
@@ -21,13 +21,8 @@ COMPARISON = "from components.evidence.silhouettes.comparison_command import mai
 
 def limited(limit: int, *words: object, start: str = MAIN) -> subprocess.CompletedProcess[str]:
     """Call the program where no file may become longer than a limit, as on a full disk."""
-    return subprocess.run(
-        [sys.executable, "-B", "-c", CODE.format(limit=limit, start=start), *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    code = CODE.format(limit=limit, start=start)
+    return warm_process.run(["-B", "-c", code, *words], timeout=120)
 
 
 @pytest.mark.parametrize(
@@ -107,13 +102,8 @@ def test_our_own_output_on_a_full_disk(
     monkeypatch.chdir(tmp_path)
     scene = configs / "first_light.toml"
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "dsa_des", *(word.format(scene=scene) for word in words)],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        started = ["-m", "dsa_des", *(word.format(scene=scene) for word in words)]
+        done = warm_process.run(started, stdout=full)
     assert done.returncode == 1
     said = [
         line for line in done.stderr.splitlines() if not line.startswith(("note: ", "warning: "))

@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -11,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
+from tests import warm_process
 
 #: A sensor that says when it is under way, and then takes as long as it is let.
 SLOW = """
@@ -45,19 +44,16 @@ def _usual_handlers():
         signal.signal(number, handler)
 
 
-def under_way(place: Path, *words: object, wait_in: str = "look") -> subprocess.Popen[str]:
+def under_way(place: Path, *words: object, wait_in: str = "look") -> warm_process.Process:
     """Start a command with a slow sensor and return when it waits."""
     (place / "slow.py").write_text(SLOW)
     sign = place / "under way"
     sign.unlink(missing_ok=True)
     path = os.pathsep.join(filter(None, [str(place), os.environ.get("PYTHONPATH")]))
-    process = subprocess.Popen(
-        [sys.executable, "-B", "-m", "dsa_des", *map(str, words)],
+    process = warm_process.start(
+        ["-B", "-m", "dsa_des", *words],
         cwd=place,
         env={**os.environ, "PYTHONPATH": path, "SLOW": wait_in},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
     )
     deadline = time.monotonic() + 60
     while not sign.exists():

@@ -14,6 +14,7 @@ from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.hidden import refuse_hidden
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
+from tests import warm_process
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "configs" / "first_light.toml"
@@ -198,6 +199,9 @@ def command(
 ) -> subprocess.CompletedProcess[str]:
     """Run the program as a user does."""
     start = ["-m", "dsa_des"] if module else ["-P", "-c", "from dsa_des.cli import main; main()"]
+    if not environment:
+        safe = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+        return warm_process.run([*start, *words], cwd=home, env=safe, timeout=120)
     return subprocess.run(
         [sys.executable, *start, *map(str, words)], cwd=home, capture_output=True, text=True,
         timeout=120, check=False,

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from snippets import (
 )
 
 from dsa_des.cli import main
+from tests import warm_process
 
 RUN = [page for page in PAGES if any(not not_run(part) for part in read_snippets(page))]
 LEFT = [part for page in PAGES for part in read_snippets(page) if not_run(part)]
@@ -41,8 +43,18 @@ def desk(folder: Path) -> Path:
     return folder
 
 
+#: What only a shell understands.
+_SHELL = re.compile(r"[|<>&;$*?`(){}~!#\n\\]")
+
+
 def run_command(line: str, folder: Path) -> None:
-    """Run a line in a shell that finds this environment's commands."""
+    """Run a line as a shell does that finds this environment's commands."""
+    words = shlex.split(line)
+    if not _SHELL.search(line) and words[0] in ("dsa-des", "python"):
+        own = words[1:] if words[0] == "python" else ["-P", "-m", "dsa_des", *words[1:]]
+        forked = warm_process.run(own, cwd=folder)
+        assert forked.returncode == 0, f"{line}\n{forked.stdout}\n{forked.stderr}"
+        return
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", line],

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import warm_process
+
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted((ROOT / "docs" / "examples").glob("*.py"))
 SAID = {
@@ -23,9 +25,7 @@ def test_there_are_three():
 @pytest.mark.slow
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_it_runs_anywhere(script, tmp_path):
-    done = subprocess.run(
-        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=120
-    )
+    done = warm_process.run([script], cwd=tmp_path, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
     assert SAID[script.stem] in done.stdout
     assert (tmp_path / "plan.png").exists() == (script.stem == "scene_in_python")
@@ -70,8 +70,6 @@ def test_the_snippet_of_the_readme_runs(tmp_path):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     snippet = text.partition("## From Python\n\n```python\n")[2].partition("```")[0]
     assert "dsa_des.study(" in snippet
-    done = subprocess.run(
-        [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, timeout=120
-    )
+    done = warm_process.run(["-c", snippet], cwd=tmp_path, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
     assert "detections" in done.stdout and not list(tmp_path.iterdir())

@@ -10,7 +10,9 @@ from dice import Dice
 from random_scene import Case
 
 from dsa_des.files.toml_text import to_toml
+from tests import warm_process
 
+_MAIN = "from dsa_des.cli import main; main()"
 _HERE = Path(__file__).resolve().parent
 _METRICS = ("detection_share", "age_of_information", "track_updates", "first_detection")
 
@@ -62,7 +64,7 @@ def workers_differ(study: Path, limit_s: float) -> str:
     for workers in ("1", "2"):
         folder = study.with_name(f"workers-{workers}")
         arguments = ["study", str(study), "--out", str(folder), "--workers", workers, "--quiet"]
-        done = _python(["-m", "dsa_des.cli", *arguments], limit_s)
+        done = warm_process.run(["-c", _MAIN, *arguments], timeout=limit_s)
         if "Traceback" in done.stderr:
             return f"{workers} workers: {done.stderr.strip()[-300:]}"
         codes.append(done.returncode)

@@ -5,7 +5,6 @@ import resource
 import shlex
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.runner import Stopped, run_study
 from dsa_des.studies.statistics import wilson
 from dsa_des.studies.study_file import read_study
+from tests import warm_process
 
 
 @pytest.fixture(autouse=True)
@@ -43,11 +43,9 @@ def undisturbed(name: str = "alone") -> dict[str, bytes]:
     return contents(Path(name))
 
 
-def dsa_des(*words: str) -> subprocess.Popen[bytes]:
+def dsa_des(*words: str) -> warm_process.Process:
     code = "from dsa_des.cli import main; main()"
-    return subprocess.Popen(
-        [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    )
+    return warm_process.start(["-c", code, *words], stdout=subprocess.DEVNULL)
 
 
 def flawed(flaw: str) -> None:
@@ -134,7 +132,7 @@ def test_a_poisoned_run_does_not_stop_the_study(small: Path) -> None:
     assert words[:2] == ["dsa-des", "run"]
     again = dsa_des(*words[1:], "--out", "again")
     _, stderr = again.communicate()
-    assert again.returncode == 1 and b"poisoned" in stderr
+    assert again.returncode == 1 and "poisoned" in stderr
     assert all(row["command"] is None for row in rows if not row["error"])
 
 
@@ -147,9 +145,7 @@ def test_a_full_disk_leaves_a_resumable_folder(small: Path) -> None:
         "from dsa_des.cli import main; main()"
     )
     words = ["study", "study.toml", "--workers", "1", "--out", "full", "--quiet"]
-    process = subprocess.run(
-        [sys.executable, "-B", "-c", code, *words], capture_output=True, text=True, check=False
-    )
+    process = warm_process.run(["-B", "-c", code, *words])
     assert process.returncode == 1, process.stderr
     assert "results cannot be written: File too large" in process.stderr
     assert "--resume" in process.stderr and "Traceback" not in process.stderr
@@ -173,7 +169,7 @@ def test_ctrl_c_leaves_a_resumable_folder(small: Path) -> None:
     if process.returncode == 0:
         pytest.skip("the study was done before it could be interrupted")
     assert process.returncode == 130
-    assert b"continue with" in stderr and b"Traceback" not in stderr
+    assert "continue with" in stderr and "Traceback" not in stderr
     study = read_study("study.toml")
     finish(study, run_into(study, Path("stopped"), 1, True), quiet=True)
     assert contents(Path("stopped")) == whole

@@ -1,0 +1,316 @@
+"""Reading the published text files of encounter models, strictly.
+
+A file has ten parts in a fixed order, each a line ``# name`` with rows of numbers below it. What
+is wrong is one error that names the file, and the part, line or variable.
+"""
+
+import csv
+import math
+import re
+from collections import Counter
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from components.encounters.bayes_network import BayesNetwork, NetworkError, make_network
+from components.encounters.model import Bins, EncounterModel
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.errors import did_you_mean, shown_value
+from dsa_des.files.input_files import InputFileError, read_input_text
+
+PARTS = (
+    "labels_initial", "G_initial", "r_initial", "N_initial",
+    "labels_transition", "G_transition", "r_transition", "N_transition",
+    "boundaries", "resample_rates",
+)  # fmt: skip
+_NEXT, _NOW = "(t+1)", "(t)"
+_MOST_BINS = 10_000
+#: So many nodes must agree about the number of cases before one that does not is called wrong.
+_MAJORITY = 4
+_Rows = list[tuple[int, str]]
+
+
+class ModelFileError(ValueError):
+    """A model file cannot be used; the message names the file and the place in it."""
+
+
+def read_model(path: Path) -> EncounterModel:
+    """Read and check a model file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ModelFileError
+        If it cannot be read, is cut short, or any part of it cannot be.
+    """
+    try:
+        state = path.stat()
+        return _read(path, (state.st_mtime_ns, state.st_size))
+    except (OSError, ValueError) as error:
+        if isinstance(error, ModelFileError):
+            raise
+        return _read(path, None)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, state: object) -> EncounterModel:
+    """Read a file; the replicas of a study read the same one over and over."""
+    try:
+        text = read_input_text(path)
+    except InputFileError as error:
+        raise ModelFileError(f"{path}: {error}") from None
+    return _Reader(path, text).model()
+
+
+class _Reader:
+    def __init__(self, path: Path, text: str) -> None:
+        self.path = path
+        self.parts = self._parts(text)
+
+    def fail(self, message: str, line: int | None = None) -> ModelFileError:
+        where = f"{self.path}: " if line is None else f"{self.path}: line {line}: "
+        return ModelFileError(where + message)
+
+    def _parts(self, text: str) -> dict[str, tuple[int, _Rows]]:
+        found: dict[str, tuple[int, _Rows]] = {}
+        rows: _Rows = []
+        for number, line in enumerate(text.split("\n"), start=1):
+            stripped = line.strip()
+            if stripped.startswith("#"):
+                name = stripped[1:].strip()
+                expected = PARTS[len(found)] if len(found) < len(PARTS) else None
+                if name != expected:
+                    raise self.fail(self._why_not(name, expected, found), number)
+                rows = []
+                found[name] = number, rows
+            elif stripped:
+                if not found:
+                    raise self.fail(f"the file must begin with the line '# {PARTS[0]}'", number)
+                rows.append((number, stripped))
+        if len(found) < len(PARTS):
+            raise self.fail(f"the file ends before its part '# {PARTS[len(found)]}'")
+        return found
+
+    def _why_not(self, name: str, expected: str | None, found: dict[str, tuple[int, _Rows]]) -> str:
+        if name in found:
+            return f"the part {shown_value(name)} stands there twice"
+        if name not in PARTS:
+            return f"there is no part {shown_value(name)}{did_you_mean(name, PARTS)}"
+        return f"the part {name!r} stands where {expected!r} is expected"
+
+    def model(self) -> EncounterModel:
+        labels = self.labels("labels_initial")
+        now = self.labels("labels_transition")
+        sources, targets = self.match(labels, now)
+        sizes = self.sizes("r_initial", labels)
+        initial = self.network("initial", labels, sizes, range(len(labels)))
+        later = self.sizes("r_transition", now)
+        for place, of in [*enumerate(sources), *targets.items()]:
+            if of >= 0 and later[place] != sizes[of]:
+                raise self.fail(
+                    f"r_transition: variable {now[place]!r} has {later[place]} bins, but "
+                    f"{labels[of]!r} has {sizes[of]} in r_initial",
+                    self.parts["r_transition"][0],
+                )
+        transition = self.network("transition", now, later, sorted(targets))
+        rates = self.rates(labels)
+        notes = self.totals(initial)
+        return EncounterModel(
+            self.path.stem, initial, transition, self.bins(labels, sizes), rates, sources, targets,
+            notes,
+        )  # fmt: skip
+
+    # -- variables ---------------------------------------------------------------------------
+
+    def labels(self, part: str) -> tuple[str, ...]:
+        start, rows = self.parts[part]
+        if len(rows) != 1:
+            raise self.fail(f"{part}: one row of names is needed, there are {len(rows)}", start)
+        number, text = rows[0]
+        cells = next(csv.reader([text], skipinitialspace=True))
+        names = [re.sub(r"\s+", " ", cell.strip().strip('"')).strip() for cell in cells]
+        if names and not names[-1]:
+            names.pop()  # a comma at the end
+        if not all(names) or not names:
+            raise self.fail(f"{part}: a name is empty", number)
+        name, count = Counter(names).most_common(1)[0]
+        if count > 1:
+            raise self.fail(f"{part}: the variable {name!r} stands there twice", number)
+        return tuple(names)
+
+    def match(
+        self, labels: tuple[str, ...], now: tuple[str, ...]
+    ) -> tuple[tuple[int, ...], dict[int, int]]:
+        """Return of each transition variable the initial one, and those at t + 1."""
+        number = self.parts["labels_transition"][1][0][0]
+        sources, targets = [], {}
+        for place, name in enumerate(now):
+            later = name.endswith(_NEXT)
+            base = name.removesuffix(_NEXT if later else _NOW).strip()
+            if base not in labels:
+                raise self.fail(
+                    f"labels_transition: unknown variable {shown_value(name)}"
+                    f"{did_you_mean(base, labels)}",
+                    number,
+                )
+            of = labels.index(base)
+            sources.append(-1 if later else of)
+            if later:
+                targets[place] = of
+        for of, label in enumerate(labels):
+            if of not in sources:
+                raise self.fail(f"labels_transition: variable {label!r} at t is missing", number)
+        for place, of in targets.items():
+            if f"{labels[of]}{_NOW}" not in now:
+                raise self.fail(
+                    f"labels_transition: {now[place]!r} needs {labels[of] + _NOW!r} beside it",
+                    number,
+                )
+        if len(set(sources) - {-1}) + len(targets) != len(now):
+            raise self.fail("labels_transition: a variable stands there twice", number)
+        return tuple(sources), targets
+
+    # -- numbers -----------------------------------------------------------------------------
+
+    def numbers(self, part: str, what: str = "numbers") -> FloatArray:
+        """Return all numbers of a part; none may be negative or not finite."""
+        start, rows = self.parts[part]
+        found: list[float] = []
+        for number, text in rows:
+            words = text.replace(",", " ").split()
+            for word in words:
+                value = _number(word)
+                if not (math.isfinite(value) and value >= 0.0):
+                    raise self.fail(f"{part}: {shown_value(word)}: {what} of 0 or more", number)
+                found.append(value)
+        if not found:
+            raise self.fail(f"{part}: holds no number: the file is cut short", start)
+        return np.array(found)
+
+    def sizes(self, part: str, labels: tuple[str, ...]) -> tuple[int, ...]:
+        found = self.numbers(part, "must be whole numbers")
+        number = self.parts[part][1][0][0]
+        if len(found) != len(labels):
+            raise self.fail(
+                f"{part}: {len(labels)} numbers of bins are needed, one for each variable; there "
+                f"are {len(found)}",
+                number,
+            )
+        for value, label in zip(found.tolist(), labels, strict=True):
+            if value != int(value) or not 1 <= value <= _MOST_BINS:
+                raise self.fail(
+                    f"{part}: variable {label!r} has {value:g} bins: must be a whole number of 1 "
+                    "or more",
+                    number,
+                )
+        return tuple(int(value) for value in found)
+
+    def network(
+        self, which: str, labels: tuple[str, ...], sizes: tuple[int, ...], drawn: range | list[int]
+    ) -> BayesNetwork:
+        arrows = self.arrows(f"G_{which}", labels)
+        part = f"N_{which}"
+        counts = self.numbers(part, "must be counts")
+        if which == "transition":
+            for place in range(len(labels)):
+                if place not in drawn and arrows[:, place].any():
+                    raise self.fail(
+                        f"G_transition: variable {labels[place]!r} has parents, but is not drawn: "
+                        f"only variables at {_NEXT} are",
+                        self.parts["G_transition"][0],
+                    )
+        try:
+            return make_network(labels, sizes, arrows, counts, list(drawn))
+        except NetworkError as error:
+            raise self.fail(f"{part}: {error}", self.parts[part][1][0][0]) from None
+
+    def arrows(self, part: str, labels: tuple[str, ...]) -> IntArray:
+        start, rows = self.parts[part]
+        count = len(labels)
+        if len(rows) != count:
+            raise self.fail(f"{part}: {count} rows are needed, there are {len(rows)}", start)
+        found = np.zeros((count, count), dtype=np.int64)
+        for place, (number, text) in enumerate(rows):
+            words = text.replace(",", " ").split()
+            if len(words) != count or set(words) - {"0", "1"}:
+                raise self.fail(
+                    f"{part}: variable {labels[place]!r}: {count} values of 0 or 1 are needed",
+                    number,
+                )
+            found[place] = [int(word) for word in words]
+        return found
+
+    def bins(self, labels: tuple[str, ...], sizes: tuple[int, ...]) -> tuple[Bins, ...]:
+        start, rows = self.parts["boundaries"]
+        if len(rows) != len(labels):
+            raise self.fail(
+                f"boundaries: {len(labels)} rows are needed, one for each variable; there are "
+                f"{len(rows)}",
+                start,
+            )
+        found = []
+        for label, size, (number, text) in zip(labels, sizes, rows, strict=True):
+            if text == "*":
+                found.append(Bins(None, size))
+                continue
+            edges = np.array([_number(word) for word in text.replace(",", " ").split()])
+            if len(edges) != size + 1:
+                raise self.fail(
+                    f"boundaries: variable {label!r} has {size} bins: {size + 1} edges are needed, "
+                    f"or *; there are {len(edges)}",
+                    number,
+                )
+            if not np.isfinite(edges).all() or (np.diff(edges) <= 0.0).any():
+                raise self.fail(
+                    f"boundaries: variable {label!r}: edges must be rising numbers", number
+                )
+            found.append(Bins(edges, size))
+        return tuple(found)
+
+    def rates(self, labels: tuple[str, ...]) -> FloatArray:
+        rates = self.numbers("resample_rates", "must be probabilities")
+        number = self.parts["resample_rates"][1][0][0]
+        if len(rates) != len(labels):
+            raise self.fail(
+                f"resample_rates: {len(labels)} are needed, one for each variable; there are "
+                f"{len(rates)}",
+                number,
+            )
+        for rate, label in zip(rates.tolist(), labels, strict=True):
+            if rate > 1.0:
+                raise self.fail(
+                    f"resample_rates: variable {label!r}: {rate:g} must lie in [0, 1]: it is the "
+                    "probability per second",
+                    number,
+                )
+        return rates
+
+    def totals(self, initial: BayesNetwork) -> tuple[str, ...]:
+        """Refuse the one variable whose rows sum to something else than those of all others.
+
+        All nodes are counted over the same cases. A model whose nodes do not agree at all was not
+        made by counting; its columns are probabilities all the same.
+        """
+        totals = {node.name: math.fsum(node.totals) for node in initial.nodes.values()}
+        (common, many), *others = Counter(totals.values()).most_common()
+        if not others:
+            return ()
+        odd = [name for name, total in totals.items() if total != common]
+        if many >= _MAJORITY and many > len(totals) - 3:
+            raise self.fail(
+                f"N_initial: variable {odd[0]!r}: its counts sum to {totals[odd[0]]:.15g}, those "
+                f"of the other variables to {common:.15g}",
+                self.parts["N_initial"][1][0][0],
+            )
+        return ("the counts of the initial variables sum to different numbers of cases",)
+
+
+def _number(word: str) -> float:
+    try:
+        return math.nan if "_" in word else float(word)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,171 @@
+"""Sampling an encounter model: states at time 0, and a Markov chain from second to second.
+
+One uniform number serves a variable at an instant: it falls into a bin, and what is left of it
+within the bin is again uniform. It says whether a value is drawn anew, and which one. So a track
+takes as many numbers as it has dynamic variables and seconds, whatever they bring about.
+
+Upstream releases from 1.4 on look up the parents once, at time 0, unless a variable at t + 1
+depends on another one at t + 1; such tracks hop about their first state. Here parents are those of
+the present second, always. Upstream draws bin 1 where a combination of parents was never seen;
+here the present bin stays.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.encounters.bayes_network import Node
+from components.encounters.draws import EncounterDraws
+from components.encounters.model import EncounterModel
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+#: Tracks that are sampled together: their arrays stay in the processor's cache.
+TRACKS_AT_ONCE = 2048
+
+
+@dataclass(frozen=True)
+class SampledTracks:
+    """What the networks gave for some tracks, before anything is rejected.
+
+    Parameters
+    ----------
+    numbers : (tracks,)
+    initial : (variables, tracks)
+        Values at time 0, in the file's units.
+    initial_bins : (variables, tracks)
+        From 0.
+    left : (variables, tracks)
+        Where in its bin each value lies, [0, 1).
+    changing : (seconds + 1, dynamic variables, tracks)
+        Values of the dynamic variables, in the order of `EncounterModel.dynamic`.
+    """
+
+    numbers: IntArray
+    initial: FloatArray
+    initial_bins: IntArray
+    left: FloatArray
+    changing: FloatArray
+
+    def put(self, places: IntArray, others: "SampledTracks", which: BoolArray) -> None:
+        """Put some of other tracks in these places."""
+        self.initial[:, places] = others.initial[:, which]
+        self.initial_bins[:, places] = others.initial_bins[:, which]
+        self.left[:, places] = others.left[:, which]
+        self.changing[:, :, places] = others.changing[:, :, which]
+
+
+class TrackSampler:
+    """Samples tracks of a model.
+
+    Parameters
+    ----------
+    model : EncounterModel
+    draws : EncounterDraws
+    """
+
+    def __init__(self, model: EncounterModel, draws: EncounterDraws) -> None:
+        self.model = model
+        self._draws = draws
+        self._low = [bins.low for bins in model.bins]
+        self._width = [bins.width for bins in model.bins]
+        dynamic = model.dynamic
+        self._steps = [
+            _Step(model, place, dynamic.index(model.targets[place]))
+            for place in model.transition.order
+        ]
+
+    def sample(
+        self, numbers: Sequence[int], seconds: int, attempts: Sequence[int] | int = 0
+    ) -> SampledTracks:
+        """Return tracks by their numbers.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+        seconds : int
+            Length; there is one instant more.
+        attempts : int or sequence of int
+            How often each was rejected before.
+        """
+        model = self.model
+        variables, changing = len(model.labels), len(model.dynamic)
+        uniform = self._draws.uniform(numbers, variables + seconds * changing, attempts)
+        bins: IntArray = np.zeros((variables, len(numbers)), dtype=np.int64)
+        values, left = np.zeros((2, variables, len(numbers)))
+        for place in model.initial.order:
+            node = model.initial.nodes[place]
+            mine, left[place] = _drawn(node, node.column(bins), uniform[place])
+            bins[place] = mine
+            values[place] = self._low[place][mine] + self._width[place][mine] * left[place]
+        over_time = np.empty((seconds + 1, changing, len(numbers)))
+        over_time[0] = values[list(model.dynamic)]
+        # Places in the transition network: variables at t, static ones among them, and at t + 1.
+        now: IntArray = np.zeros((len(model.sources), len(numbers)), dtype=np.int64)
+        for place, source in enumerate(model.sources):
+            if source >= 0:
+                now[place] = bins[source]
+        rows = iter(uniform[variables:].reshape(seconds, changing, len(numbers)))
+        for second, row in enumerate(rows, start=1):
+            for step in self._steps:
+                step.take(now, row, over_time[second - 1], over_time[second])
+            for step in self._steps:
+                now[step.before] = now[step.place]
+        return SampledTracks(np.asarray(numbers, dtype=np.int64), values, bins, left, over_time)
+
+    def batches(self, numbers: range, seconds: int) -> Iterator[SampledTracks]:
+        """Return tracks in batches of a size that suits the processor."""
+        for start in range(0, len(numbers), TRACKS_AT_ONCE):
+            yield self.sample(numbers[start : start + TRACKS_AT_ONCE], seconds)
+
+
+class _Step:
+    """Draws one dynamic variable at t + 1 for all tracks."""
+
+    def __init__(self, model: EncounterModel, place: int, row: int) -> None:
+        self.place, self._row = place, row
+        variable = model.targets[place]
+        self.before = model.sources.index(variable)
+        self._node = node = model.transition.nodes[place]
+        self._low, self._width = model.bins[variable].low, model.bins[variable].width
+        self._rate = float(model.resample_rates_hz[variable])
+        begin, chance = node.edges[:, :-1], np.diff(node.edges, axis=1)
+        # A bin without probability begins where no draw lies; an empty column is all of any bin.
+        empty = node.empty[:, np.newaxis]
+        self._begin = np.where(empty, 0.0, np.where(chance > 0.0, begin, 2.0)).reshape(-1)
+        with np.errstate(divide="ignore"):
+            each = np.where(empty, 1.0, np.where(chance > 0.0, 1.0 / chance, 1.0))
+        self._each = each.reshape(-1)
+
+    def take(
+        self, now: IntArray, uniform: FloatArray, before: FloatArray, after: FloatArray
+    ) -> None:
+        """Draw the variable's bins into `now` and its values into `after`."""
+        u, node = uniform[self._row], self._node
+        column = node.column(now)
+        present = now[self.before]
+        cell = column * node.size + present
+        left = (u - self._begin.take(cell)) * self._each.take(cell)
+        stays = (left >= 0.0) & (left < 1.0)
+        held, value = before[self._row], after[self._row]
+        now[self.place] = present
+        np.copyto(value, held)
+        anew = np.flatnonzero(stays & (left < self._rate))
+        if len(anew):
+            bins = present[anew]
+            value[anew] = self._low[bins] + self._width[bins] * (left[anew] / self._rate)
+        moved = np.flatnonzero(~stays)
+        if len(moved):
+            bins, rest = _drawn(node, column[moved], u[moved])
+            now[self.place, moved] = bins
+            value[moved] = self._low[bins] + self._width[bins] * rest
+
+
+def _drawn(node: Node, column: IntArray, uniform: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the bins into which draws fall, and what is left of them within the bin, [0, 1)."""
+    edges = node.edges
+    bins: IntArray = np.zeros(len(column), dtype=np.int64)
+    for k in range(1, node.size):
+        bins += uniform >= edges[column, k]
+    begin, end = edges[column, bins], edges[column, bins + 1]
+    return bins, np.minimum((uniform - begin) / (end - begin), np.nextafter(1.0, 0.0))

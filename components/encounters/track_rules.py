@@ -1,0 +1,253 @@
+"""Which sampled tracks are flights: the rules by which the published programs reject tracks.
+
+A track is drawn again (next attempt of the same number) where
+
+- it climbs at time 0 as fast as it flies, or faster;
+- it leaves the outer edges of the altitude layers;
+- its speed leaves the upper edges of the bins that hold the 1 % and the 99 % point of speeds, given
+  its geographic area, airspace and layer (of fixed wing models also where it is below 30 ft/s);
+- its vertical rate is larger than the larger of the two such edges of vertical rates.
+
+Distributions are those before rejection (`TrackSampler`); what is left is not the model's any more.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.encounters.bayes_network import BayesNetwork
+from components.encounters.model import (
+    ACCELERATION,
+    AIRSPACE,
+    CLIMB,
+    GEOGRAPHY,
+    LAYER,
+    LAYERS_FT,
+    SPEED,
+    TURN,
+    EncounterModel,
+)
+from components.encounters.motion import FT_S_PER_KT, Flown, fly_euler, fly_point_mass
+from components.encounters.sampling import SampledTracks, TrackSampler
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.errors import did_you_mean
+
+DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
+_SHARES = (0.01, 0.99)
+_SLOWEST_FIXED_WING_FT_S = 30.0
+_MOST_ATTEMPTS = 2000
+_MOST_CELLS = 20_000_000
+#: Point-mass flights hold eight arrays of ten instants per second.
+_TRACKS_AT_ONCE = 512
+_FLOWN = (SPEED, ACCELERATION, CLIMB, TURN, LAYER)
+
+
+class TrackError(ValueError):
+    """A model's tracks cannot be flown, or none of them is accepted."""
+
+
+@dataclass(frozen=True)
+class Commands:
+    """What sampled tracks command, ready to be flown.
+
+    Parameters
+    ----------
+    altitude_ft, speed_ft_s : (tracks,)
+    acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
+    """
+
+    altitude_ft: FloatArray
+    speed_ft_s: FloatArray
+    acceleration_ft_s2: FloatArray
+    climb_ft_s: FloatArray
+    turn_rad_s: FloatArray
+
+    def fly(self, dynamics: str) -> Flown:
+        """Return the flights, ``"euler"`` or ``"point_mass"``."""
+        return DYNAMICS[dynamics](
+            self.altitude_ft,
+            self.speed_ft_s,
+            self.acceleration_ft_s2,
+            self.climb_ft_s,
+            self.turn_rad_s,
+        )
+
+
+class TrackRules:
+    """What a model's tracks command, and which of them are accepted.
+
+    Parameters
+    ----------
+    model : EncounterModel
+
+    Raises
+    ------
+    TrackError
+        If the model lacks a variable that a flight needs.
+    """
+
+    def __init__(self, model: EncounterModel) -> None:
+        self.model = model
+        for label in _FLOWN:
+            if model.place(label) is None:
+                raise TrackError(
+                    f"the model has no variable {label!r}{did_you_mean(label, model.labels)}: its "
+                    "tracks cannot be flown (--raw writes what it gives)"
+                )
+        self._layer = self._at(LAYER)
+        bins = model.bins[self._layer]
+        edges = bins.edges
+        if edges is None:
+            if bins.size > len(LAYERS_FT) - 1:
+                raise TrackError(
+                    f"variable {LAYER!r} has {bins.size} layers without edges; known are the edges "
+                    f"of {len(LAYERS_FT) - 1}"
+                )
+            edges = np.array(LAYERS_FT[: bins.size + 1])
+        self._edges_ft = edges
+        self._by_edges = bins.edges is not None
+        self._given = [p for p in map(model.place, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None]
+        self._speed_ft_s, climbs = (
+            self._limits(label) * factor
+            for label, factor in ((SPEED, FT_S_PER_KT), (CLIMB, 1.0 / 60.0))
+        )
+        self._climb_ft_s = np.abs(climbs).max(axis=0)
+        if "fw" in model.name:
+            self._speed_ft_s[0] = np.maximum(self._speed_ft_s[0], _SLOWEST_FIXED_WING_FT_S)
+
+    def _at(self, label: str) -> int:
+        place = self.model.place(label)
+        assert place is not None
+        return place
+
+    def commands(self, tracks: SampledTracks) -> Commands:
+        """Return what tracks command, in feet and seconds."""
+        if self._by_edges:
+            altitude_ft = tracks.initial[self._layer]
+        else:
+            layer = tracks.initial_bins[self._layer]
+            low, high = self._edges_ft[layer], self._edges_ft[layer + 1]
+            altitude_ft = low + (high - low) * tracks.left[self._layer]
+        return Commands(
+            altitude_ft,
+            tracks.initial[self._at(SPEED)] * FT_S_PER_KT,
+            self._over_time(tracks, ACCELERATION) * FT_S_PER_KT,
+            self._over_time(tracks, CLIMB) / 60.0,
+            np.radians(self._over_time(tracks, TURN)),
+        )
+
+    def _over_time(self, tracks: SampledTracks, label: str) -> FloatArray:
+        place, dynamic = self._at(label), self.model.dynamic
+        if place in dynamic:
+            found: FloatArray = tracks.changing[:, dynamic.index(place)]
+            return found
+        return np.broadcast_to(
+            tracks.initial[place], (len(tracks.changing), len(tracks.numbers))
+        ).copy()
+
+    def accepted(self, tracks: SampledTracks, commands: Commands, flown: Flown) -> BoolArray:
+        """Return which tracks are accepted."""
+        given: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
+        for place in self._given:
+            given = given * self.model.initial.sizes[place] + tracks.initial_bins[place]
+        slowest, fastest = self._speed_ft_s[:, given]
+        good = commands.speed_ft_s > np.abs(commands.climb_ft_s[0])
+        good &= (flown.up_ft >= self._edges_ft[0]).all(axis=0)
+        good &= (flown.up_ft <= self._edges_ft[-1]).all(axis=0)
+        good &= (flown.speed_ft_s >= slowest).all(axis=0)
+        good &= (flown.speed_ft_s <= fastest).all(axis=0)
+        # Rounding alone must not reject the value on the edge itself.
+        steepest = self._climb_ft_s[given] * (1.0 + 1e-9)
+        return good & (np.abs(flown.climb_ft_s) <= steepest).all(axis=0)
+
+    def _limits(self, label: str) -> FloatArray:
+        """Return the upper edges of the bins with both points, (2, areas x airspaces x layers)."""
+        place = self._at(label)
+        edges = self.model.bins[place].edges
+        if edges is None:
+            raise TrackError(f"variable {label!r} has no edges: its values are no rates")
+        table = conditional(self.model.initial, self._given, place)
+        summed = np.cumsum(table, axis=1)
+        low, high = (np.argmax(summed >= share - 1e-12, axis=1) for share in _SHARES)
+        found = np.stack([edges[low + 1], edges[high + 1]])
+        # Where both points lie in one bin, all of the bin is usual.
+        found[0] = np.where(low == high, edges[low], found[0])
+        return found
+
+
+def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArray:
+    """Return the exact distribution of a variable given some others, by enumeration.
+
+    Parameters
+    ----------
+    network : BayesNetwork
+    given : list of int
+        Places of the variables that are known; the last one runs fastest.
+    place : int
+
+    Returns
+    -------
+    (combinations, bins) array
+        Combinations that cannot be have the distribution over all of them.
+    """
+    needed, todo = set(), [*given, place]
+    while todo:
+        item = todo.pop()
+        if item not in needed:
+            needed.add(item)
+            todo += network.nodes[item].parents
+    order = sorted(needed)
+    sizes = [network.sizes[item] for item in order]
+    if np.prod(sizes, dtype=float) > _MOST_CELLS:
+        raise TrackError(f"variable {network.labels[place]!r} depends on too many others")
+    cells = np.indices(sizes).reshape(len(order), -1)
+    bins = {item: cells[k] for k, item in enumerate(order)}
+    chance = np.ones(cells.shape[1])
+    for item in order:
+        node = network.nodes[item]
+        column: AnyArray = np.zeros(cells.shape[1], dtype=np.int64)
+        for parent, stride in zip(node.parents, node.strides, strict=True):
+            column = column + stride * bins[parent]
+        chance = chance * node.probabilities[column, bins[item]]
+    row: AnyArray = np.zeros(cells.shape[1], dtype=np.int64)
+    count = 1
+    for item in given:
+        row, count = row * network.sizes[item] + bins[item], count * network.sizes[item]
+    size = network.sizes[place]
+    joint = np.bincount(row * size + bins[place], weights=chance, minlength=count * size)
+    table = joint.reshape(count, size)
+    table = np.where(table.sum(axis=1, keepdims=True) > 0.0, table, table.sum(axis=0))
+    found: FloatArray = table / table.sum(axis=1, keepdims=True)
+    return found
+
+
+def accepted_tracks(
+    sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
+) -> Iterator[tuple[SampledTracks, Flown]]:
+    """Give accepted tracks with their flights, in batches in order of their numbers.
+
+    Raises
+    ------
+    TrackError
+        If a track is rejected time after time.
+    """
+    for start in range(0, len(numbers), _TRACKS_AT_ONCE):
+        some = numbers[start : start + _TRACKS_AT_ONCE]
+        kept: SampledTracks | None = None
+        left = np.arange(len(some))
+        for attempt in range(_MOST_ATTEMPTS):
+            tracks = sampler.sample([some[k] for k in left], seconds, attempt)
+            commands = rules.commands(tracks)
+            good = rules.accepted(tracks, commands, commands.fly(dynamics))
+            if kept is None:
+                kept = tracks
+            else:
+                kept.put(left[good], tracks, good)
+            left = left[~good]
+            if not len(left):
+                break
+        else:
+            raise TrackError(f"track {some[int(left[0])]} was rejected {_MOST_ATTEMPTS} times")
+        assert kept is not None
+        yield kept, rules.commands(kept).fly(dynamics)

@@ -1,0 +1,69 @@
+"""Flights from commands: closed forms for straight flight, climbs and turns, and the limits."""
+
+import numpy as np
+import pytest
+
+from components.encounters.motion import FT_S_PER_KT, fly_euler, fly_point_mass
+
+
+def commands(seconds: int, a: float, climb: float, turn_deg: float, tracks: int = 1):
+    shape = seconds + 1, tracks
+    return np.full(shape, a), np.full(shape, climb), np.radians(np.full(shape, turn_deg))
+
+
+def test_a_knot_is_what_the_format_says() -> None:
+    assert abs(FT_S_PER_KT - 1.68781) < 5e-6
+
+
+def test_straight_and_level_is_exact_in_both() -> None:
+    start = np.array([1000.0, 3000.0]), np.array([100.0, 180.0])
+    for fly in (fly_euler, fly_point_mass):
+        flown = fly(*start, *commands(50, 0.0, 0.0, 0.0, 2))
+        assert flown.north_ft[-1] == pytest.approx([5000.0, 9000.0])
+        assert flown.up_ft[-1] == pytest.approx([1000.0, 3000.0])
+        assert np.abs(flown.east_ft).max() == 0.0
+
+
+def test_euler_takes_the_old_values_on_the_right() -> None:
+    a, climb, turn = (np.array([[row] for row in rows], dtype=float) for rows in (
+        [2, 2, 0, 0], [10, -5, 0, 0], np.radians([90, 0, 0, 0])
+    ))  # fmt: skip
+    flown = fly_euler(np.array([500.0]), np.array([100.0]), a, climb, turn)
+    assert flown.speed_ft_s[:, 0].tolist() == [100, 102, 104, 104]
+    assert flown.up_ft[:, 0].tolist() == [500, 510, 505, 505]
+    assert flown.north_ft[:, 0] == pytest.approx([0, 100, 100, 100])
+    assert flown.east_ft[:, 0] == pytest.approx([0, 0, 102, 206])
+
+
+def test_a_steady_turn_is_a_circle_of_its_radius() -> None:
+    flown = fly_point_mass(np.array([2000.0]), np.array([200.0]), *commands(120, 0.0, 0.0, 3.0))
+    radius = 200.0 / np.radians(3.0)
+    assert np.degrees(flown.heading_rad[-1, 0]) == pytest.approx(360.0, abs=2.0)
+    assert np.ptp(flown.east_ft) == pytest.approx(2 * radius, rel=0.02)
+    assert np.ptp(flown.up_ft) < 20.0
+    bank = np.arctan(200.0 * np.radians(3.0) / 32.2)
+    assert flown.bank_rad[-1, 0] == pytest.approx(bank, rel=0.02)
+
+
+def test_a_climb_is_reached_and_held() -> None:
+    a, climb, turn = commands(60, 0.0, 25.0, 0.0)
+    flown = fly_point_mass(np.array([2000.0]), np.array([150.0]), a, climb, turn)
+    assert flown.up_ft[-1, 0] == pytest.approx(2000 + 60 * 25, rel=1e-3)
+    climb[:] = 0.0
+    climb[5:] = 40.0
+    flown = fly_point_mass(np.array([2000.0]), np.array([150.0]), a, climb, turn)
+    assert flown.climb_ft_s[-1, 0] == pytest.approx(40.0, rel=1e-3)
+    pitching = np.diff(flown.pitch_rad[:, 0]) / 0.1
+    assert np.degrees(np.abs(pitching).max()) == pytest.approx(3.0, abs=1e-6)
+
+
+def test_limits_hold_whatever_is_commanded() -> None:
+    random = np.random.default_rng(1)
+    shape = 41, 50
+    flown = fly_point_mass(
+        np.full(50, 3000.0), np.full(50, 120.0), random.normal(0, 30, shape),
+        random.normal(0, 100, shape), random.normal(0, 0.6, shape),
+    )  # fmt: skip
+    assert np.isfinite(flown.up_ft).all()
+    assert np.degrees(np.abs(flown.bank_rad)).max() <= 75.0 + 1e-9
+    assert flown.speed_ft_s.min() >= 1.7 and flown.speed_ft_s.max() <= 1116.0
