@@ -1,24 +1,24 @@
-"""An avoidance that turns out of the bands of guidance (``avoidance.daidalus``)."""
+"""An avoidance that flies out of the bands of guidance (``avoidance.daidalus``)."""
 
 import math
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
-from components.guidance.bands import GuidedIntruder, guidance
-from components.guidance.resolution import Resolution, resolution
-from components.guidance.situation import State
+from components.guidance.way_out import changes_out, smaller
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvres
+from components.messages.steering import Manoeuvre, Manoeuvres
 from dsa_des.block.component import Component, NonNegativeRational, Parameters, ScenePath
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
-_OWN = ("alt_m", "east_mps", "north_mps", "climb_mps")
-_RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
+_KINDS = {"turn": "hdir", "climb": "alt"}
+# Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min.
+_TURN_RATE_RAD_S = math.radians(3.0)
+_VERTICAL_RATE_MPS = 500.0 * 0.3048 / 60.0
 
 
 class TurnOutParameters(Parameters):
@@ -31,8 +31,14 @@ class TurnOutParameters(Parameters):
         default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
     )
     level: int = Field(default=2, ge=1, description="Turn when an alert is of this level or above.")
+    manoeuvre: Literal["turn", "climb"] = Field(
+        default="turn", description="Whether to change direction, or altitude."
+    )
     beyond_deg: float = Field(
         default=0.0, ge=0, le=90, description="Turn so much beyond the edge of the band, deg."
+    )
+    beyond_m: float = Field(
+        default=0.0, ge=0, le=3000, description="Climb or descend so much beyond its edge, m."
     )
     pause_s: NonNegativeRational = Field(
         default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
@@ -46,15 +52,15 @@ class TurnOutParameters(Parameters):
 
 
 class TurnOut(Component):
-    """Turns the ownship to the nearest direction that leads clear, when an alert is due.
+    """Steers the ownship by the smallest change that leads clear, when an alert is due.
 
-    The bands of direction are those of DAIDALUS, each instant by itself, over all targets whose
-    flights the alerting knows. Where no direction is clear it turns towards the recovery band;
-    without one it leaves the ownship alone.
+    The change is one of direction or of altitude. The bands are those of DAIDALUS, each instant by
+    itself, over all targets whose flights the alerting knows. Where no value is clear it goes
+    towards the recovery band; without one it leaves the ownship alone.
     """
 
     inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
-    outputs = {"manoeuvres": Output(Manoeuvres, "Turns that the ownship is told to fly.")}
+    outputs = {"manoeuvres": Output(Manoeuvres, "Turns or climbs that the ownship is told to fly.")}
     Parameters = TurnOutParameters
     windowed = True
     rewindable = True
@@ -77,47 +83,33 @@ class TurnOut(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        ticks, turns = [], []
+        ticks, told = [], []
         for place, tick in enumerate(wake.ticks.tolist()):
             entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
             highest = int(np.max(alerts.level[entries], initial=0))
             if highest < self.p.level or tick < self._free_from:
                 continue
-            turn = self._turn(alerts, place, entries)
-            if turn is not None:
+            manoeuvre = self._manoeuvre(alerts, place, entries)
+            if manoeuvre is not None:
                 ticks.append(tick)
-                turns.append(turn)
+                told.append(manoeuvre)
                 self._free_from = tick + self._pause_ticks
-        if not ticks:
-            return None
-        rate = self._configuration["turn_rate"] or math.radians(3.0)
-        rates = np.full(len(ticks), rate)
-        return Manoeuvres(np.array(ticks, dtype=np.int64), np.array(turns), rates)
+        return Manoeuvres.of(ticks, told) if ticks else None
 
-    def _turn(self, alerts: AlertLevels, place: int, entries: slice) -> float | None:
-        """Return the change of direction that leads out of the band, or None."""
-        own_values = {name: float(values[place]) for name, values in alerts.own_motion.items()}
-        if not all(map(math.isfinite, own_values.values())):
+    def _manoeuvre(self, alerts: AlertLevels, place: int, entries: slice) -> Manoeuvre | None:
+        """Return what leads out of the band, or None."""
+        conf = self._configuration
+        kind = _KINDS[self.p.manoeuvre]
+        changes = changes_out(
+            kind, conf, self._alerter, alerts.own_motion, alerts.relative, place, entries
+        )
+        change = None if changes is None else smaller(changes)
+        if change is None:
             return None
-        alt, *velocity = (np.asarray(own_values[name]) for name in _OWN)
-        own = State(np.zeros(()), np.zeros(()), alt, *velocity)
-        parts = [alerts.relative[name][entries] for name in _RELATIVE]
-        intruders = [
-            GuidedIntruder(
-                State(*(mine - part[i] for mine, part in zip(own, parts, strict=True))),
-                self._alerter,
-            )
-            for i in range(len(parts[0]))
-        ]
-        found = guidance("hdir", self._configuration, own, intruders)
-        region = self._configuration["corrective_region"]
-        way = resolution(found.bands, found.own_value, region, cyclic=True)
-        return None if way is None else self._smallest(way, found.own_value)
-
-    def _smallest(self, way: Resolution, own_value: float) -> float | None:
-        target = way.high if way.prefers_high else way.low
-        if not math.isfinite(target):
-            return None
-        side = 1.0 if way.prefers_high else -1.0
-        away = (side * (target - own_value)) % (2.0 * math.pi)
-        return side * min(away + math.radians(self.p.beyond_deg), math.pi)
+        if self.p.manoeuvre == "climb":
+            beyond_m = math.copysign(self.p.beyond_m, change)
+            rate_mps = conf["vertical_rate"] or _VERTICAL_RATE_MPS
+            return Manoeuvre(climb_m=change + beyond_m, climb_rate_mps=rate_mps)
+        away = min(abs(change) + math.radians(self.p.beyond_deg), math.pi)
+        rate_rad_s = conf["turn_rate"] or _TURN_RATE_RAD_S
+        return Manoeuvre(turn_rad=math.copysign(away, change), rate_rad_s=rate_rad_s)

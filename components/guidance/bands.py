@@ -12,7 +12,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
 from components.guidance.intervals import Band, Interval, painted
-from components.guidance.kinds import Kind, kind_of
+from components.guidance.kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
@@ -142,7 +142,7 @@ class _Painter:
     def __init__(
         self,
         configuration: Configuration,
-        kind: Kind,
+        kind: ManoeuvreKind,
         layers: list[tuple[str, BoolArray, BoolArray]],
     ) -> None:
         self._kind, self._layers = kind, layers

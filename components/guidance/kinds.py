@@ -31,7 +31,7 @@ class Conflicts(Protocol):
         """Tell which do either until a time."""
 
 
-class Kind(Protocol):
+class ManoeuvreKind(Protocol):
     """Manoeuvres of one kind, of n ownships, by the k values that they lead to.
 
     Attributes
@@ -96,7 +96,7 @@ class _AltitudeKind:
         return AltitudeConflicts(self._altitudes, intruder, detector, self._lookahead_s)
 
 
-def kind_of(name: str, own: State, values: Any) -> Kind:
+def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
     """Return the manoeuvres of one kind.
 
     Parameters

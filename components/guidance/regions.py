@@ -6,7 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.guidance.intervals import Interval, clear_intervals
-from components.guidance.kinds import Conflicts, Kind
+from components.guidance.kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
 from components.well_clear.nearly import surely_less
 from components.well_clear.volume import Volume
@@ -72,14 +72,18 @@ class Regions:
     Parameters
     ----------
     configuration : Configuration
-    kind : Kind
+    kind : ManoeuvreKind
         Of the ownships.
     own : State of (n,)
     intruders : list of GuidedIntruders
     """
 
     def __init__(
-        self, configuration: Configuration, kind: Kind, own: State, intruders: list[GuidedIntruders]
+        self,
+        configuration: Configuration,
+        kind: ManoeuvreKind,
+        own: State,
+        intruders: list[GuidedIntruders],
     ) -> None:
         self._configuration, self._kind, self._own = configuration, kind, own
         self._intruders = intruders
@@ -155,7 +159,7 @@ class Regions:
         return known, found
 
 
-def any_interval(kind: Kind, clear: BoolArray) -> BoolArray:
+def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     """Tell in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
@@ -164,7 +168,7 @@ def any_interval(kind: Kind, clear: BoolArray) -> BoolArray:
     return np.asarray(both.any(axis=1))
 
 
-def intervals_of(kind: Kind, row: int, clear: BoolArray) -> list[Interval]:
+def intervals_of(kind: ManoeuvreKind, row: int, clear: BoolArray) -> list[Interval]:
     """Return the intervals of values of one ownship that are clear."""
     there = kind.there[row]
     values = kind.values[row][there]

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from components.geometry.line_of_sight import LineOfSight
 from components.geometry.wrapping import wrap_pi_unchecked
+from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
 from components.line_of_sight.ladder import ATTITUDE, EARTH
 from components.line_of_sight.rung_choice import REFERENCE
 from components.line_of_sight.rung_planning import PickedModels, pick_rung
@@ -64,8 +65,12 @@ class Transform(Component):
     windowed = True
     lockstep = True
     rewindable = True
-    hooks = {"ownship": "(states) -> what the ownship believes of itself, by name"}
-    effects = (NavigationErrors(),)
+    hooks = {
+        "ownship": "(states) -> what the ownship believes of itself, by name",
+        "hides": "(own, other, present) -> which targets something stands before",
+        "bends": "(own, seen, attitude) -> seen: lines of sight along bent rays",
+    }
+    effects = (NavigationErrors(), *EARTH_EFFECTS)
     ladders = (EARTH, ATTITUDE)
     #: The type's own model of the Earth.
     earth: ClassVar[str]
@@ -79,6 +84,8 @@ class Transform(Component):
         self._beliefs: list[Callable[[TrafficStates], dict[str, FloatArray]]] = self.built(
             "ownship"
         )
+        self._hiding: list[Hides] = self.built("hides")
+        self._bending: list[Bends] = self.built("bends")
         self.rung = pick_rung(self)
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
@@ -135,9 +142,11 @@ class Transform(Component):
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         seen = self._line_of_sight.from_ownship(own, other)
+        for bends in self._bending:
+            seen = bends(own, seen, self._line_of_sight.attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)
         _require_numbers(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
-        return {
+        fields = {
             **seen._asdict(),
             "relative_heading_rad": heading,
             "target_pitch_rad": other.pitch_rad,
@@ -145,6 +154,11 @@ class Transform(Component):
             "alt_m": other.alt_m,
             "present": present,
         }
+        if self._hiding:
+            fields["hidden"] = np.logical_or.reduce(
+                [hides(own, other, present) for hides in self._hiding]
+            )
+        return fields
 
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where the ownship is then."""

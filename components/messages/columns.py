@@ -52,6 +52,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "skipped_off": ("targets", "", "left out: the sensor is off"),
         "skipped_field_of_view": ("targets", "", "left out: outside the field of view"),
         "skipped_range": ("targets", "", "left out: beyond the range"),
+        "skipped_hidden": ("targets", "", "left out: the Earth or its ground stands before it"),
         "skipped_culled": ("targets", "", "left out: too far away for any sensor"),
     },
     "detections": {
@@ -108,6 +109,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
     "manoeuvres": {
         "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
         "rate_rad_s": ("rad/s", "", "rate of that turn"),
+        "climb_m": ("m", "", "commanded change of altitude, positive upward"),
+        "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
     },
     "processing": {
         "processor": ("", "", "shared processor"),

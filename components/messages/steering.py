@@ -1,29 +1,70 @@
 """The message of an avoidance block to the ownship."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import Message, per_row
 
 
+class Manoeuvre(NamedTuple):
+    """One manoeuvre: a turn, or a climb or descent; what is not changed is 0.
+
+    Parameters
+    ----------
+    turn_rad : float
+        Change of heading, positive to the right.
+    rate_rad_s : float
+        Rate of the turn, above 0 where there is one.
+    climb_m : float
+        Change of altitude, positive upward.
+    climb_rate_mps : float
+        Vertical speed of it, above 0 where there is one.
+    """
+
+    turn_rad: float = 0.0
+    rate_rad_s: float = 0.0
+    climb_m: float = 0.0
+    climb_rate_mps: float = 0.0
+
+
 @dataclass(eq=False)
 class Manoeuvres(Message):
-    """Turns that the ownship is told to fly, one per row.
+    """Turns and climbs that the ownship is told to fly, one per row.
 
     Parameters
     ----------
     turn_rad : (rows,)
-        Change of heading, positive to the right.
+        Change of heading, positive to the right; 0 for a climb or descent.
     rate_rad_s : (rows,)
-        Rate of the turn, above 0.
+        Rate of the turn, above 0 where there is one.
+    climb_m : (rows,), optional
+        Change of altitude, positive upward; 0 for a turn, and by default.
+    climb_rate_mps : (rows,), optional
+        Vertical speed, above 0 where there is a climb or descent.
     """
 
     row_table = "manoeuvres"
 
     turn_rad: FloatArray = per_row(column="float64")
     rate_rad_s: FloatArray = per_row(column="float64")
+    climb_m: FloatArray = per_row(column="float64", default=None)
+    climb_rate_mps: FloatArray = per_row(column="float64", default=None)
+
+    def __post_init__(self) -> None:
+        """Fill in what is not changed."""
+        for name in ("climb_m", "climb_rate_mps"):
+            if getattr(self, name) is None:
+                setattr(self, name, np.zeros(len(self.tick)))
+
+    @classmethod
+    def of(cls, ticks: Sequence[int], told: Sequence[Manoeuvre]) -> Self:
+        """Return the message of manoeuvres, each told at an instant."""
+        parts = np.array(told, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
+        return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

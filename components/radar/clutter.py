@@ -2,7 +2,8 @@
 
 The model. In one look (the pulses of a coherent interval already added up) the receiver sees the
 complex amplitude ``target + mean clutter + Gaussian``, against the threshold that was set for noise
-alone. The thesis has only the Gaussian part, of zero mean: noise. Clutter adds to it
+alone, or against one that rises with the power of the clutter. The thesis has only the Gaussian
+part, of zero mean: noise. Clutter adds to it
 
 - a *mean*: the echo of this patch of ground. It is *constant* (a building, a rock face) or
   *fluctuating* (exponential power from look to look: many scatterers), with a phase that is random
@@ -53,6 +54,8 @@ KINDS = ("constant", "fluctuating")
 
 # Half circle of phases between a steady target and constant clutter.
 _PHASES = 64
+# For a threshold that has no largest value.
+_ANY_THRESHOLD = math.inf
 _SMALLEST_FALSE_ALARM_PROBABILITY = 1e-100
 
 
@@ -64,8 +67,9 @@ def clutter_detection_probability(
     model: str = "swerling1",
     clutter: str = "fluctuating",
     diffuse_cnr: ArrayLike = 0.0,
+    threshold: str = "noise",
 ) -> Any:
-    """Return the probability that the cell of a target in clutter crosses the noise threshold.
+    """Return the probability that the cell of a target in clutter crosses the threshold.
 
     Parameters
     ----------
@@ -75,7 +79,7 @@ def clutter_detection_probability(
         Power of the clutter's mean over the noise, C, linear, 0 or more. Where `cnr` and
         `diffuse_cnr` are 0 the result is `detection_probability`'s, to the bit.
     false_alarm_probability : float
-        Of noise alone: it sets the threshold, which clutter does not move. 1e-100 to below 1.
+        Of noise alone: it sets the threshold V. 1e-100 to below 1.
     model : str
         ``swerling0`` (or ``swerling5``) … ``swerling4``. In one look I and II are the same, and
         so are III and IV.
@@ -83,6 +87,10 @@ def clutter_detection_probability(
         Whether the clutter's mean fluctuates from look to look.
     diffuse_cnr : array_like
         Power of the clutter's zero-mean part over the noise, D, linear, 0 or more.
+    threshold : {"noise", "adaptive"}
+        Whether the threshold stays where noise alone has it, or rises with the mean power of noise
+        and clutter, V (1 + C + D). Then the false alarms of fluctuating clutter stay what they
+        are, and those of a constant mean are fewer.
 
     Returns
     -------
@@ -103,6 +111,7 @@ def clutter_detection_probability(
     """
     name = checked_model(model)
     kind = one_of("clutter", clutter, KINDS)
+    rises = one_of("threshold", threshold, ("noise", "adaptive")) == "adaptive"
     pfa = checked_probability("false_alarm_probability", false_alarm_probability)
     refuse(
         "false_alarm_probability",
@@ -121,7 +130,11 @@ def clutter_detection_probability(
     result[clear] = detection_probability(
         target[clear], false_alarm_probability=float(pfa), model=name
     )
-    cell = (target[cluttered], mean[cluttered], 1.0 + diffuse[cluttered], -math.log(float(pfa)))
+    noise = 1.0 + diffuse[cluttered]
+    # A threshold that is so many times higher sees all powers so many times lower.
+    over = noise + mean[cluttered] if rises else np.ones_like(noise)
+    powers = (target[cluttered] / over, mean[cluttered] / over, noise / over)
+    cell = (*powers, -math.log(float(pfa)), _ANY_THRESHOLD if rises else 0.0)
     with np.errstate(under="ignore"):  # vanishing probabilities are 0
         found = _fluctuating(name, *cell) if kind == "fluctuating" else _constant(name, *cell)
     result[cluttered] = np.minimum(np.maximum(found, 0.0), 1.0)
@@ -129,10 +142,11 @@ def clutter_detection_probability(
 
 
 def _fluctuating(
-    model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float
+    model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, most: float
 ) -> FloatArray:
     noise = noise + mean
     if model == "swerling0":
+        # With the mean as noise a threshold that rises is back at v, up to rounding.
         return marcum_q1(target / noise, v / noise, v)
     if model in ("swerling1", "swerling2"):
         return np.exp(-v / (noise + target))
@@ -141,16 +155,17 @@ def _fluctuating(
 
 
 def _constant(
-    model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float
+    model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, most: float
 ) -> FloatArray:
+    largest = max(v, most)
     if model == "swerling0":
-        return _over_phases(target, mean, noise, v)
+        return _over_phases(target, mean, noise, v, largest)
     if model in ("swerling1", "swerling2"):
         total = noise + target
-        return marcum_q1(mean / total, v / total, v)
+        return marcum_q1(mean / total, v / total, largest)
     a = 0.5 * target
     total = noise + a
-    return marcum_q1(mean / total, v / total, v) + a / total * _slope(mean / total, v / total)
+    return marcum_q1(mean / total, v / total, largest) + a / total * _slope(mean / total, v / total)
 
 
 def _slope(c: FloatArray, w: FloatArray) -> FloatArray:
@@ -162,11 +177,13 @@ def _slope(c: FloatArray, w: FloatArray) -> FloatArray:
     return np.exp(-((root_c - root_w) ** 2)) * (w * i0e(x) - root_c * root_w * i1e(x))
 
 
-def _over_phases(target: FloatArray, mean: FloatArray, noise: FloatArray, v: float) -> FloatArray:
+def _over_phases(
+    target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, largest: float
+) -> FloatArray:
     s, c = np.sqrt(target), np.sqrt(mean)
     total = np.zeros_like(s)
     for phase in (np.arange(_PHASES) + 0.5) * (math.pi / _PHASES):
         # |s + c e^(i phase)|² as (s - c)² + 4 s c cos²(phase/2): never negative.
         power = (s - c) ** 2 + 4.0 * s * c * math.cos(0.5 * phase) ** 2
-        total += marcum_q1(power / noise, v / noise, v)
+        total += marcum_q1(power / noise, v / noise, largest)
     return total / _PHASES

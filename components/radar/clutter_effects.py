@@ -1,5 +1,6 @@
 """Ground clutter as an effect on a radar's detections."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,9 +17,10 @@ _CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution
 class GroundClutter(Effect):
     """Echo of flat terrain in the cell of each target, where the beam meets it.
 
-    The beam points at the target and is as wide as a resolution cell; clutter more than two
-    beamwidths off its axis is 0. The air takes from the echo of the ground what it takes from the
-    target's. Clutter that is detected where no target is, is not reported.
+    The beam points at the target and is as wide as a resolution cell, unless the scene gives its
+    beamwidths; clutter more than two beamwidths off its axis is 0. The air takes from the echo of
+    the ground what it takes from the target's. What the threshold does there is said by
+    ``clutter_threshold``.
     """
 
     lockstep = True
@@ -48,6 +50,15 @@ class GroundClutter(Effect):
                 "set it to 1, with integration_gain_db for pulses integrated coherently"
             )
 
+        if terrain.clutter_mean == "constant" and block.p.cfar_reference_cells is not None:
+            raise ValueError(
+                f"cfar_reference_cells is {block.p.cfar_reference_cells} and [terrain] "
+                "clutter_mean is 'constant': an average of cells is known for clutter that "
+                "fluctuates; leave one of them out"
+            )
+
+        across_rad, upwards_rad = beamwidths_rad(block)
+
         def clutter_rcs_m2(cells: Cells) -> FloatArray:
             height_m = height_above_terrain_m(cells.of_row("own_alt_m"), terrain.height_m)
             rcs = ground_clutter_rcs_m2(
@@ -55,13 +66,43 @@ class GroundClutter(Effect):
                 cells.elevation_rad,
                 height_m,
                 gamma_db=terrain.clutter_gamma_db,
-                azimuth_beamwidth_rad=block.azimuth_step_rad,
-                elevation_beamwidth_rad=block.elevation_step_rad,
+                azimuth_beamwidth_rad=across_rad,
+                elevation_beamwidth_rad=upwards_rad,
                 range_resolution_m=block.range_step_m,
             )
             return np.asarray(rcs)
 
         return clutter_rcs_m2
+
+
+class BoundaryClutter(GroundClutter):
+    """The same for a range boundary, which hears the ground if its cells have a size."""
+
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] height_m``, and for a cell."""
+        found = super().verdict(block)
+        zero = [name for name in _CELL if getattr(block.p, name) == 0]
+        if found.simulated and zero:
+            return Verdict(False, f"{zero[0]} is 0: no cell, no ground in it")
+        return found
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return each cell's ground clutter; 0 where the verdict was that there is none."""
+        if not self.verdict(block).simulated:
+            return lambda cells: np.zeros(len(cells))
+        return super().build(block)
+
+
+def beamwidths_rad(block: Any) -> tuple[float, float]:
+    """Return a radar's beamwidths in azimuth and elevation, rad; by default its resolution."""
+    azimuth_deg = getattr(block.p, "azimuth_beamwidth_deg", None)
+    elevation_deg = getattr(block.p, "elevation_beamwidth_deg", None)
+    return (
+        block.azimuth_step_rad if azimuth_deg is None else math.radians(azimuth_deg),
+        block.elevation_step_rad if elevation_deg is None else math.radians(elevation_deg),
+    )
 
 
 def terrain_of(block: Any) -> Any:

@@ -25,6 +25,8 @@ class ExactDetection(Effect):
         """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""
         if block.p.detection != "exact":
             return Verdict(False, f"detection is {block.p.detection!r}")
+        if block.p.cfar_reference_cells is not None:
+            return Verdict(True, "with CFAR there is no other")
         if closed_form(block):
             return Verdict(True, "with 1 pulse and Swerling I or II it is a closed form")
         bound = {"detection_probability": TABLE_ERROR}

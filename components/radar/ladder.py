@@ -44,8 +44,8 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
     radar: Any = block
     if not hasattr(radar, "models_in_use"):
         raise Unavailable("a boundary or threshold decides: it states no probability")
-    if radar.built("clutter"):
-        raise Unavailable("ground clutter: no evaluation at more digits")
+    if radar.built("clutter") or radar.built("threshold from reference cells"):
+        raise Unavailable("ground clutter or CFAR: no evaluation at more digits")
     at: dict[str, FloatArray] = {}
 
     def values(cells: Cells) -> dict[str, FloatArray]:
@@ -91,6 +91,11 @@ def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
     raise Unavailable("needs calibrate.range_km or range_km to put the boundary at")
 
 
+def _averages(block: Component) -> str:
+    cells = getattr(block.p, "cfar_reference_cells", None)
+    return "" if cells is None else f"cfar_reference_cells is {cells}: Pd has one method with CFAR"
+
+
 def _tables(block: Component) -> str:
     rosters = known_targets(block.context)
     if rosters and not any(craft.rcs_table for roster in rosters for craft in roster.aircraft):
@@ -115,6 +120,7 @@ DETECTION = Ladder(
     measure_pd,
     pd_truth,
     clears=("model",),
+    applies=_averages,
 )  # fmt: skip
 
 RCS = Ladder(

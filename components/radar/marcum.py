@@ -8,6 +8,8 @@ import numpy as np
 
 from components.arguments.checks import FloatArray
 
+#: Largest threshold of the sums.
+MOST = 240.0
 # Elements per pass, so that the working arrays stay in the cache.
 _CHUNK = 4096
 
@@ -24,8 +26,9 @@ def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: floa
     threshold : (m,) array
         In [0, largest_threshold], in the unit in which noise alone is Exponential(1).
     largest_threshold : float
-        At most 240 (a false-alarm probability of 1e-104). It sets the number of terms, so that
-        an element's bits depend on nothing else.
+        It sets the number of terms, so that an element's bits depend on nothing else. Above 240
+        (a false-alarm probability of 1e-104) thresholds beyond 240 have an asymptotic form, with
+        an absolute error below 1e-4.
 
     Returns
     -------
@@ -37,6 +40,8 @@ def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: floa
     With N Poisson(signal) and M Poisson(threshold) this is Pr(M <= N): summed over N where the
     signal is below the threshold, its complement over M elsewhere. All terms are positive.
     """
+    if largest_threshold > MOST:
+        return _q1_of_any(signal, threshold)
     terms = math.ceil(largest_threshold + 9.0 * math.sqrt(largest_threshold) + 36.0)
     result = np.empty_like(signal)
     for start in range(0, signal.size, _CHUNK):
@@ -59,3 +64,19 @@ def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: floa
                 total += outer * np.where(weak, below, previous)
         result[part] = np.where(weak, total, 1.0 - total)
     return np.minimum(np.maximum(result, 0.0), 1.0)
+
+
+def _q1_of_any(signal: FloatArray, threshold: FloatArray) -> FloatArray:
+    """Return the same for any threshold; far out both amplitudes are large.
+
+    There Q1(a, b) is Q(b - a) + e/2, of which Q1(a, b) + Q1(b, a) = 1 + e is exact, with
+    e = exp(-(a - b)²/2) i0e(a b).
+    """
+    from scipy.special import i0e, ndtr
+
+    far = threshold > MOST
+    result = marcum_q1(signal, np.where(far, 1.0, threshold), MOST)
+    a, b = np.sqrt(2.0 * signal[far]), np.sqrt(2.0 * threshold[far])
+    with np.errstate(under="ignore"):  # far apart the tails are 0
+        result[far] = ndtr(a - b) + 0.5 * np.exp(-0.5 * (a - b) ** 2) * i0e(a * b)
+    return np.minimum(result, 1.0)

@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from components.radar.clutter_parameters import ClutterParameters
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
 from components.radar.plausible import implausible
 from components.radar.resolution_parameters import ResolutionParameters
@@ -13,7 +14,7 @@ from components.radar.time_parameters import TimeBudgetParameters
 from dsa_des.block.component import Parameters
 
 
-class RadarParameters(ResolutionParameters):
+class RadarParameters(ResolutionParameters, ClutterParameters):
     """Parameters of every radar."""
 
     beam_sweep: bool = Field(

@@ -67,6 +67,22 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     ]
 
 
+def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
+    """Say that clutter raises detections where the threshold stays at the noise.
+
+    Parameters
+    ----------
+    parameters : ClutterParameters
+    terrain : Terrain or None
+    """
+    if terrain is None or parameters.clutter_threshold != "noise":
+        return []
+    return [
+        "clutter_threshold is 'noise': the echo of the ground counts as signal, so that clutter "
+        "raises detections; 'adaptive' keeps the probability of false alarm"
+    ]
+
+
 def many_false_alarms(parameters: Any, cells: int) -> list[str]:
     """Say how many false alarms a scan has where a probability meant for one look makes many.
 

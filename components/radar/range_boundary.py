@@ -1,15 +1,22 @@
 """The crudest radar: all inside its range is detected (``radar.range_boundary``, §2.2.2)."""
 
+from collections.abc import Callable
+
 import numpy as np
 from pydantic import Field
 
 from components.radar.beam_effects import BeamSweep
+from components.radar.cfar_effects import Averaging, CellAveraging
+from components.radar.clutter_effects import BoundaryClutter, terrain_of
 from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
+from components.radar.plausible import clutter_as_signal
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.sensor.look import Cells, Look
+from dsa_des.arrays.types import FloatArray
 
 
 class RangeBoundaryParameters(RadarParameters):
@@ -19,6 +26,29 @@ class RangeBoundaryParameters(RadarParameters):
     minimum_range_m: float | None = Field(
         default=None, gt=0, description="Closer than this nothing is detected, m; none by default."
     )
+    boundary_rcs_dbsm: float = Field(
+        default=0.0,
+        ge=-100,
+        le=100,
+        description="Target that the range is stated for, dBsm; used with ground clutter only.",
+    )
+    boundary_pd: float = Field(
+        default=0.9,
+        gt=0,
+        lt=1,
+        description="Pd at that range (Swerling I); used with ground clutter and CFAR only.",
+    )
+    false_alarm_probability: float = Field(
+        default=1e-6,
+        gt=0,
+        lt=1,
+        description="Probability of false alarm that goes with it; used as boundary_pd is.",
+    )
+
+    @property
+    def pulses_summed(self) -> int:
+        """One look."""
+        return 1
 
 
 class RangeBoundary(Radar):
@@ -26,20 +56,60 @@ class RangeBoundary(Radar):
 
     Confidence is 40·log10(range limit / range), the SNR margin in dB that a radar would have
     whose threshold lies at the limit.
+
+    Ground clutter brings the boundary nearer: for the target that it is stated for, the noise at
+    the boundary has that target's echo over the SNR that `boundary_pd` needs; the ground's echo
+    comes on top of it, and a threshold from reference cells needs the CFAR loss more.
     """
 
     Parameters = RangeBoundaryParameters
     lockstep = True
-    effects = (BlindRange(), OneReportByCell(), BeamSweep())
+    hooks = {
+        "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
+        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
+    }
+    effects = (BlindRange(), BoundaryClutter(), CellAveraging(), OneReportByCell(), BeamSweep())
     ladders = (DETECTION,)
+    _clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
+    _cfar: Averaging | None = None
+
+    def setup(self) -> None:
+        """Take what the scene's effects do to the boundary."""
+        super().setup()
+        (self._clutter_rcs_m2,) = self.built("clutter") or [None]
+        (self._cfar,) = self.built("threshold from reference cells") or [None]
+
+    def warnings(self) -> list[str]:
+        """Say that clutter counts as signal, where it does."""
+        return [*super().warnings(), *clutter_as_signal(self.p, terrain_of(self))]
 
     def look(self, cells: Cells) -> Look:
         """Detect every cell: the gate has kept those out of range away."""
         # A metre is closer than any radar sees; it keeps the margin finite at range 0.
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
+        margin_db = 40.0 * np.log10(ratio)
         detected = np.ones(len(cells), dtype=bool)
+        if self._clutter_rcs_m2 is not None or self._cfar is not None:
+            margin_db = self._margin_db(cells, margin_db)
+            detected = margin_db >= 0.0
         for factor in self.snr_factors:
             detected &= factor(cells) > 0.0
         # Of equal targets the nearer one has the stronger echo.
         detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
-        return Look(detected, 40.0 * np.log10(ratio))
+        return Look(detected, margin_db)
+
+    def _margin_db(self, cells: Cells, over_noise_db: FloatArray) -> FloatArray:
+        """Return the margin over what is in the cell, in dB, from that over noise."""
+        p = self.p
+        needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
+        signal, noise = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        if self._clutter_rcs_m2 is not None:
+            clutter = self._clutter_rcs_m2(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
+            if p.clutter_threshold == "noise":
+                signal = signal + clutter
+            else:
+                noise = noise + needed * clutter
+        margin_db: FloatArray = 10.0 * np.log10(signal / noise)
+        if self._cfar is not None:
+            margin_db = margin_db - self._cfar.loss_db(p.boundary_pd, "swerling1")
+        return margin_db

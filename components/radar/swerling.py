@@ -55,6 +55,11 @@ class SwerlingParameters(LinkBudgetParameters):
             raise ValueError(
                 f"model is 'auto' and detection is {self.detection!r}: leave one of them out"
             )
+        if self.cfar_reference_cells is not None and self.detection != "exact":
+            raise ValueError(
+                f"cfar_reference_cells is {self.cfar_reference_cells} and detection is "
+                f"{self.detection!r}: Pd with CFAR is computed exactly; leave one of them out"
+            )
         steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
         if self.detection == "gram_charlier" and not steady:
             raise ValueError(
@@ -66,6 +71,8 @@ class SwerlingParameters(LinkBudgetParameters):
 
 class SwerlingRadar(LinkBudgetRadar):
     """Detects each target with its probability of detection for a fluctuating cross-section.
+
+    Ground clutter raises the threshold with it (or counts as signal: ``clutter_threshold``).
 
     One keyed uniform draw per target and scan decides. With fluctuation 'probability' Pd is that
     of the fluctuating target at its mean SNR; with 'sampled' further keyed draws sample the RCS of
@@ -128,10 +135,9 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
-        snr = self.resolved(cells, self.snr(cells))
+        snr, cnr = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
-        cnr = self.clutter_cnr(cells)
         pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
@@ -159,9 +165,16 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
-        p = self.p
+        p, name = self.p, f"swerling{model}"
+        kind = "" if cnr is None else self.context.sections["terrain"].clutter_mean
+        adaptive = p.clutter_threshold == "adaptive"
+        if cnr is not None and adaptive and kind == "fluctuating":
+            # Clutter that fluctuates like noise is more noise to a threshold that follows it.
+            snr, cnr = snr / (1.0 + cnr), None
+        if self.cfar is not None:
+            return self.cfar.probability(snr, name)
         pd = probability_of_cells(
-            snr, p.pulses_summed, p.false_alarm_probability, f"swerling{model}", self._method
+            snr, p.pulses_summed, p.false_alarm_probability, name, self._method
         )
         if cnr is None or not cnr.any():
             return pd
@@ -169,18 +182,19 @@ class SwerlingRadar(LinkBudgetRadar):
         pd[cluttered] = clutter_detection_probability(
             snr[cluttered],
             cnr[cluttered],
-            false_alarm_probability=self.p.false_alarm_probability,
-            model=f"swerling{model}",
-            clutter=self.context.sections["terrain"].clutter_mean,
+            false_alarm_probability=p.false_alarm_probability,
+            model=name,
+            clutter=kind,
+            threshold=p.clutter_threshold,
         )
         return pd
 
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
 
-        None where there is ground clutter, which the same loss takes as well.
+        None where there is ground clutter, which the same loss takes as well, and with CFAR.
         """
-        if terrain_of(self) is not None:
+        if terrain_of(self) is not None or self.p.cfar_reference_cells is not None:
             return None
         return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
 
@@ -192,8 +206,11 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:
-            self._reference_db[model] = self.required_snr_db(
-                self.p.reference_pd, f"swerling{model}"
+            pd, name = self.p.reference_pd, f"swerling{model}"
+            self._reference_db[model] = (
+                self.required_snr_db(pd, name)
+                if self.cfar is None
+                else 10.0 * math.log10(self.cfar.required_snr(pd, name))
             )
         return self._reference_db[model]
 

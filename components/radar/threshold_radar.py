@@ -12,12 +12,14 @@ from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
 from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
-from components.radar.clutter_effects import GroundClutter
+from components.radar.cfar_effects import Averaging, CellAveraging
+from components.radar.clutter_effects import GroundClutter, terrain_of
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.plausible import (
+    clutter_as_signal,
     high_false_alarms,
     implausible,
     many_false_alarms,
@@ -53,12 +55,14 @@ class LinkBudgetRadar(Radar):
         "mean RCS": "(cells) -> each cell's mean RCS in m²",
         "energy of a look": "what the time of a scan leaves for each beam",
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
+        "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
         BlindRange(),
         GroundClutter(),
+        CellAveraging(),
         OneReportByCell(),
         FalseAlarms(),
         TimeBudget(),
@@ -75,6 +79,7 @@ class LinkBudgetRadar(Radar):
         #: Each cell's mean RCS, m².
         self.mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
         self._clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
+        self.cfar: Averaging | None = None
         self._roster: Roster | None = None
 
     def setup(self) -> None:
@@ -83,6 +88,7 @@ class LinkBudgetRadar(Radar):
         self._echo_budget = self._without_blind_range()
         (self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
         (self._clutter_rcs_m2,) = self.built("clutter") or [None]
+        (self.cfar,) = self.built("threshold from reference cells") or [None]
 
     def _without_blind_range(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
@@ -124,6 +130,10 @@ class LinkBudgetRadar(Radar):
             return None
         return self.echo_snr(cells, self._clutter_rcs_m2(cells))
 
+    def received(self, cells: Cells) -> tuple[FloatArray, FloatArray | None]:
+        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground."""
+        return self.resolved(cells, self.snr(cells)), self.clutter_cnr(cells)
+
     def false_alarm_zero_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
         raise TypeError(f"{type(self).__name__} does not say what its confidence is measured from")
@@ -150,6 +160,7 @@ class LinkBudgetRadar(Radar):
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
             *self._said_of_false_alarms(),
+            *clutter_as_signal(self.p, terrain_of(self)),
         ]
 
     def _said_of_false_alarms(self) -> list[str]:
@@ -171,6 +182,8 @@ class ThresholdRadar(LinkBudgetRadar):
 
     Confidence is the SNR above the threshold in dB. Ground clutter counts as more noise: where
     there is some, the SNR is that over noise and clutter (the recorded one is over noise alone).
+    With ``clutter_threshold = "noise"`` it counts as signal. A threshold from reference cells is
+    higher by the CFAR loss, that of the calibration's Pd and target (else Pd 0.9, Swerling I).
     """
 
     Parameters = ThresholdParameters
@@ -178,13 +191,19 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
+        known = parameters.calibrate
+        pd = 0.9 if known is None else known.pd
+        self._stated_for = pd, "swerling1" if known is None else f"swerling{known.swerling}"
         if parameters.threshold_db is not None:
             self.threshold_db = float(parameters.threshold_db)
         else:
-            known = parameters.calibrate
-            pd = 0.9 if known is None else known.pd
-            model = "swerling1" if known is None else f"swerling{known.swerling}"
-            self.threshold_db = self.required_snr_db(pd, model)
+            self.threshold_db = self.required_snr_db(*self._stated_for)
+
+    def setup(self) -> None:
+        """Take the scene's effects; a threshold from reference cells is higher by its loss."""
+        super().setup()
+        if self.cfar is not None:
+            self.threshold_db += self.cfar.loss_db(*self._stated_for)
 
     def false_alarm_zero_db(self) -> float:
         """Return the threshold."""
@@ -192,11 +211,12 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Compare every cell's SNR with the threshold."""
-        snr = self.resolved(cells, self.snr(cells))
+        snr, cnr = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         margin = snr_db - self.threshold_db
-        cnr = self.clutter_cnr(cells)
-        if cnr is not None:
+        if cnr is not None and self.p.clutter_threshold == "noise":
+            margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
+        elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
         return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db})

@@ -15,7 +15,7 @@ from components.aircraft.known_targets import KnownTraffic
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.reach import FarthestLook, farthest_look
-from components.messages.steering import Manoeuvres
+from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
 from components.traffic.censored import censored_approaches, present_together_s
 from components.traffic.closest_approach import (
@@ -29,7 +29,7 @@ from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
-from components.traffic.terrain_check import check_above_terrain
+from components.traffic.terrain_check import check_above_terrain, check_on_raster
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -37,6 +37,8 @@ from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
+
+_TOLD = Manoeuvre._fields
 
 
 class SourceParameters(Parameters):
@@ -86,7 +88,10 @@ class TrafficSource(Component):
 
     inputs = {
         "manoeuvres": Input(
-            Manoeuvres, "queued", "Turns that the ownship is told to fly.", required=False
+            Manoeuvres,
+            "queued",
+            "Turns and climbs that the ownship is told to fly.",
+            required=False,
         )
     }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
@@ -131,6 +136,13 @@ class TrafficSource(Component):
         terrain = self.context.sections.get("terrain")
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
+        if terrain is not None and terrain.raster is not None:
+            check_on_raster(
+                self.own,
+                terrain.raster.raster,
+                terrain.raster_offset_m,
+                float(self.context.duration_s),
+            )
         self._all_columns = np.arange(len(self.roster))
         self._culling: Culling | None = None
         self._steered_culling: SteeredCulling | None = None
@@ -141,8 +153,8 @@ class TrafficSource(Component):
         if self.context.producers:
             self.own = SteeredFlight(self.own)
         self._flights_now: Flights = partial(self.flights, self.own)
-        #: Manoeuvres (tick, turn and rate) that have come, and are not flown by any row yet.
-        self._told: list[tuple[int, float, float]] = []
+        #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
+        self._told: list[tuple[int, Manoeuvre]] = []
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where it is known how far sensors look."""
@@ -241,7 +253,7 @@ class TrafficSource(Component):
         return own.at(time_s), others.reshaped(time_s.shape)
 
     def _steer(self, wake: Wake) -> KnownFlights | None:
-        """Turn the ownship at the times at which manoeuvres have come.
+        """Steer the ownship at the times at which manoeuvres have come.
 
         Returns
         -------
@@ -250,23 +262,23 @@ class TrafficSource(Component):
             the manoeuvres that have come by its own instant, whatever came later in this wake.
         """
         for new in wake.arrivals("manoeuvres"):
-            turns = new.message.turn_rad.tolist(), new.message.rate_rad_s.tolist()
-            self._told = [*self._told, *zip(new.tick.tolist(), *turns, strict=True)]
+            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
+            self._told = [*self._told, *zip(new.tick.tolist(), manoeuvres, strict=True)]
         last = int(wake.ticks[-1])
         # What comes after the last row is for the next wake: what is flown at the end of a run
         # must not depend on how far a window reached beyond it.
-        told = [turn for turn in self._told if turn[0] <= last]
+        told = [one for one in self._told if one[0] <= last]
         self._told = self._told[len(told) :]
         known = [self._flights_now]
-        for tick, turn_rad, rate_rad_s in told:
+        for tick, manoeuvre in told:
             assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.turned(tick / self.context.ticks_per_s, turn_rad, rate_rad_s)
+            self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
             known.append(partial(self.flights, self.own))
         self._flights_now = known[-1]
         if not self._flights_asked_for:
             return None
         # A manoeuvre has come before anything runs at its instant.
-        came = np.array([tick for tick, _, _ in told], dtype=np.int64)
+        came = np.array([tick for tick, _ in told], dtype=np.int64)
         return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A flight that is told to turn while it is flown."""
+"""A flight that is told to turn, climb or descend while it is flown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
-from components.traffic.legs import AnyLeg, ScriptedTrajectory, Straight, Turn
+from components.messages.steering import Manoeuvre
+from components.traffic.legs import AnyLeg, Climb, ScriptedTrajectory, Straight, Turn
 
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
@@ -29,9 +30,9 @@ class SteerableFlight(Protocol):
 
 
 class SteeredFlight:
-    """A flight up to its first manoeuvre, and from each manoeuvre on a turn and then straight on.
+    """A flight up to its first manoeuvre; each is a turn, climb or descent, and then straight on.
 
-    It never changes: `turned` returns another one, so that a run can go back to the flight it had.
+    It never changes: `steered` returns another one, so that a run can go back to the flight it had.
 
     Parameters
     ----------
@@ -51,17 +52,16 @@ class SteeredFlight:
         """Largest speed along the path as it is now."""
         return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
 
-    def turned(self, time_s: float, turn_rad: float, rate_rad_s: float) -> SteeredFlight:
-        """Return the flight that turns at a time, levels off and flies on.
+    def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
+        """Return the flight that does as it is told from a time on, levels off and flies on.
 
         Parameters
         ----------
         time_s : float
             Not before an earlier manoeuvre.
-        turn_rad : float
-            Change of heading, positive to the right; not 0.
-        rate_rad_s : float
-            Rate of the turn, above 0.
+        told : Manoeuvre
+            A turn or a change of altitude, which begins and ends at once: without a change of
+            speed along the path's projection, and without acceleration upward.
         """
         state = self.at(np.array([time_s - _BASE_S, time_s, time_s + _BASE_S]))
         here = float(state.lat_deg[1]), float(state.lon_deg[1]), float(state.alt_m[1])
@@ -70,13 +70,7 @@ class SteeredFlight:
             *here, state.lat_deg[[0, 2]], state.lon_deg[[0, 2]], state.alt_m[[0, 2]]
         )
         along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
-        legs: list[AnyLeg] = [
-            Turn(
-                rate_deg_s=math.copysign(math.degrees(rate_rad_s), turn_rad),
-                angle_deg=math.degrees(abs(turn_rad)),
-            ),
-            Straight(),
-        ]
+        legs: list[AnyLeg] = [_leg(told, here[2]), Straight()]
         part = ScriptedTrajectory(
             self.name,
             lat_deg=here[0],
@@ -107,3 +101,13 @@ class SteeredFlight:
         order = np.argsort(np.concatenate(chosen), kind="stable")
         columns = zip(*(state.arrays() for state in states), strict=True)
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
+
+
+def _leg(told: Manoeuvre, alt_m: float) -> AnyLeg:
+    if told.climb_m != 0.0:
+        rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
+        return Climb(climb_mps=rate_mps, to_alt_m=alt_m + told.climb_m)
+    return Turn(
+        rate_deg_s=math.copysign(math.degrees(told.rate_rad_s), told.turn_rad),
+        angle_deg=math.degrees(abs(told.turn_rad)),
+    )

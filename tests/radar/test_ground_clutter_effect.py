@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import chndtr, roots_genlaguerre
 
 from components.radar.clutter import clutter_detection_probability
 from components.radar.detection import detection_probability
@@ -40,6 +41,8 @@ heading_deg = 180
 speed_mps = 60
 """
 GROUND = "[terrain]\nheight_m = 60\nclutter_gamma_db = -20\n"
+#: Clutter counts as signal: the threshold stays at the noise.
+STAYS = 'clutter_threshold = "noise"\n'
 
 
 @pytest.fixture
@@ -75,12 +78,16 @@ def radar_rows(tables, target):
 
 @pytest.mark.parametrize("swerling", [0, 1, 3])
 @pytest.mark.parametrize("mean", ["constant", "fluctuating"])
-def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling):
-    """Shnidman's treatment (thesis §5.3.2) at the CNR of the radar equation, detection by one."""
-    path = scene(GROUND + f'clutter_mean = "{mean}"\n', swerling=swerling)
+@pytest.mark.parametrize(("radar", "rises"), [("", True), (STAYS, False)])
+def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling, radar, rises):
+    """Shnidman's treatment (thesis §5.3.2) at the CNR of the radar equation, detection by one.
+
+    A threshold that rises with the clutter sees the powers of all that much smaller.
+    """
+    path = scene(GROUND + f'clutter_mean = "{mean}"\n', radar=radar, swerling=swerling)
     simulation, tables = simulate(path)
     rows = radar_rows(tables, "low")
-    assert len(rows) > 50
+    assert len(rows) > 40
     ranges = np.array([row["true_range_m"] for row in rows])
     # The ownship is level, so its body elevation is that of the NED frame.
     elevation = np.array([row["true_elevation_rad"] for row in rows])
@@ -96,13 +103,38 @@ def test_pd_is_that_of_the_echo_within_the_clutter(scene, mean, swerling):
     cnr = simulation.components["radar"].budget.snr(ranges, clutter)
     assert cnr.max() > 0.3
     snr = 10.0 ** (np.array([row["snr_db"] for row in rows]) / 10.0)
-    expected = clutter_detection_probability(
-        snr, cnr, false_alarm_probability=0.05, model=f"swerling{swerling}", clutter=mean
-    )
+    stays = {"false_alarm_probability": 0.05, "model": f"swerling{swerling}"}
+    if rises and mean == "fluctuating":
+        expected = detection_probability(snr / (1.0 + cnr), **stays)
+    elif rises:
+        powers = [snr / (1.0 + cnr), cnr / (1.0 + cnr)]
+        expected = averaged_over_the_echoes(*powers, 1.0 / (1.0 + cnr), swerling)
+    else:
+        expected = clutter_detection_probability(snr, cnr, **stays, clutter=mean)
     found = np.array([row["detection_probability"] for row in rows])
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    np.testing.assert_allclose(found, expected, rtol=1e-4 if rises else 1e-8)
     clear = detection_probability(snr, false_alarm_probability=0.05, model=f"swerling{swerling}")
     assert np.max(np.abs(found - clear)) > 1e-5
+    if rises:
+        assert np.all(found <= clear + 1e-12)
+
+
+def averaged_over_the_echoes(target, clutter, noise, swerling):
+    """Marcum's Q averaged over RCS and phase, for a threshold of the thesis's Pfa."""
+    if swerling == 0:
+        rcs, weight = np.ones(1), np.ones(1)
+    else:
+        shape = {1: 1, 3: 2}[swerling]
+        node, weight = roots_genlaguerre(90, shape - 1)
+        rcs, weight = node / shape, weight / weight.sum()
+    phase = (np.arange(200) + 0.5) * math.pi / 200
+    found = []
+    for s, c, n in zip(target, clutter, noise, strict=True):
+        amplitude = np.sqrt(s * rcs)[:, np.newaxis]
+        power = amplitude**2 + c + 2.0 * amplitude * math.sqrt(c) * np.cos(phase)
+        reached = 1.0 - chndtr(-2.0 * math.log(0.05) / n, 2, 2.0 * power / n)
+        found.append(float(weight @ reached.mean(axis=1)))
+    return np.array(found)
 
 
 def test_clutter_is_only_where_the_beam_meets_the_ground(scene):

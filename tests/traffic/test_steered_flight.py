@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from components.geometry.ellipsoid import line_of_sight_ned
+from components.messages.steering import Manoeuvre
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.steered_flight import SteeredFlight
 
@@ -16,7 +17,7 @@ STRAIGHT = ScriptedTrajectory(
 
 def test_before_the_manoeuvre_nothing_changes():
     times = np.linspace(0.0, 30.0, 61)
-    turned = SteeredFlight(STRAIGHT).turned(30.5, 0.3, 0.05)
+    turned = SteeredFlight(STRAIGHT).steered(30.5, Manoeuvre(0.3, 0.05))
     for got, expected in zip(turned.at(times).arrays(), STRAIGHT.at(times).arrays(), strict=True):
         assert np.array_equal(got, expected)
 
@@ -24,7 +25,7 @@ def test_before_the_manoeuvre_nothing_changes():
 @pytest.mark.parametrize("turn_deg", [-40.0, 25.0, 170.0])
 def test_it_turns_by_the_angle_at_the_rate_without_a_jump(turn_deg):
     rate = math.radians(3.0)
-    turned = SteeredFlight(STRAIGHT).turned(20.0, math.radians(turn_deg), rate)
+    turned = SteeredFlight(STRAIGHT).steered(20.0, Manoeuvre(math.radians(turn_deg), rate))
     done_s = 20.0 + abs(turn_deg) / 3.0
     yaw = turned.at(np.array([20.0, done_s + 1.0])).yaw_rad
     change = math.remainder(float(yaw[1] - yaw[0]), 2.0 * math.pi)
@@ -40,8 +41,8 @@ def test_it_turns_by_the_angle_at_the_rate_without_a_jump(turn_deg):
 
 
 def test_manoeuvres_follow_each_other_and_the_old_flight_stays():
-    once = SteeredFlight(STRAIGHT).turned(10.0, 0.5, 0.05)
-    twice = once.turned(40.0, -0.5, 0.05)
+    once = SteeredFlight(STRAIGHT).steered(10.0, Manoeuvre(0.5, 0.05))
+    twice = once.steered(40.0, Manoeuvre(-0.5, 0.05))
     assert len(once.parts) == 1
     times = np.array([5.0, 25.0, 39.9])
     for got, expected in zip(twice.at(times).arrays(), once.at(times).arrays(), strict=True):
@@ -54,5 +55,17 @@ def test_a_climbing_flight_levels_off():
         "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=0.0, speed_mps=60.0,
         climb_mps=5.0,
     )  # fmt: skip
-    state = SteeredFlight(climbing).turned(10.0, 0.2, 0.05).at(np.array([10.0, 50.0]))
+    state = SteeredFlight(climbing).steered(10.0, Manoeuvre(0.2, 0.05)).at(np.array([10.0, 50.0]))
     assert state.alt_m == pytest.approx([1050.0, 1050.0], abs=0.01)
+
+
+@pytest.mark.parametrize("climb_m", [180.0, -240.0])
+def test_it_climbs_by_the_change_at_the_rate_and_levels_off(climb_m):
+    flight = SteeredFlight(STRAIGHT).steered(20.0, Manoeuvre(climb_m=climb_m, climb_rate_mps=4.0))
+    done_s = 20.0 + abs(climb_m) / 4.0
+    state = flight.at(np.array([20.0, 30.0, done_s, done_s + 50.0]))
+    start = float(STRAIGHT.at(np.array([20.0])).alt_m[0])
+    wanted = [0.0, math.copysign(40.0, climb_m), climb_m, climb_m]
+    assert state.alt_m - start == pytest.approx(wanted, abs=0.02)
+    straight = STRAIGHT.at(np.array([20.0, 30.0, done_s, done_s + 50.0]))
+    assert state.yaw_rad == pytest.approx(straight.yaw_rad, abs=1e-6)

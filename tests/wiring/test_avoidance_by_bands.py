@@ -122,3 +122,22 @@ def test_it_pauses_between_turns(tmp_path):
 def test_it_turns_as_fast_as_the_configuration_says(tmp_path):
     found = run(scene(tmp_path, rate_deg_s=1.5))
     assert {round(math.degrees(row["rate_rad_s"]), 9) for row in rows(found, "manoeuvres")} == {1.5}
+
+
+@covers("manoeuvre", "beyond_m", of=KIND)
+def test_it_climbs_out_of_the_band_of_altitudes(tmp_path):
+    """30 m above us and climbing as we do: the way out is down, by the volume's half height."""
+    to_edge, beyond = (
+        rows(run(scene(tmp_path, level=1, manoeuvre="climb", beyond_m=m)), "manoeuvres")[0]
+        for m in (0.0, 37.0)
+    )
+    assert to_edge["turn_rad"] == to_edge["rate_rad_s"] == 0.0
+    assert to_edge["climb_rate_mps"] == pytest.approx(500 * 0.3048 / 60)
+    own_m = 900.0 + 0.5 * to_edge["time_s"]
+    # Altitudes are on a grid of 100 ft; the intruder goes on climbing while we go down.
+    assert -80.0 < to_edge["climb_m"] < -50.0 + 0.5 * 60
+    assert (own_m + to_edge["climb_m"]) / 30.48 == pytest.approx(
+        round((own_m + to_edge["climb_m"]) / 30.48), abs=0.4
+    )
+    assert beyond["time_s"] == to_edge["time_s"]
+    assert beyond["climb_m"] == pytest.approx(to_edge["climb_m"] - 37.0)

@@ -69,7 +69,7 @@ def test_the_probability_of_detection_follows_the_clutter_s_mean(mean):
     radar = {
         **{key: RADAR[key] for key in RADAR if key != "threshold_db"},
         "type": "radar.swerling", "swerling": 0, "false_alarm_probability": pfa,
-        "power_w": 0.4, "reference_pd": 0.5,
+        "power_w": 0.4, "reference_pd": 0.5, "clutter_threshold": "noise",
     }  # fmt: skip
     terrain = {"height_m": 1300.0, "clutter_gamma_db": -5.0, "clutter_mean": mean}
     seen = first_look(chain({"radar": radar}, targets=TARGETS, terrain=terrain), "radar")

@@ -79,16 +79,21 @@ def test_the_air_takes_from_the_ground_what_it_takes_from_the_target(weather):
     assert ratio(weather=weather) == pytest.approx(ratio(), rel=1e-6)
 
 
+@pytest.mark.parametrize("threshold", ["noise", "adaptive"])
 @pytest.mark.parametrize("model", [1, 3])
-def test_a_fluctuating_target_in_clutter(model):
+def test_a_fluctuating_target_in_clutter(model, threshold):
     """As noise raised by the clutter; another Pfa per cell has no part in it."""
     pfa = 1e-2
     radar = sensor(
         "radar.swerling", **CELL, swerling=model, false_alarm_probability=pfa, power_w=0.4,
         cell_false_alarm_probability=1e-7, reference_pd=0.5, scan_rate_hz=20,
+        clutter_threshold=threshold,
     )  # fmt: skip
     plain = sensor("radar.threshold", **CELL, power_w=0.4)
-    sections = {"ownship": OWN, "targets": LOW, "terrain": TERRAIN}
+    # Where the threshold rises with it, clutter as strong as that leaves nothing to be seen.
+    gamma_db = -5.0 if threshold == "noise" else -30.0
+    terrain = {**TERRAIN, "clutter_gamma_db": gamma_db}
+    sections = {"ownship": OWN, "targets": LOW, "terrain": terrain}
     clutter = {}
     for name, row in first_look(chain({"radar": plain}, **sections), "radar").items():
         lost_db = row["snr_db"] + 250.0 - row["confidence"]
@@ -98,13 +103,13 @@ def test_a_fluctuating_target_in_clutter(model):
     for row in found:
         snr = 10.0 ** (row["snr_db"] / 10.0)
         noise = 1.0 + snr * clutter[row["target"]]
-        threshold = -math.log(pfa) / noise
+        over = -math.log(pfa) / (noise if threshold == "noise" else 1.0)
         if model == 1:
-            expected = math.exp(-threshold / (1.0 + snr / noise))
+            expected = math.exp(-over / (1.0 + snr / noise))
         else:
             half = 0.5 * snr / noise
-            expected = math.exp(-threshold / (1.0 + half))
-            expected *= 1.0 + threshold * half / (1.0 + half) ** 2
+            expected = math.exp(-over / (1.0 + half))
+            expected *= 1.0 + over * half / (1.0 + half) ** 2
         assert row["detection_probability"] == pytest.approx(expected, rel=1e-6)
 
 
