@@ -18,7 +18,8 @@ FAULTS = [
          "            azimuth_rad=p,"),
         ("elevation-is-azimuth-s", "            elevation_rad=elevation,",
          "            elevation_rad=azimuth,"),
-        ("cameras-measure-range", "if not self.measures_range:", "if False:"),
+        ("cameras-measure-range", "self.range_step_m if self.measures_range else None,",
+         "self.range_step_m,"),
     ),
     *in_file(
         _GROUP, "components/sensor/sensor.py",
