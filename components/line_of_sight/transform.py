@@ -40,7 +40,10 @@ CELLS_AT_ONCE = 8192
 class TransformParameters(Parameters):
     """Parameters of a coordinate transform."""
 
-    model: Literal["auto", "flat_earth", "local_radii", "geodesic", "ellipsoid"] | None = Field(
+    model: (
+        Literal["auto", "flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"]
+        | None
+    ) = Field(
         default=None,
         description="Model of the Earth, by default that of the block's type; 'auto' picks the "
         "cheapest whose proven error [accuracy] allows.",
@@ -207,6 +210,13 @@ class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
     earth = "local_radii"
+    lockstep = True
+
+
+class DaidalusSphere(Transform):
+    """Line of sight in the plane in which the alerting logic of DO-365 compares aircraft."""
+
+    earth = "daidalus_sphere"
     lockstep = True
 
 
