@@ -101,9 +101,11 @@ class Sensor(Component):
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = dict(self.grid.variances)
+        reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             del constant[AZIMUTH], constant[ELEVATION]
-        return SensorOffer(self.measures_range, resolution_rad, **constant)
+            reach = Mounting().build(self).reach(reach)
+        return SensorOffer(self.measures_range, resolution_rad, reach=reach, **constant)
 
     @cached_property
     def axes(self) -> BodyAxes:
