@@ -16,7 +16,7 @@ from components.estimation.batched import (
     symmetric,
 )
 from components.estimation.frame import Place
-from components.estimation.kalman import Innovation, Moments
+from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, residual
 from components.estimation.motion import Motion
 from dsa_des.arrays.types import FloatArray
@@ -73,18 +73,6 @@ def predict_unscented(
     apart = moved - mean[:, np.newaxis]
     spread = product_transposed(apart * of_covariance[:, np.newaxis], apart)
     return mean, symmetric(spread + model.noise(dt_s))
-
-
-def unscented_innovation(
-    kind: Kind,
-    state: FloatArray,
-    covariance: FloatArray,
-    place: Place,
-    variance: FloatArray,
-    sigma: SigmaPoints,
-) -> Innovation:
-    """Return the innovation of an unscented Kalman filter for variances (m, n)."""
-    return unscented_moments(kind, state, covariance, place, sigma).innovation(variance)
 
 
 def unscented_moments(
