@@ -16,7 +16,8 @@ class Gate(Component):
     """Decides for every sensor and target whether the sensor's physics is needed, and why not.
 
     A target is skipped when the sensor is switched off, when it is not the sensor's scan time,
-    when the target is not there, or when it is outside the field of view or the range.
+    when the target is not there, when it is outside the field of view or
+    the range, or when the Earth stands before it.
     """
 
     inputs = {"targets": Input(RelativeTargets, "trigger", "Targets as seen from the ownship.")}
@@ -54,6 +55,8 @@ class Gate(Component):
             targets.range_m,
             targets.present,
         ]
+        if targets.hidden is not None:
+            where.append(targets.hidden)
         for sensor, reach in self._reach.items():
             rows = wake.demand.get(sensor)
             if rows is not None and len(rows) == 0:

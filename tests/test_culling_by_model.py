@@ -47,7 +47,7 @@ def detections(path: Path, **options: object) -> object:
 
 
 @pytest.mark.parametrize("lat_deg", [0.0, 52.0, 88.0])
-@pytest.mark.parametrize("model", ["flat_earth", "local_radii", "geodesic"])
+@pytest.mark.parametrize("model", ["flat_earth", "local_radii", "daidalus_sphere", "geodesic"])
 def test_no_model_loses_who_it_takes_to_be_in_reach(
     tmp_path: Path, model: str, lat_deg: float
 ) -> None:

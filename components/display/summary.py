@@ -17,6 +17,8 @@ from dsa_des.block.message import Text
 from dsa_des.record.recording import Columns
 
 _SKIPPED = "skipped_"
+#: Said only where something stood before a target: most scenes have nothing that could.
+_HIDDEN = "skipped_hidden"
 SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.startswith(_SKIPPED))
 
 
@@ -129,7 +131,11 @@ class _Sensor:
             "evaluated": self.evaluated,
             "detections": self.detections,
             "false_alarms": self.false_alarms,
-            "skipped": {name.removeprefix(_SKIPPED): n for name, n in self.skipped.items()},
+            "skipped": {
+                name.removeprefix(_SKIPPED): n
+                for name, n in self.skipped.items()
+                if n or name != _HIDDEN
+            },
             "first_detection": self._marked(self.first, 0),
             "last_detection": self._marked(self.last, 1),
         }

@@ -91,6 +91,7 @@ _WHY_NOT_SEEN = {
     "off": "there while the sensor was off",
     "field_of_view": "outside its field of view",
     "range": "beyond its range",
+    "hidden": "hidden by the Earth or its ground",
     "culled": "too far away to be looked at",
 }
 

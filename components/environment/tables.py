@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from components.terrain.raster_files import RasterFile
 from dsa_des.block.component import Parameters
 
 
@@ -89,7 +90,7 @@ class Navigation(Parameters):
 
 
 class Terrain(Parameters):
-    """Flat ground, whose echo a radar may hear; by default there is none."""
+    """The ground: flat, whose echo a radar may hear, and what hides targets; by default none."""
 
     height_m: float | None = Field(
         default=None,
@@ -107,4 +108,26 @@ class Terrain(Parameters):
     clutter_mean: Literal["constant", "fluctuating"] = Field(
         default="fluctuating",
         description="Whether the clutter's mean fluctuates from look to look (thesis §5.3.2).",
+    )
+    horizon: bool = Field(
+        default=False,
+        description="Whether targets behind the Earth's limb are hidden, and cameras see sky down "
+        "to the horizon's dip. The limb is that of height_m, or else of the ellipsoid.",
+    )
+    refraction: Literal["none", "four_thirds"] = Field(
+        default="none",
+        description="How the air bends rays: not at all, or as over an Earth of 4/3 its radius: "
+        "targets appear higher, and the horizon is farther away.",
+    )
+    raster: RasterFile | None = Field(
+        default=None,
+        description="Elevation raster whose ground hides targets: SRTM .hgt, or GeoTIFF with the "
+        "extra geotiff. Beside it no ground is known.",
+    )
+    raster_offset_m: float = Field(
+        default=0.0,
+        ge=-200,
+        le=200,
+        description="Height of the raster's zero above the ellipsoid, m: the geoid's undulation "
+        "where altitudes are above the ellipsoid.",
     )

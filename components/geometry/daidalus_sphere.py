@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from components.geometry.angles import RAD_PER_DEG, longitude_difference_rounded
 from components.geometry.normals import FloatArray
 
 #: Radius of the sphere, m.
@@ -74,3 +75,32 @@ def east_north_mps(
     now = east_north_m(lat_rad, lon_rad, own_lat_rad, own_lon_rad)
     later = east_north_m(later_lat, later_lon, own_lat_rad, own_lon_rad)
     return (later[0] - now[0]) / _AHEAD_S, (later[1] - now[1]) / _AHEAD_S
+
+
+def north_east_up(
+    lat1: FloatArray,
+    lon1: FloatArray,
+    alt1: FloatArray,
+    lat2: FloatArray,
+    lon2: FloatArray,
+    alt2: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Give the target's north, east and up offsets in the plane in m, without checks.
+
+    Parameters
+    ----------
+    lat1, lon1, alt1, lat2, lon2, alt2 : ndarray
+        The observer and the target, in degrees and m: contiguous, at least one axis, in bounds.
+
+    Notes
+    -----
+    As `east_north_m`, in a form that does not cancel for targets close by. Beyond a quarter of the
+    way around the Earth the projection comes back: what is there seems nearer than it is.
+    """
+    away = longitude_difference_rounded(lon1, lon2) * RAD_PER_DEG
+    own, other = lat1 * RAD_PER_DEG, lat2 * RAD_PER_DEG
+    # sin(b - a) + sin(a) cos(b) (1 - cos c) is cos(a) sin(b) - sin(a) cos(b) cos(c).
+    east = RADIUS_M * np.cos(other) * np.sin(away)
+    bulge = 2.0 * np.sin(own) * np.cos(other) * np.sin(0.5 * away) ** 2
+    north = RADIUS_M * (np.sin((lat2 - lat1) * RAD_PER_DEG) + bulge)
+    return north, east, alt2 - alt1

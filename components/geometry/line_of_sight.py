@@ -1,8 +1,8 @@
 """The line of sight from an ownship to targets: one front for all models of Earth and attitude.
 
 What the transform block, the maps of errors and the tests ask; the models stand behind it, each
-in the file of its name: `flat_earth`, `local_radii`, `geodesic`, `ellipsoid`, and `sensor_angles`
-for the body axes.
+in the file of its name: `flat_earth`, `local_radii`, `daidalus_sphere`, `geodesic`, `ellipsoid`,
+and `sensor_angles` for the body axes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.arguments.checks import FloatArray, positions, shaped
-from components.geometry import ellipsoid, flat_earth, geodesic, local_radii
+from components.geometry import daidalus_sphere, ellipsoid, flat_earth, geodesic, local_radii
 from components.geometry.ellipsoid import spherical_from_enu
 from components.geometry.sensor_angles import MODELS as ATTITUDE_MODELS
 from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_offsets
@@ -22,10 +22,11 @@ from components.geometry.sensor_angles import sensor_angles, sensor_angles_of_of
 _OFFSETS: dict[str, Callable[..., tuple[FloatArray, FloatArray, FloatArray]]] = {
     "flat_earth": flat_earth.north_east_up,
     "local_radii": local_radii.north_east_up,
+    "daidalus_sphere": daidalus_sphere.north_east_up,
     "ellipsoid": ellipsoid.north_east_up,
 }
 
-EARTH_MODELS = ("flat_earth", "local_radii", "geodesic", "ellipsoid")
+EARTH_MODELS = ("flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid")
 """Models of the Earth, crude to exact."""
 
 
@@ -54,7 +55,7 @@ class LineOfSight:
 
     Parameters
     ----------
-    earth : {"flat_earth", "local_radii", "geodesic", "ellipsoid"}
+    earth : {"flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"}
     attitude : {"exact", "small_angle"}
         As for `components.geometry.sensor_angles.sensor_angles`.
 

@@ -78,6 +78,8 @@ EARTH = Ladder(
         Rung("flat_earth", "111,195 m per degree (thesis eq. 1-5)", "geometry.flat_earth"),
         Rung("local_radii", "flat, with the ellipsoid's radii at the ownship",
              "geometry.local_radii"),
+        Rung("daidalus_sphere", "a sphere of 1 nmi per minute, projected (alerting of DO-365)",
+             "geometry.daidalus_sphere"),
         Rung("geodesic", "bearing and distance along the geodesic", "geometry.geodesic"),
         Rung("ellipsoid", "exact line of sight on WGS-84", "geometry.ellipsoid"),
     ),

@@ -10,7 +10,10 @@ from components.messages.reach import REACH_MARGIN
 
 # CPU time per line of sight in blocks of 10,000, relative to flat earth; only the order matters.
 # (The geodesic takes a hundred times as long as the exact form and is never worth it.)
-EARTH_COST = {"flat_earth": 1.0, "local_radii": 1.05, "ellipsoid": 1.95, "geodesic": 800.0}
+EARTH_COST = {
+    "flat_earth": 1.0, "local_radii": 1.05, "ellipsoid": 1.95, "daidalus_sphere": 2.0,
+    "geodesic": 800.0,
+}  # fmt: skip
 ATTITUDE_COST = {"small_angle": 0.8, "exact": 1.5}
 
 REFERENCE = ("ellipsoid", "exact")

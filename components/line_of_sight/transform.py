@@ -16,6 +16,7 @@ from pydantic import Field
 
 from components.geometry.line_of_sight import LineOfSight
 from components.geometry.wrapping import wrap_pi_unchecked
+from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
 from components.line_of_sight.ladder import ATTITUDE, EARTH
 from components.line_of_sight.rung_choice import REFERENCE
 from components.line_of_sight.rung_planning import PickedModels, pick_rung
@@ -39,7 +40,10 @@ CELLS_AT_ONCE = 8192
 class TransformParameters(Parameters):
     """Parameters of a coordinate transform."""
 
-    model: Literal["auto", "flat_earth", "local_radii", "geodesic", "ellipsoid"] | None = Field(
+    model: (
+        Literal["auto", "flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"]
+        | None
+    ) = Field(
         default=None,
         description="Model of the Earth, by default that of the block's type; 'auto' picks the "
         "cheapest whose proven error [accuracy] allows.",
@@ -64,8 +68,12 @@ class Transform(Component):
     windowed = True
     lockstep = True
     rewindable = True
-    hooks = {"ownship": "(states) -> what the ownship believes of itself, by name"}
-    effects = (NavigationErrors(),)
+    hooks = {
+        "ownship": "(states) -> what the ownship believes of itself, by name",
+        "hides": "(own, other, present) -> which targets something stands before",
+        "bends": "(own, seen, attitude) -> seen: lines of sight along bent rays",
+    }
+    effects = (NavigationErrors(), *EARTH_EFFECTS)
     ladders = (EARTH, ATTITUDE)
     #: The type's own model of the Earth.
     earth: ClassVar[str]
@@ -79,6 +87,8 @@ class Transform(Component):
         self._beliefs: list[Callable[[TrafficStates], dict[str, FloatArray]]] = self.built(
             "ownship"
         )
+        self._hiding: list[Hides] = self.built("hides")
+        self._bending: list[Bends] = self.built("bends")
         self.rung = pick_rung(self)
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
@@ -135,9 +145,11 @@ class Transform(Component):
 
     def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         seen = self._line_of_sight.from_ownship(own, other)
+        for bends in self._bending:
+            seen = bends(own, seen, self._line_of_sight.attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)
         _require_numbers(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
-        return {
+        fields = {
             **seen._asdict(),
             "relative_heading_rad": heading,
             "target_pitch_rad": other.pitch_rad,
@@ -145,6 +157,11 @@ class Transform(Component):
             "alt_m": other.alt_m,
             "present": present,
         }
+        if self._hiding:
+            fields["hidden"] = np.logical_or.reduce(
+                [hides(own, other, present) for hides in self._hiding]
+            )
+        return fields
 
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where the ownship is then."""
@@ -193,6 +210,13 @@ class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
     earth = "local_radii"
+    lockstep = True
+
+
+class DaidalusSphere(Transform):
+    """Line of sight in the plane in which the alerting logic of DO-365 compares aircraft."""
+
+    earth = "daidalus_sphere"
     lockstep = True
 
 

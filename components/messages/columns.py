@@ -52,6 +52,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "skipped_off": ("targets", "", "left out: the sensor is off"),
         "skipped_field_of_view": ("targets", "", "left out: outside the field of view"),
         "skipped_range": ("targets", "", "left out: beyond the range"),
+        "skipped_hidden": ("targets", "", "left out: the Earth or its ground stands before it"),
         "skipped_culled": ("targets", "", "left out: too far away for any sensor"),
     },
     "detections": {

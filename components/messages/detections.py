@@ -25,6 +25,7 @@ _SKIPPED = {
     "skipped_off": "int64",
     "skipped_field_of_view": "int64",
     "skipped_range": "int64",
+    "skipped_hidden": "int64",
     "skipped_culled": "int64",
 }
 #: Columns of ``detections`` that only some sensors fill. For others, a subclass has a field

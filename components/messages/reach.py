@@ -15,8 +15,14 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 ReasonArray = npt.NDArray[np.uint8]
 
 #: Reasons, in the order in which they are looked for; EVALUATE means that physics must decide.
-EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE = range(5)
-SKIP_REASONS = {"absent": ABSENT, "off": OFF, "field_of_view": FIELD_OF_VIEW, "range": RANGE}
+EVALUATE, ABSENT, OFF, FIELD_OF_VIEW, RANGE, HIDDEN = range(6)
+SKIP_REASONS = {
+    "absent": ABSENT,
+    "off": OFF,
+    "field_of_view": FIELD_OF_VIEW,
+    "range": RANGE,
+    "hidden": HIDDEN,
+}
 #: Targets up to so many reaches away count when models of the line of sight are judged: one that
 #: is off may take them to be in reach.
 REACH_MARGIN = 1.05
@@ -65,6 +71,7 @@ class Reach:
         body_elevation_rad: FloatArray,
         range_m: FloatArray,
         present: BoolArray,
+        hidden: BoolArray | None = None,
     ) -> ReasonArray:
         """Return the reason why each target is skipped, or EVALUATE.
 
@@ -73,6 +80,8 @@ class Reach:
         body_azimuth_rad, body_elevation_rad, range_m, present : arrays of one shape
             Body azimuth in (-pi, pi] and elevation, slant range, and whether the target is there;
             finite.
+        hidden : array of that shape, optional
+            Whether Earth or ground stands before the target; nothing is hidden by default.
         """
         if not self.enabled:
             return np.where(present, _OFF, _ABSENT)
@@ -81,6 +90,8 @@ class Reach:
         if self.range_max_m < math.inf:
             seen &= range_m > self.range_max_m
             reason[seen] = RANGE
+        if hidden is not None:
+            reason[hidden & (reason == EVALUATE)] = HIDDEN
         if np.count_nonzero(present) < present.size:
             reason[~present] = ABSENT
         return reason

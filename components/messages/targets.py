@@ -95,6 +95,8 @@ class RelativeTargets(Message):
         block that does not say.
     revisit : KnownFlights or None
         The targets at other instants than those of the rows, as each row knows their flights.
+    hidden : (rows, targets) of bool, or None
+        Whether the Earth or its ground stands before the target; None where neither is there.
     state_tick : (rows,) of int, or None
         The instant at which the aircraft were there: earlier than `tick` where the traffic's
         message took its time. None where it is `tick`.
@@ -117,6 +119,7 @@ class RelativeTargets(Message):
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: KnownFlights | None = per_row(default=None, kw_only=True)
     state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
+    hidden: BoolArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from components.optical.contrast import contrast_gain
 from components.sensor.look import Cells
+from components.terrain.rays import dip_rad
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -35,7 +36,9 @@ class Background(Effect):
             "sun_exclusion_rad": math.radians(p.sun_exclusion_deg),
         }
 
-        def factor(cells: Cells) -> FloatArray:
+        terrain = block.context.sections.get("terrain")
+
+        def gain_against(cells: Cells, background: str) -> FloatArray:
             gain = contrast_gain(
                 model="daylight",
                 azimuth_rad=cells.azimuth_rad,
@@ -43,9 +46,19 @@ class Background(Effect):
                 paint_reflectance=cells.of_target(cells.roster.column("paint_reflectance")),
                 ground_reflectance=p.ground_reflectance,
                 sky=p.sky,
-                background=p.background,
+                background=background,
                 **sun,
             )
             return np.asarray(gain)
+
+        if p.background != "auto" or terrain is None or not terrain.horizon:
+            return lambda cells: gain_against(cells, p.background)
+        surface_m, refraction = terrain.height_m or 0.0, terrain.refraction
+
+        def factor(cells: Cells) -> FloatArray:
+            # From up here there is sky down to the dip of the horizon.
+            dip = dip_rad(cells.of_row("own_alt_m") - surface_m, refraction)
+            sky, ground = (gain_against(cells, name) for name in ("sky", "ground"))
+            return np.where(cells.elevation_rad >= -dip, sky, ground)
 
         return factor

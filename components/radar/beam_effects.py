@@ -95,7 +95,7 @@ class Sweep:
         azimuth_at(offset_s)
         lit = replace(at_start, **found)
         reason = block.axes.reach(block.reach).decide(
-            lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present
+            lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present, lit.hidden
         )
         reason[~met & ((reason == EVALUATE) | (reason == RANGE))] = FIELD_OF_VIEW
         fields = {**vars(lit), "decisions": {block.name: Decision(np.arange(len(rows)), reason)}}

@@ -74,7 +74,7 @@ def picked_method(block: Any, method: str) -> list[str]:
 
 
 def _models(block: Any) -> set[int]:
-    if block.p.fluctuation == "sampled":
+    if block.p.samples_rcs:
         return {0}
     if block.p.swerling is not None:
         return {block.p.swerling % 5}

@@ -11,6 +11,7 @@ from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import terrain_of
 from components.radar.detection import detection_probability, probability_of_cells
 from components.radar.detection_rung import ExactDetection, picked_method
+from components.radar.fading import Fading, LastingFluctuation
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
@@ -18,6 +19,7 @@ from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
+from dsa_des.time.gauss_markov import LONGEST_S
 
 
 class SwerlingParameters(LinkBudgetParameters):
@@ -30,6 +32,13 @@ class SwerlingParameters(LinkBudgetParameters):
         default="probability",
         description="Fluctuation inside Pd, or a sampled RCS (per scan for I and III, per pulse "
         "for II and IV) and a steady target's Pd at it; the same share of detections.",
+    )
+    fluctuation_correlation_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=LONGEST_S,
+        description="How long a sampled RCS lasts, s: the correlation of its power falls as "
+        "exp(-2 |dt| / it), whenever it is looked at. By default each scan draws its own.",
     )
     model: Literal["auto"] | None = Field(
         default=None,
@@ -60,13 +69,18 @@ class SwerlingParameters(LinkBudgetParameters):
                 f"cfar_reference_cells is {self.cfar_reference_cells} and detection is "
                 f"{self.detection!r}: Pd with CFAR is computed exactly; leave one of them out"
             )
-        steady = self.fluctuation == "sampled" or self.swerling in (0, 5)
+        steady = self.samples_rcs or self.swerling in (0, 5)
         if self.detection == "gram_charlier" and not steady:
             raise ValueError(
                 f"detection is 'gram_charlier' and swerling is {self.swerling}: the series covers "
                 "steady targets only; set swerling to 0, or fluctuation to 'sampled'"
             )
         return self
+
+    @property
+    def samples_rcs(self) -> bool:
+        """Whether each look has an RCS of its own and a steady target's Pd at it."""
+        return self.fluctuation == "sampled" or self.fluctuation_correlation_s is not None
 
 
 class SwerlingRadar(LinkBudgetRadar):
@@ -76,8 +90,9 @@ class SwerlingRadar(LinkBudgetRadar):
 
     One keyed uniform draw per target and scan decides. With fluctuation 'probability' Pd is that
     of the fluctuating target at its mean SNR; with 'sampled' further keyed draws sample the RCS of
-    the scan, and Pd is a steady target's at the SNR it gives. Confidence is the SNR (mean, or of
-    the scan) above the SNR at which that Pd is `reference_pd`, in dB.
+    the scan, and Pd is a steady target's at the SNR it gives. So it is where fluctuation lasts
+    (`components.radar.fading`). Confidence is the SNR (mean, or of the scan) above the SNR at which
+    that Pd is `reference_pd`, in dB.
 
     The approximations of Shnidman and Albersheim are no choice for `detection`: they hold for part
     of the SNR of an encounter only and refuse the rest.
@@ -87,9 +102,10 @@ class SwerlingRadar(LinkBudgetRadar):
     lockstep = True
     hooks = {
         "RCS": "which Swerling model each cell has",
+        "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",
         "method of Pd": "name of the method that gives the probability of detection",
     }
-    effects = (RcsFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
+    effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -98,12 +114,14 @@ class SwerlingRadar(LinkBudgetRadar):
         self._method: str = parameters.detection
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
+        self._fading: Fading | None = None
         self._reference_db: dict[int, float] = {}
 
     def setup(self) -> None:
         """Take the scene's effects; without fluctuation every target is steady."""
         super().setup()
         (self._models,) = self.built("RCS") or [steady]
+        (self._fading,) = self.built("fading") or [None]
         if self.p.detection == "exact":
             (self._method,) = self.built("method of Pd") or ["table"]
 
@@ -148,11 +166,14 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
-        if self.p.fluctuation == "probability" or self._models is steady:
+        if not self.p.samples_rcs or self._models is steady:
             return super().snr(cells)
         rcs = self.mean_rcs_m2(cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
+            if self._fading is not None and self._lasts(model):
+                rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
+                continue
             target, scan = keys[chosen], cells.scan[chosen]
 
             def draw(number: int, target: Any = target, scan: Any = scan) -> FloatArray:
@@ -162,6 +183,10 @@ class SwerlingRadar(LinkBudgetRadar):
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"
             )
         return self.echo_snr(cells, rcs)
+
+    def _lasts(self, model: int) -> bool:
+        """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
+        return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
     def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
@@ -200,7 +225,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
         """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
-        if self.p.fluctuation == "sampled":
+        if self.p.samples_rcs:
             return [(0, slice(None))]
         return self._models(cells)
 

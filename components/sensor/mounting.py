@@ -124,9 +124,11 @@ class MountedReach(Reach):
         body_elevation_rad: FloatArray,
         range_m: FloatArray,
         present: BoolArray,
+        hidden: BoolArray | None = None,
     ) -> ReasonArray:
         """Return the reason why each target is skipped, from its angles in body axes."""
-        return super().decide(*self.axes(body_azimuth_rad, body_elevation_rad), range_m, present)
+        angles = self.axes(body_azimuth_rad, body_elevation_rad)
+        return super().decide(*angles, range_m, present, hidden)
 
 
 class Mounting(Effect):

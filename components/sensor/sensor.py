@@ -229,7 +229,11 @@ class Sensor(Component):
                 return rows, decision.reason[place]
         part = targets.take(rows)
         reason = self._reach_from_body.decide(
-            part.body_azimuth_rad, part.body_elevation_rad, part.range_m, part.present
+            part.body_azimuth_rad,
+            part.body_elevation_rad,
+            part.range_m,
+            part.present,
+            part.hidden,
         )
         return rows, reason
 

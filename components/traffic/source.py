@@ -29,7 +29,7 @@ from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
-from components.traffic.terrain_check import check_above_terrain
+from components.traffic.terrain_check import check_above_terrain, check_on_raster
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -136,6 +136,13 @@ class TrafficSource(Component):
         terrain = self.context.sections.get("terrain")
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
+        if terrain is not None and terrain.raster is not None:
+            check_on_raster(
+                self.own,
+                terrain.raster.raster,
+                terrain.raster_offset_m,
+                float(self.context.duration_s),
+            )
         self._all_columns = np.arange(len(self.roster))
         self._culling: Culling | None = None
         self._steered_culling: SteeredCulling | None = None

@@ -46,13 +46,14 @@ def rows(tmp_path_factory):
 def test_rows_and_files(rows):
     found, out = rows
     assert [r["rung"] for r in found] == [
-        "flat_earth", "local_radii", "geodesic", "ellipsoid", "small_angle", "exact"]  # fmt: skip
+        "flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid", "small_angle",
+        "exact"]  # fmt: skip
     for row in found:
         assert row["block"] == "transform" and row["error_unit"] == "mrad"
         assert row["cpu_us_per_target_scan"] > 0.0
         assert row["error_p95"] <= row["error_max"]
-    earth = {r["rung"]: r for r in found[:4]}
-    assert {r["reference"] for r in found[:4]} == {"ellipsoid"}
+    earth = {r["rung"]: r for r in found[:5]}
+    assert {r["reference"] for r in found[:5]} == {"ellipsoid"}
     assert earth["ellipsoid"]["in_scene"] and earth["ellipsoid"]["pareto"]
     assert not earth["geodesic"]["pareto"]  # dearer than the exact one, and wrong
     assert earth["ellipsoid"]["inside_budget"] and earth["ellipsoid"]["cheapest_inside"]

@@ -12,7 +12,7 @@ from dsa_des.block.message import Message, Text, per_entry, per_row, static
 # As files of earlier versions have them; whoever reads one by position must not be surprised.
 COLUMNS = {
     "scans": "scan evaluated detected skipped_absent skipped_off skipped_field_of_view "
-    "skipped_range skipped_culled",
+    "skipped_range skipped_hidden skipped_culled",
     "detections": "scan target azimuth_rad elevation_rad range_m confidence true_azimuth_rad "
     "true_elevation_rad true_range_m snr_db detection_probability pixels declared illuminated_s "
     "ned_azimuth_rad ned_elevation_rad own_lat_deg own_lon_deg own_alt_m "

@@ -197,8 +197,8 @@ FAULTS = [
          "MountedAxes((azimuth, elevation, roll), (believed",
          "MountedAxes((azimuth, roll, elevation), (believed"),
         ("field-of-view-by-the-nose",
-         "super().decide(*self.axes(body_azimuth_rad, body_elevation_rad), range_m, present)",
-         "super().decide(body_azimuth_rad, body_elevation_rad, range_m, present)"),
+         "angles = self.axes(body_azimuth_rad, body_elevation_rad)",
+         "angles = body_azimuth_rad, body_elevation_rad"),
     ),
     *in_file(
         _GROUP, "components/navigation/effects.py",

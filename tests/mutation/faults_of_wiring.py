@@ -11,7 +11,24 @@ _FLIGHT = "wiring/test_flight_keys.py"
 _AIRCRAFT = "wiring/test_aircraft_keys.py"
 _HOST = "wiring/test_host_plane_keys.py"
 
+_EARTH = "wiring/test_what_the_earth_hides.py"
+
 FAULTS = [
+    *in_file(
+        _GROUP, "components/line_of_sight/earth_effects.py", _EARTH,
+        ("limb-always-of-the-sea", "surface_m = terrain.height_m or 0.0", "surface_m = 0.0"),
+        ("raster-without-its-offset", "offset_m=terrain.raster_offset_m", "offset_m=0.0"),
+        ("limb-by-straight-rays", "surface_m=surface_m, refraction=terrain.refraction",
+         'surface_m=surface_m, refraction="none"'),
+    ),
+    *in_file(
+        _GROUP, "components/radar/beam_effects.py", _EARTH,
+        ("swept-beams-see-through-the-earth", "lit.present, lit.hidden", "lit.present"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/background.py", _EARTH,
+        ("dip-the-wrong-way", ">= -dip", ">= dip"),
+    ),
     *in_file(
         _GROUP, "components/optical/ir.py", ("wiring/test_camera_signature.py", _CAMERA),
         ("infrared-by-visible-contrast",
@@ -67,7 +84,8 @@ FAULTS = [
         ("paint-ignored", 'cells.of_target(cells.roster.column("paint_reflectance"))', "0.5"),
         ("ground-ignored", "ground_reflectance=p.ground_reflectance", "ground_reflectance=0.2"),
         ("sky-ignored", "sky=p.sky,", 'sky="clear",'),
-        ("background-always-auto", "background=p.background,", 'background="auto",'),
+        ("background-always-auto", "gain_against(cells, p.background)",
+         'gain_against(cells, "auto")'),
         ("sun-azimuth-is-elevation", "math.radians(p.sun_azimuth_deg)",
          "math.radians(p.sun_elevation_deg)"),
         ("sun-never-blinds", "math.radians(p.sun_exclusion_deg)", "0.0"),
@@ -205,8 +223,26 @@ FAULTS = [
          'clutter="fluctuating"'),
         ("detection-method-ignored", "self._method: str = parameters.detection",
          'self._method: str = "exact"'),
-        ("fluctuation-ignored", 'if self.p.fluctuation == "sampled":\n            return [(0',
-         'if self.p.fluctuation == "":\n            return [(0'),
+        ("fluctuation-ignored", "if self.p.samples_rcs:\n            return [(0",
+         "if False:\n            return [(0"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/fading.py", "wiring/test_fluctuation_that_lasts.py",
+        ("chi-square-of-two-for-all", "parts = 4 if model in (3, 4) else 2", "parts = 2"),
+        ("one-amplitude-s-parts-alike", "process(keys, instant_ns, part)",
+         "process(keys, instant_ns, 0)"),
+        ("fades-by-scan-number", "nanosecond_of(cells.scan_ticks, ticks_per_s)[cells.row]",
+         "(cells.scan * 10**9)"),
+        ("sweep-fades-at-its-start", "    if offset_s is None:\n", "    if True:\n"),
+        ("everyone-fades-together", "cells.roster.keys_of(cells.target)[chosen]",
+         "cells.roster.keys_of(cells.target * 0)[chosen]"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/swerling.py", "wiring/test_fluctuation_that_lasts.py",
+        ("pulses-of-a-look-fade-alike", "(model in (2, 4) and self.p.pulses_summed == 1)",
+         "model in (2, 4)"),
+        ("lasting-pd-of-the-model", "return self.fluctuation == \"sampled\" or ",
+         "return self.fluctuation == \"sampled\" and "),
     ),
     *in_file(
         _GROUP, "components/radar/rcs_effects.py",

@@ -14,6 +14,8 @@ import dsa_des
 RADAR = sensor("radar.range_boundary", scan_rate_hz=4)
 FLIGHT = ("heading_deg", "speed_mps", "climb_mps", "yaw_deg", "pitch_deg", "roll_deg")
 
+EARTHS = ["ellipsoid", "flat_earth", "geodesic", "local_radii", "daidalus_sphere"]
+
 
 def seen(scene: dict, block: str = "radar") -> dict[tuple[str, int], dict]:
     return {(row["target"], row["scan"]): row for row in rows(run(scene), block=block)}
@@ -59,9 +61,9 @@ def test_a_run_lasts_as_long_as_it_says():
 
 
 @covers("model", "attitude",
-        of=("geometry.ellipsoid", "geometry.flat_earth", "geometry.geodesic",
-            "geometry.local_radii"))  # fmt: skip
-@pytest.mark.parametrize("earth", ["ellipsoid", "flat_earth", "geodesic", "local_radii"])
+        of=("geometry.daidalus_sphere", "geometry.ellipsoid", "geometry.flat_earth",
+            "geometry.geodesic", "geometry.local_radii"))  # fmt: skip
+@pytest.mark.parametrize("earth", EARTHS)
 @pytest.mark.parametrize("named", [False, True])
 def test_models_of_the_earth(earth, named):
     """By type, or by `model` of another type; each with its own way of being wrong."""
@@ -84,6 +86,11 @@ def test_models_of_the_earth(earth, named):
         along = across * (1.0 - e2) / (1.0 - e2 * sine2)
         north = math.radians(dlat) * (along + own["alt_m"])
         east = math.radians(dlon) * (across + own["alt_m"]) * math.cos(math.radians(own["lat_deg"]))
+    elif earth == "daidalus_sphere":
+        radius = 60.0 * 180.0 / math.pi * 1852.0
+        a, b, c = map(math.radians, (own["lat_deg"], lat, dlon))
+        east = radius * math.cos(b) * math.sin(c)
+        north = radius * (math.cos(a) * math.sin(b) - math.sin(a) * math.cos(b) * math.cos(c))
     elif earth == "geodesic":
         level_m, bearing_deg = vdist(own["lat_deg"], own["lon_deg"], lat, lon)
         north = float(level_m) * math.cos(math.radians(float(bearing_deg)))
@@ -99,7 +106,7 @@ def test_models_of_the_earth(earth, named):
     np.testing.assert_allclose(there, vector / range_m, atol=1e-3 / range_m)
 
 
-@pytest.mark.parametrize("earth", ["ellipsoid", "flat_earth", "geodesic", "local_radii"])
+@pytest.mark.parametrize("earth", EARTHS)
 def test_small_angles_are_subtracted_one_by_one(earth):
     scene = chain({"radar": RADAR})
     scene["blocks"]["transform"] = {"type": f"geometry.{earth}", "attitude": "small_angle"}

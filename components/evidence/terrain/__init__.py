@@ -1,0 +1,1 @@
+"""The elevation raster that is shipped."""

@@ -1,0 +1,151 @@
+"""What the Earth does to lines of sight: hides targets, bends rays. Effects of the transform."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.arguments.checks import FloatArray
+from components.environment.tables import Terrain
+from components.geometry.line_of_sight import SeenFromOwnship
+from components.geometry.sensor_angles import sensor_angles
+from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
+from components.terrain.rays import bent_elevation_rad
+from dsa_des.arrays.types import BoolArray
+from dsa_des.block.effect import Effect, Verdict
+
+_PLACE = ("lat_deg", "lon_deg", "alt_m")
+
+#: (own, other, present) -> whether each target is hidden.
+Hides = Callable[[Any, Any, BoolArray], BoolArray]
+#: (own, seen, attitude model) -> seen, along bent rays.
+Bends = Callable[[Any, SeenFromOwnship, str], SeenFromOwnship]
+
+
+def terrain_section(block: Any) -> Terrain:
+    """Return the scene's ``[terrain]``, or what it is by default."""
+    terrain = block.context.sections.get("terrain")
+    return Terrain() if terrain is None else terrain
+
+
+class Limb(Effect):
+    """The Earth's limb hides what lies behind it."""
+
+    name = "Earth's horizon"
+    acts_on = "hides"
+    neutral = False
+    outside_the_proof = "an Earth that hides nothing is none"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] horizon``."""
+        horizon = terrain_section(block).horizon
+        return Verdict(horizon, f"[terrain] horizon is {str(horizon).lower()}")
+
+    def build(self, block: Any) -> Hides:
+        """Return what tells which targets are behind the limb."""
+        terrain = terrain_section(block)
+        surface_m = terrain.height_m or 0.0
+
+        def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
+            return _of_present(
+                own, other, present,
+                lambda a, b: behind_the_limb(
+                    a, b, surface_m=surface_m, refraction=terrain.refraction
+                ),
+            )  # fmt: skip
+
+        return hides
+
+
+class Mountains(Effect):
+    """The ground of an elevation raster hides what lies behind it."""
+
+    name = "masking by the ground"
+    acts_on = "hides"
+    neutral = False
+    outside_the_proof = "without a raster there is no ground"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] raster``."""
+        file = terrain_section(block).raster
+        if file is None:
+            return Verdict(False, "[terrain] raster is not given")
+        raster = file.raster
+        return Verdict(
+            True,
+            f"[terrain] raster is {raster.name} ({raster.box()}); nothing hides beside it, and "
+            f"of what stands in a line of sight up to {miss_bound_m(raster):.2g} m may be missed",
+        )
+
+    def build(self, block: Any) -> Hides:
+        """Return what tells which targets are behind the ground."""
+        terrain = terrain_section(block)
+        assert terrain.raster is not None
+        raster = terrain.raster.raster
+
+        def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
+            return _of_present(
+                own, other, present,
+                lambda a, b: behind_terrain(
+                    a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
+                ),
+            )  # fmt: skip
+
+        return hides
+
+
+class Refraction(Effect):
+    """The air bends rays, and targets appear above where they are."""
+
+    name = "refraction"
+    acts_on = "bends"
+    neutral = False
+    outside_the_proof = "angles are formed anew, and their last bits differ"
+    lockstep = True
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain] refraction``."""
+        refraction = terrain_section(block).refraction
+        return Verdict(refraction != "none", f"[terrain] refraction is {refraction!r}")
+
+    def build(self, block: Any) -> Bends:
+        """Return what turns straight lines of sight into those along which rays arrive."""
+        refraction = terrain_section(block).refraction
+
+        def bends(own: Any, seen: SeenFromOwnship, attitude: str) -> SeenFromOwnship:
+            elevation = bent_elevation_rad(seen.elevation_rad, seen.range_m, refraction)
+            body = sensor_angles(
+                seen.azimuth_rad,
+                elevation,
+                own.yaw_rad,
+                own.pitch_rad,
+                own.roll_rad,
+                model=attitude,
+                validate=False,
+            )
+            return SeenFromOwnship(seen.azimuth_rad, elevation, seen.range_m, *body)
+
+        return bends
+
+
+EARTH_EFFECTS = (Limb(), Mountains(), Refraction())
+
+
+def _of_present(
+    own: Any, other: Any, present: BoolArray, tell: Callable[[Any, Any], BoolArray]
+) -> BoolArray:
+    """Ask only for the targets that are there; the others count as not hidden."""
+    hidden = np.zeros(present.shape, dtype=bool)
+    here = np.nonzero(present)
+    if len(here[0]):
+        hidden[here] = tell(_flat(own, present, here), _flat(other, present, here))
+    return hidden
+
+
+def _flat(state: Any, present: BoolArray, here: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    lat, lon, alt = (np.broadcast_to(getattr(state, name), present.shape)[here] for name in _PLACE)
+    return lat, lon, alt

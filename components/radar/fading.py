@@ -1,0 +1,98 @@
+"""Fluctuation that lasts: a radar that looks again soon sees the same fade again."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from components.radar.rcs_effects import RcsFluctuation
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.clock import NANOSECONDS, nanosecond_of
+from dsa_des.time.gauss_markov import GaussMarkov
+
+#: (cells, chosen of them, Swerling model) → power of each echo over its mean.
+Fading = Callable[[Cells, Any, int], FloatArray]
+
+
+def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
+    """Return the power of an echo over its mean, from the real and imaginary parts of amplitudes.
+
+    Parameters
+    ----------
+    amplitudes : list of arrays
+        Independent standard normal processes: two for exponential power (one complex amplitude of
+        many scatterers, Swerling I and II), four for chi-square of 4 degrees of freedom (two such
+        amplitudes, III and IV).
+
+    Returns
+    -------
+    array
+        Of mean 1. Where the amplitudes are correlated with ρ, it is with ρ².
+
+    Notes
+    -----
+    The complex Gaussian amplitude behind the Swerling cases: P. Swerling, "Probability of detection
+    for fluctuating targets", IRE Trans. IT-6(2), 1960.
+    """
+    total = np.zeros_like(amplitudes[0])
+    for part in amplitudes:
+        total += part * part
+    return total / len(amplitudes)
+
+
+class LastingFluctuation(Effect):
+    """Echoes whose complex amplitude forgets with ``fluctuation_correlation_s``.
+
+    The amplitude of each target is a Gauss-Markov process: its correlation falls as exp(-|dt|/τ),
+    that of the power as exp(-2 |dt|/τ), whenever the radar looks. A look is detected with a steady
+    target's Pd at the power it meets; over many looks far apart that is the Swerling model's own
+    Pd. Where pulses are summed, Swerling II and IV change from pulse to pulse and do not last.
+
+    An aspect table's mean is multiplied by it: aspect alone changes the mean as fast as the target
+    turns, the scatterers' interference, which a table averages over, with τ.
+    """
+
+    name = "lasting fluctuation"
+    acts_on = "fading"
+    neutral = False
+    outside_the_proof = "without it every scan draws a fade of its own"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``fluctuation_correlation_s``, and whether anything fluctuates."""
+        lasts_s = block.p.fluctuation_correlation_s
+        if lasts_s is None:
+            return Verdict(False, "fluctuation_correlation_s is not given")
+        fluctuates = RcsFluctuation().verdict(block)
+        if not fluctuates.simulated:
+            return Verdict(False, fluctuates.because)
+        period_s = float(1 / block.p.scan_rate_hz)
+        again = f"{np.exp(-2.0 * period_s / lasts_s):.3g}"
+        return Verdict(
+            True,
+            f"fluctuation_correlation_s is {lasts_s:g}: the power of two scans in a row is "
+            f"correlated with {again}",
+        )
+
+    def build(self, block: Any) -> Fading:
+        """Return each echo's power over its mean, at the instant of its look."""
+        process = GaussMarkov(block.stream("fading"), block.p.fluctuation_correlation_s or 1.0)
+        ticks_per_s = block.context.ticks_per_s
+
+        def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
+            keys = cells.roster.keys_of(cells.target)[chosen]
+            instant_ns = _instants_ns(cells, ticks_per_s)[chosen]
+            parts = 4 if model in (3, 4) else 2
+            return fading_power([process(keys, instant_ns, part) for part in range(parts)])
+
+        return fading
+
+
+def _instants_ns(cells: Cells, ticks_per_s: int) -> Any:
+    """Return when each cell is looked at: at its scan, or when a sweeping beam meets it."""
+    instant = nanosecond_of(cells.scan_ticks, ticks_per_s)[cells.row]
+    offset_s = getattr(cells, "offset_s", None)
+    if offset_s is None:
+        return instant
+    return instant + np.rint(offset_s * NANOSECONDS).astype(np.int64)

@@ -1,0 +1,1 @@
+"""What the Earth and its mountains hide: rays, horizon, elevation rasters."""

@@ -1,0 +1,232 @@
+"""Rays over the ellipsoid, rasters, and what hides behind them, against brute force by pymap3d."""
+
+import math
+import sys
+
+import numpy as np
+import pymap3d
+import pytest
+from scipy.ndimage import map_coordinates
+
+from components.evidence.terrain.synthetic_raster import NAME, main, synthetic_heights_m
+from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
+from components.terrain.raster import ElevationRaster
+from components.terrain.raster_files import read_raster
+from components.terrain.rays import bent_elevation_rad, dip_rad, geodetic_of, rays_between
+
+R = 6371008.8
+
+
+def pairs(count, longest_m, seed=1):
+    """Random places and others up to a distance from them, by pymap3d."""
+    rng = np.random.default_rng(seed)
+    own = rng.uniform(-85, 85, count), rng.uniform(-180, 180, count), rng.uniform(10, 9e3, count)
+    far, bearing = rng.uniform(100, longest_m, count), rng.uniform(0, 2 * np.pi, count)
+    ecef = pymap3d.enu2ecef(far * np.sin(bearing), far * np.cos(bearing), 0.0 * far, *own)
+    lat, lon, _ = pymap3d.ecef2geodetic(*ecef)
+    return own, (np.asarray(lat), np.asarray(lon), rng.uniform(10, 9e3, count))
+
+
+def along(own, other, shares):
+    """Heights of the chord above the ellipsoid, (pairs, shares), and its places."""
+    a, b = (np.array(pymap3d.geodetic2ecef(*p)) for p in (own, other))
+    points = a[:, :, None] + (b - a)[:, :, None] * shares
+    return pymap3d.ecef2geodetic(*points), np.linalg.norm(b - a, axis=0)
+
+
+def test_places_by_bowring():
+    rng = np.random.default_rng(2)
+    lat, lon, alt = (
+        rng.uniform(-90, 90, 300),
+        rng.uniform(-180, 180, 300),
+        rng.uniform(-5e2, 5e4, 300),
+    )
+    found = geodetic_of(*map(np.asarray, pymap3d.geodetic2ecef(lat, lon, alt)))
+    np.testing.assert_allclose(np.degrees(found[0]), lat, atol=1e-9)
+    np.testing.assert_allclose(found[1], lon, atol=1e-9)
+    np.testing.assert_allclose(found[2], alt, atol=1e-5)
+
+
+@pytest.mark.parametrize(("longest_m", "error_m"), [(1e5, 1e-3), (3e5, 0.1)])
+def test_the_lowest_point_of_a_straight_ray(longest_m, error_m):
+    own, other = pairs(200, longest_m)
+    shares = np.linspace(0, 1, 4001)
+    heights, _ = along(own, other, shares)
+    low = rays_between(own, other).lowest_height_m()
+    np.testing.assert_allclose(low, heights[2].min(axis=1), atol=error_m)
+
+
+def test_the_limb_of_the_ellipsoid_in_closed_form():
+    """Stretched along its axis the ellipsoid is a sphere, and lines stay lines."""
+    own, other = pairs(400, 6e5, seed=3)
+    stretch = np.array([1, 1, 1 / math.sqrt(1 - 0.0066943799901413165)])[:, None]
+    a, b = (np.array(pymap3d.geodetic2ecef(*p)) * stretch for p in (own, other))
+    share = np.clip(-np.sum(a * (b - a), axis=0) / np.sum((b - a) ** 2, axis=0), 0, 1)
+    nearest = np.linalg.norm(a + share * (b - a), axis=0) - 6378137.0
+    clear = np.abs(nearest) > 1.0
+    assert 50 < np.count_nonzero(nearest < 0) < 350
+    assert (behind_the_limb(own, other) == (nearest < 0))[clear].all()
+
+
+@pytest.mark.parametrize(("refraction", "factor"), [("none", 1.0), ("four_thirds", 4 / 3)])
+def test_the_range_to_the_horizon_is_that_of_the_textbook(refraction, factor):
+    """d = k R (acos(kR/(kR+h1)) + acos(kR/(kR+h2))), 4.12 (√h1 + √h2) km with k = 4/3."""
+    east = np.arange(50e3, 300e3, 50.0)
+    own = (0 * east - 35.0, 0 * east + 10.0, 0 * east + 800.0)
+    lat, lon, _ = pymap3d.enu2geodetic(east, 0 * east, 0 * east, -35.0, 10.0, 0.0)
+    hidden = behind_the_limb(own, (lat, lon, 0 * east + 400.0), refraction=refraction)
+    first = int(np.argmax(hidden))
+    assert hidden[first:].all() and not hidden[:first].any()
+    # Along the parallel the radius of curvature is the prime vertical's.
+    radius = factor * 6378137.0 / math.sqrt(1 - 0.00669438 * math.sin(math.radians(35)) ** 2)
+    expected = radius * sum(math.acos(radius / (radius + h)) for h in (800.0, 400.0))
+    # The rung takes the Earth's mean radius for the bending: 0.1 %.
+    assert east[first] == pytest.approx(expected, rel=1.5e-3)
+    if factor > 1:
+        assert east[first] / 1e3 == pytest.approx(
+            4.12 * (math.sqrt(800) + math.sqrt(400)), rel=3e-3
+        )
+
+
+def test_bending_and_dip():
+    assert math.degrees(bent_elevation_rad(0.0, 20e3)) == pytest.approx(0.0225, abs=5e-5)
+    assert bent_elevation_rad(0.3, 2e4, "none") == 0.3
+    assert bent_elevation_rad(math.pi / 2, 1e4) == math.pi / 2
+    # The bent ray over the round Earth is the straight one over the Earth of 4/3: h2 there.
+    el, range_m = 0.02, 60e3
+    rises = math.tan(bent_elevation_rad(el, range_m)) - math.tan(el)
+    assert rises * range_m == pytest.approx(range_m**2 / (8 * R), rel=2e-3)
+    assert math.degrees(dip_rad(1000.0)) == pytest.approx(math.degrees(math.acos(R / (R + 1e3))))
+    assert dip_rad(1000.0, "four_thirds") == pytest.approx(math.acos(R / (R + 750.0)), rel=1e-4)
+    assert dip_rad(-5.0) == 0.0
+    with pytest.raises(ValueError, match="refraction is 'air'"):
+        bent_elevation_rad(0.0, 1.0, "air")
+
+
+def ridges():
+    rng = np.random.default_rng(8)
+    return ElevationRaster(-42.0, 179.5, 1 / 60, 1 / 60, rng.uniform(0, 2500, (61, 61)), "ridges")
+
+
+def bilinear(raster, lat, lon):
+    """Heights by SciPy, -inf beside the raster."""
+    place = [(lat + 42.0) * 60, np.mod(lon - 179.5, 360.0) * 60]
+    return map_coordinates(raster.height_m, place, order=1, cval=-np.inf)
+
+
+def test_heights_between_nodes_across_the_antimeridian():
+    raster = ridges()
+    rng = np.random.default_rng(5)
+    lat, lon = (
+        rng.uniform(-42.3, -40.7, 200),
+        np.mod(rng.uniform(179.3, 180.7, 200) + 180, 360) - 180,
+    )
+    found, inside = raster.height(lat, lon)
+    np.testing.assert_allclose(found, bilinear(raster, lat, lon), rtol=1e-9)
+    assert 0 < np.count_nonzero(inside) < 200
+    corner, on = raster.height(np.array([-42.0, -41.0]), np.array([-180.5, -179.5]))
+    assert on.all()
+    assert corner == pytest.approx([raster.height_m[0, 0], raster.height_m[-1, -1]])
+
+
+@pytest.mark.parametrize("refraction", ["none", "four_thirds"])
+def test_rays_through_mountains_by_brute_force(refraction):
+    raster = ridges()
+    rng = np.random.default_rng(6)
+    count = 60
+    ends = [
+        (rng.uniform(-41.95, -41.05, count), rng.uniform(179.55, 180.45, count) - 360.0,
+         rng.uniform(1900, 2900, count)) for _ in range(2)
+    ]  # fmt: skip
+    shares = np.linspace(0, 1, 2001)[1:-1]
+    (lat, lon, height), length = along(*ends, shares)
+    if refraction == "four_thirds":
+        height = height + (length**2 / (2 * R) / 4)[:, None] * shares * (1 - shares)
+    ground = bilinear(raster, lat, lon)
+    above = (ground - height).max(axis=1)
+    found = behind_terrain(*ends, raster, refraction=refraction)
+    assert 5 < np.count_nonzero(found) < count - 5
+    # Never hidden where nothing stands in it (the brute force's comb misses crests by metres);
+    # missed only by less than the bound.
+    assert (above[found] > -15.0).all()
+    assert (above[~found] < miss_bound_m(raster)).all()
+    # The raster's zero counts, and one by one they are what they are together.
+    assert behind_terrain(*ends, raster, offset_m=2000.0).all()
+    single = [
+        behind_terrain(
+            *([a[i : i + 1] for a in end] for end in ends), raster, refraction=refraction
+        )
+        for i in range(count)
+    ]
+    assert (np.concatenate(single) == found).all()
+
+
+def hgt(folder, heights, name="S42W180.hgt"):
+    path = folder / name
+    path.write_bytes(np.asarray(heights).astype(">i2").tobytes())
+    return path
+
+
+def test_an_hgt_file_runs_from_north_to_south(tmp_path):
+    raster = read_raster(hgt(tmp_path, [[1, 2, 3], [4, 5, 6], [7, 8, 9]], "n45E007.hgt"))
+    assert (raster.south_deg, raster.west_deg, raster.lat_step_deg) == (45.0, 7.0, 0.5)
+    found, _ = raster.height(np.array([46.0, 45.0, 45.25]), np.array([7.0, 8.0, 7.5]))
+    assert found.tolist() == [1.0, 9.0, 6.5]
+    assert read_raster(hgt(tmp_path, np.zeros((2, 2)), "S05W070.hgt")).south_deg == -5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "heights", "says"),
+    [
+        ("S42W180.hgt", [[1, 2], [3, -32768]], r"1 holes .* latitude -42, longitude -179"),
+        ("S42W180.hgt", [[1, 2, 3]], "6 bytes: an .hgt file holds as many rows as columns"),
+        ("island.hgt", [[1, 2], [3, 4]], "must say its south-west corner"),
+        ("S42W180.png", [[1, 2], [3, 4]], "must be .hgt .SRTM., .tif or .tiff"),
+        ("N90W180.hgt", [[1, 2], [3, 4]], "must lie within -90 to 90"),
+    ],
+)  # fmt: skip
+def test_bad_rasters_are_named(name, heights, says, tmp_path):
+    with pytest.raises(ValueError, match=says) as caught:
+        read_raster(hgt(tmp_path, heights, name))
+    assert name in str(caught.value)
+
+
+def test_a_geotiff_without_its_package_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    with pytest.raises(ValueError, match=r"pip install 'dsa-des\[geotiff\]'"):
+        read_raster(hgt(tmp_path, [[1, 2], [3, 4]], "a.tif"))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_geotiff_is_the_same_raster(tmp_path):
+    rasterio = pytest.importorskip("rasterio")
+    from rasterio.transform import from_origin
+
+    heights = np.arange(12, dtype=np.float32).reshape(3, 4)
+
+    def written(crs="EPSG:4326", missing=None, name="a.tif"):
+        # Corner of the first pixel: half a step north and west of the first node.
+        grid = from_origin(7.0 - 0.05, 46.0 + 0.1, 0.1, 0.2)
+        options = {"height": 3, "width": 4, "count": 1, "dtype": "float32", "crs": crs}
+        with rasterio.open(tmp_path / name, "w", transform=grid, nodata=-9999, **options) as file:
+            file.write(np.where(heights == missing, -9999, heights).astype(np.float32), 1)
+        return tmp_path / name
+
+    raster = read_raster(written())
+    assert (raster.south_deg, raster.west_deg) == pytest.approx((45.6, 7.0))
+    assert raster.height_m[::-1].tolist() == heights.tolist()
+    with pytest.raises(ValueError, match="1 holes"):
+        read_raster(written(missing=5, name="holes.tif"))
+    with pytest.raises(ValueError, match="must be in longitude and latitude"):
+        read_raster(written(crs="EPSG:32633", name="utm.tif"))
+    with pytest.raises(ValueError, match="is no GeoTIFF that can be read"):
+        read_raster(hgt(tmp_path, [[1, 2], [3, 4]], "text.tif"))
+
+
+def test_the_shipped_raster_is_what_its_script_makes(tmp_path, configs, capsys):
+    assert main([str(tmp_path)]) == 0
+    shipped = (configs / "terrain" / NAME).read_bytes()
+    assert (tmp_path / NAME).read_bytes() == shipped
+    raster = read_raster(configs / "terrain" / NAME)
+    assert raster.highest_m == synthetic_heights_m().max() > 1500
+    assert main([str(tmp_path / "nowhere")]) == 2

@@ -1,0 +1,204 @@
+"""Echoes that fade slowly: a process of the target and the instant, with each model's own Pd."""
+
+import math
+from typing import Any
+
+import crooked
+import numpy as np
+import pytest
+from covering import covers
+from scipy.special import gammaincc
+from scipy.stats import norm
+from wired import HEARS_ALL, chain, rows
+
+import dsa_des
+from components.radar.detection import detection_probability
+from dsa_des.errors import SceneError
+from dsa_des.library.scenes import load_scene
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.running.simulation import Simulation
+
+PFA = 1e-4
+RADAR: dict[str, Any] = {
+    **{key: value for key, value in HEARS_ALL.items() if key != "threshold_db"},
+    "type": "radar.swerling", "swerling": 1, "false_alarm_probability": PFA, "scan_rate_hz": 10,
+}  # fmt: skip
+#: So strong that a deep fade is detected too, so that the power of every look is recorded.
+LOUD = {"power_w": 1e12}
+
+
+def formation(count: int) -> list[dict[str, Any]]:
+    """Aircraft that fly beside the ownship at some 2.5 km and stay there."""
+    along = {key: crooked.OWNSHIP[key] for key in ("heading_deg", "speed_mps", "climb_mps")}
+    turn = [2.0 * math.pi * number / count for number in range(count)]
+    return [
+        {"name": f"t{n}", "east_m": 2500 * math.sin(a), "north_m": 2500 * math.cos(a),
+         "up_m": 300.0, **along} for n, a in enumerate(turn)
+    ]  # fmt: skip
+
+
+def looks(count: int, duration_s: float, window: int | None = None, **keys: Any) -> Any:
+    """Return the detections of a formation as columns, and the run."""
+    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(count), duration_s=duration_s)
+    sink = MemorySink()
+    simulation = Simulation(load_scene(scene), recorder=Recorder([sink]), window=window)
+    simulation.run()
+    return sink.tables()["detections"]
+
+
+def power(**keys: Any) -> Any:
+    """Return the power of every look over its mean, (scans, targets), where all detect."""
+    count, duration_s = keys.pop("count", 100), keys.pop("duration_s", 8)
+    found = looks(count, duration_s, **{**LOUD, **keys}).to_pydict()
+    mean = looks(count, 0.01, **{**LOUD, **keys, "swerling": 0, "offset_s": 0}).to_pydict()
+    at = dict(zip(mean["target"], mean["snr_db"], strict=True))
+    scans = max(found["scan"]) + 1
+    values = np.full((scans, count), np.nan)
+    for scan, name, db in zip(found["scan"], found["target"], found["snr_db"], strict=True):
+        values[scan, int(name[1:])] = 10.0 ** (0.1 * (db - at[name]))
+    assert np.isnan(values).sum() < 1e-3 * values.size
+    return values
+
+
+@covers("fluctuation_correlation_s", of=("radar.swerling",))
+@pytest.mark.parametrize(("model", "degrees"), [(1, 2), (2, 2), (3, 4), (4, 4)])
+def test_power_is_chi_square_and_its_correlation_falls_as_stated(model, degrees):
+    """exp(-2 dt / tau) with tau 1.5 s: seen at lags of 0.1 to 2 s."""
+    values = power(swerling=model, fluctuation_correlation_s=1.5, count=400)
+    assert np.nanmean(values) == pytest.approx(1.0, abs=0.06)
+    variance = 2.0 / degrees
+    assert np.nanvar(values) == pytest.approx(variance, rel=0.12)
+    # Half of the looks are below the median of the distribution.
+    middle = np.nanmedian(values)
+    assert gammaincc(degrees / 2, degrees / 2 * middle) == pytest.approx(0.5, abs=0.03)
+    for lag in (1, 3, 8, 20):
+        product = np.nanmean((values[lag:] - 1.0) * (values[:-lag] - 1.0)) / variance
+        assert product == pytest.approx(math.exp(-2.0 * lag * 0.1 / 1.5), abs=0.09)
+    # One target's fades tell nothing of its neighbour's.
+    other = np.nanmean((values[:, 1:] - 1.0) * (values[:, :-1] - 1.0)) / variance
+    assert abs(other) < 0.05
+
+
+@pytest.mark.parametrize(("model", "pulses"), [(1, 1), (3, 1), (2, 1), (1, 4), (2, 4)])
+def test_over_many_looks_pd_is_the_model_s_own(model, pulses):
+    """A hundred thousand looks, the fades of which have nearly passed from scan to scan: 99 %."""
+    big = model in (1, 3) and pulses == 1
+    count, scans = (500, 200) if big else (200, 100)
+    # 12 dB or so on average.
+    keys = {"swerling": model, "pulses": pulses, "power_w": 3.5, "fluctuation_correlation_s": 0.05}
+    found = looks(count, scans / 10 - 0.01, **keys)
+    steady = looks(count, 0.01, **{**keys, "swerling": 0, **LOUD}).to_pydict()["snr_db"]
+    snr = 10.0 ** (0.1 * (np.array(steady) + 10.0 * math.log10(3.5 / LOUD["power_w"])))
+    expected = float(np.mean(detection_probability(
+        snr, pulses=pulses, false_alarm_probability=PFA, model=f"swerling{model}"
+    )))  # fmt: skip
+    assert 0.3 < expected < 0.99
+    share = len(found) / (count * scans)
+    # exp(-4) of a look's fade is left at the next one.
+    spread = math.sqrt(expected * (1 - expected) / (count * scans) * (1 + 2 * math.exp(-4)))
+    assert share == pytest.approx(expected, abs=norm.isf(0.005) * spread)
+
+
+def test_a_faster_radar_sees_the_same_fades_at_the_same_instants():
+    slow = power(scan_rate_hz=2, fluctuation_correlation_s=3.0)
+    fast = power(scan_rate_hz=10, fluctuation_correlation_s=3.0)
+    assert fast[::5] == pytest.approx(slow, rel=1e-9, nan_ok=True)
+    late = power(scan_rate_hz=2, fluctuation_correlation_s=3.0, offset_s=0.3)
+    assert fast[3::5] == pytest.approx(late, rel=1e-9, nan_ok=True)
+
+
+def test_windows_and_replicas_together_change_nothing():
+    keys = {"fluctuation_correlation_s": 0.7, "power_w": 3.5, "beam_sweep": True}
+    whole = looks(5, 3, **keys)
+    assert 20 < len(whole) < 140
+    for window in (1, 7):
+        assert looks(5, 3, window=window, **keys).equals(whole)
+    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=3)
+    study = dsa_des.study(
+        scene, metrics=["first_detection"], axes={"blocks.sensor.scan_rate_hz": [5, 10]},
+        replicas=2, workers=1,
+    )  # fmt: skip
+    for row in study.runs.to_pylist():
+        again = [f"blocks.sensor.scan_rate_hz={row['sensor.scan_rate_hz']:g}"]
+        alone = dsa_des.run(load_scene(scene, seed=row["seed"], sets=again))
+        first = min(rows(alone, block="sensor"), key=lambda seen: seen["time_s"])
+        assert row["first_detection_time_s.sensor"] == first["time_s"]
+
+
+def test_a_beam_that_sweeps_meets_the_fade_of_its_own_instant():
+    """The same target a tenth of a second later in the sweep: correlation at that lag, not 1."""
+    swept = power(beam_sweep=True, scan_rate_hz=1, fluctuation_correlation_s=0.5, count=36,
+                  duration_s=12)  # fmt: skip
+    started = power(scan_rate_hz=1, fluctuation_correlation_s=0.5, count=36, duration_s=12)
+    ratio = np.abs(np.log(swept[:-1] / started[:-1]))
+    late = np.nanmean(ratio, axis=0)
+    assert np.nanmin(late) < 0.3 < np.nanmax(late)
+
+
+def declared_share(lasts_s: float | None, rate_hz: float) -> float:
+    keys: dict[str, Any] = {
+        "power_w": 2.0,
+        "scan_rate_hz": rate_hz,
+        "declare_m": 3,
+        "declare_n": 4,
+    }
+    if lasts_s is not None:
+        keys["fluctuation_correlation_s"] = lasts_s
+    found = looks(600, 1.5, **keys).to_pydict()
+    declared = {
+        name for name, is_so in zip(found["target"], found["declared"], strict=True) if is_so
+    }
+    return len(declared) / 600
+
+
+def expected_share(lasts_s: float | None, rate_hz: float, snr: float) -> float:
+    """Brute force: amplitudes by recursion from look to look, a threshold, three of four."""
+    draw = np.random.default_rng(11)
+    scans, trials = round(1.5 * rate_hz), 40_000
+    keep = 0.0 if lasts_s is None else math.exp(-1.0 / (rate_hz * lasts_s))
+
+    def normal() -> Any:
+        return (draw.standard_normal(trials) + 1j * draw.standard_normal(trials)) / math.sqrt(2.0)
+
+    echo, hits = normal(), []
+    for _ in range(scans):
+        hits.append(np.abs(math.sqrt(snr) * echo + normal()) ** 2 > -math.log(PFA))
+        echo = keep * echo + math.sqrt(1.0 - keep**2) * normal()
+    seen = np.array(hits)
+    runs = np.array([seen[max(0, k - 3) : k + 1].sum(axis=0) >= 3 for k in range(scans)])
+    return float(np.mean(runs.any(axis=0)))
+
+
+@pytest.mark.parametrize("rate_hz", [4, 20])
+def test_declarations_hang_together_as_brute_force_has_them(rate_hz):
+    """Independent looks declare nearly everyone soon; where a fade lasts, who is in it stays."""
+    first = looks(600, 0.01, **LOUD, swerling=0).to_pydict()["snr_db"]
+    snr = 10.0 ** (0.1 * (np.mean(first) + 10.0 * math.log10(2.0 / LOUD["power_w"])))
+    shares = {}
+    for lasts_s in (None, 1.0):
+        expected = expected_share(lasts_s, rate_hz, snr)
+        spread = 3.0 * math.sqrt(expected * (1 - expected) / 600) + 0.01
+        shares[lasts_s] = declared_share(lasts_s, rate_hz)
+        assert shares[lasts_s] == pytest.approx(expected, abs=spread)
+    if rate_hz == 20:
+        assert shares[None] > shares[1.0] + 0.08
+
+
+def test_it_is_said_and_where_nothing_fluctuates_it_is_left_out():
+    def verdict(**keys: Any) -> Any:
+        scene = load_scene(chain({"sensor": {**RADAR, **keys}}))
+        (item,) = (i for i in Simulation(scene).plan if i.effect.name == "lasting fluctuation")
+        return item.verdict
+
+    given = verdict(fluctuation_correlation_s=0.2)
+    assert given.simulated and "correlated with 0.368" in given.because
+    assert verdict(fluctuation_correlation_s=0.2, swerling=0).because == "swerling is 0"
+    assert not verdict().simulated
+
+
+@pytest.mark.parametrize("lasts_s", [0, -1.0, 1e8, "long"])
+def test_a_time_that_cannot_be_is_one_error(lasts_s):
+    with pytest.raises(SceneError) as caught:
+        load_scene(chain({"sensor": {**RADAR, "fluctuation_correlation_s": lasts_s}}))
+    assert len(caught.value.problems) == 1
+    assert "blocks.sensor.fluctuation_correlation_s" in str(caught.value)
