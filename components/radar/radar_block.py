@@ -25,6 +25,7 @@ class Radar(Sensor):
     measures_range = True
     hooks = {
         "SNR": "(cells) -> factor of each cell's SNR",
+        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
         "one report by cell": "(cells, power) -> power of the echo that stands for its "
         "resolution cell, 0 of the others",
     }
@@ -33,10 +34,12 @@ class Radar(Sensor):
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
         self._merging: Merging | None = None
+        self.doppler: Any = None
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+        (self.doppler,) = self.built("Doppler") or [None]
         (self._merging,) = self.built("one report by cell") or [None]
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:

@@ -217,9 +217,11 @@ class SwerlingRadar(LinkBudgetRadar):
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
 
-        None where there is ground clutter, which the same loss takes as well, and with CFAR.
+        None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
+        moving-target filter.
         """
-        if terrain_of(self) is not None or self.p.cfar_reference_cells is not None:
+        proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
+        if terrain_of(self) is not None or not proven:
             return None
         return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
 
