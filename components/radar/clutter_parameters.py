@@ -26,12 +26,12 @@ class ClutterParameters(SensorParameters):
         "few; by default the mean power of noise and clutter is known.",
     )
 
-    moving_target_filter: Literal[
-        "none", "single_canceller", "double_canceller", "filter_bank"
-    ] = Field(
-        default="none",
-        description="Doppler processing that takes the ground's echo out, and with it targets as "
-        "slow or at a blind speed; it needs prf_hz.",
+    moving_target_filter: Literal["none", "single_canceller", "double_canceller", "filter_bank"] = (
+        Field(
+            default="none",
+            description="Doppler processing that takes out the echo of the ground, and of "
+            "targets as slow or at a blind speed; it needs prf_hz.",
+        )
     )
     filter_pulses: int = Field(
         default=16,

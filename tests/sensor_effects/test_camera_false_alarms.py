@@ -5,12 +5,15 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
+import dsa_des
 from components.aircraft.aircraft import Roster
 from components.messages.detections import Detections
 from components.messages.false_detections import FALSE_TARGET, add_false_detections
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
+from dsa_des.scene.scene_file import read_scene_file
 
 EVERY_TENTH = "false_alarms_per_frame = 0.1"
 
@@ -102,6 +105,31 @@ def test_no_probability(scene, share):
 def test_published_thresholds_are_configs(configs, threshold, percent):
     text = (configs / f"sensors/afrl_eo_{threshold}_threshold.toml").read_text(encoding="utf-8")
     assert tomllib.loads(text)["false_alarms_per_frame"] == pytest.approx(percent / 100)
+
+
+def test_the_two_thresholds_of_the_flight_tests_are_two(configs):
+    """As far apart as the two shares of Gaussian noise that cross them; ranges as the root."""
+    apart = norm.isf(0.00045) / norm.isf(0.0001)
+    high, low = (configs / f"sensors/afrl_eo_{name}_threshold.toml" for name in ("high", "low"))
+    assert read_scene_file(low).data["threshold"] == pytest.approx(apart, abs=5e-5)
+    assert read_scene_file(high).data["threshold"] == 1
+    first = {}
+    for name in ("afrl", "afrl_low_threshold"):
+        quiet = [f"blocks.{side}.false_alarms_per_frame=0" for side in ("left", "centre", "right")]
+        # The larger intruder is seen from some 9 km on: at 59 s it is 9.15 km away.
+        path = configs / f"systems/{name}.toml"
+        loaded = dsa_des.load_scene(path, sets=quiet, duration_s=59)
+        run = dsa_des.run(loaded)
+        for row in run["detections"].to_pylist():
+            assert row["target"] != "king_air"
+            first.setdefault(name, row["true_range_m"])
+        for side in ("left", "centre", "right"):
+            part = read_scene_file(low if "low" in name else high).data
+            parameters = loaded.blocks[side].parameters
+            assert parameters.threshold == part["threshold"]
+    # A frame is 7.5 m.
+    ratio = first["afrl_low_threshold"] / first["afrl"]
+    assert ratio == pytest.approx(math.sqrt(1.0 / apart), rel=0.002)
 
 
 def report_of(*counts):
