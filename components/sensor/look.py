@@ -25,12 +25,15 @@ class Look:
         Recorded beside the detection: ``snr_db``, ``detection_probability``, ``pixels``.
     signal : dict of (cells,)
         What errors of measurement follow from, where it is not among the extras.
+    noise : (cells,) of bool, optional
+        Which detections noise made, where the sensor tells them from those that the target made.
     """
 
     detected: BoolArray
     confidence: FloatArray
     extras: dict[str, AnyArray] = field(default_factory=dict)
     signal: dict[str, AnyArray] = field(default_factory=dict)
+    noise: BoolArray | None = None
 
 
 class Cells:

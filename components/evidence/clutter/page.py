@@ -37,9 +37,9 @@ does to it, and what a moving-target filter takes out; keys are in the
 ## One threshold
 
 `false_alarm_probability` is that of one look at one resolution cell. It sets the threshold that
-detections cross, and with `false_alarms = true` noise crosses it in every cell of the field of view:
-a scan has (cells · Pfa) false alarms on average. The thesis's 0.05 is meant for a look at a target;
-with false alarms it fills one cell in twenty, and `check` and `run` say what that comes to:
+detections cross, and with `false_alarms = true` noise crosses it in every cell of the field of
+view: a scan has (cells · Pfa) false alarms on average. The thesis's 0.05 is meant for a look at a
+target; with false alarms it fills one cell in twenty, and `check` and `run` say what that comes to:
 
 ```text
 false_alarms is true and false_alarm_probability is 0.05: with 15,000 resolution cells that makes
@@ -60,8 +60,8 @@ has its own, as in the thesis. Filters do not tell two targets of one cell apart
 
 ## Clutter
 
-`[terrain] height_m` gives flat ground an echo (constant gamma, `clutter_gamma_db`) in the range cell
-of each target, as far as the beam meets it. The threshold rises with it (`clutter_threshold =
+`[terrain] height_m` gives flat ground an echo (constant gamma, `clutter_gamma_db`) in the range
+cell of each target, as far as the beam meets it. The threshold rises with it (`clutter_threshold =
 "adaptive"`, the default): the false alarms stay what they are, a target needs its SNR over noise
 *and* clutter, and every radar sees less far. With `"noise"` the threshold stays where noise alone
 has it, as it did before there was a choice: then clutter is detected as if it were the target, and
@@ -69,8 +69,8 @@ has it, as it did before there was a choice: then clutter is detected as if it w
 
 By default the mean power of noise and clutter is known. A real radar averages the cells around:
 `cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few
-({loss_8:.1f} dB with 8 cells, {loss_16:.1f} dB with 16, {loss_64:.1f} dB with 64, at Pfa 1e-6, Pd 0.5
-and Swerling I). A calibrated range is that of a threshold known exactly; the loss comes on top.
+({loss_8:.1f} dB with 8 cells, {loss_16:.1f} dB with 16, {loss_64:.1f} dB with 64, at Pfa 1e-6,
+Pd 0.5 and Swerling I). A calibrated range is that of a threshold known exactly; the loss comes on top.
 The cells are taken to hold what the cell under test holds: edges of clutter, and other targets
 among them, are left out.
 
