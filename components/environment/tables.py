@@ -18,7 +18,11 @@ class Weather(Parameters):
         default=False, description="Whether oxygen and water vapour attenuate radar (P.676)."
     )
     vapour_density_g_m3: float = Field(
-        default=7.5, ge=0, le=50, description="Water vapour density at sea level, g/m³."
+        default=7.5,
+        ge=0,
+        le=50,
+        description="Water vapour density at sea level, g/m³, for gas attenuation of "
+        "radar and for clear air in infrared bands.",
     )
     rain_rate_mm_h: float = Field(default=0.0, ge=0, le=300, description="Rain rate, mm/h.")
     rain_top_m: float = Field(
@@ -36,6 +40,11 @@ class Weather(Parameters):
         default=None,
         gt=0,
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
+    )
+
+    night: bool = Field(
+        default=False,
+        description="Whether there is no daylight: cameras for visible light then see nothing.",
     )
 
     @model_validator(mode="after")

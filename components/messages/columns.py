@@ -43,6 +43,20 @@ _ERRORS: Mapping[str, Column] = {
     ),
 }
 
+_POSE: Mapping[str, Column] = {
+    "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be then: latitude"),
+    "own_lon_deg": ("deg", _WGS84, "its longitude"),
+    "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+    "own_heading_rad": ("rad", _TURNED, "how it believes to be turned: nose, from north"),
+    "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
+    "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
+}
+#: Of what was put together or is held, the pose stands where navigation errs.
+_ERRING_POSE = {
+    name: (unit, frame, f"{meaning}; there is such a column where navigation errs")
+    for name, (unit, frame, meaning) in _POSE.items()
+}
+
 COLUMNS: Mapping[str, Mapping[str, Column]] = {
     "scans": {
         "scan": ("", "", "number of the scan, from 0"),
@@ -68,12 +82,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "illuminated_s": ("s", "", "when a sweeping beam lit the target"),
         "ned_azimuth_rad": ("rad", _NED, "azimuth from north, by the believed attitude"),
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
-        "own_lat_deg": ("deg", _WGS84, "where the ownship believes to be then: latitude"),
-        "own_lon_deg": ("deg", _WGS84, "its longitude"),
-        "own_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
-        "own_heading_rad": ("rad", _TURNED, "how it believes to be turned: nose, from north"),
-        "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
-        "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
+        **_POSE,
         **_ERRORS,
     },
     "fused": {
@@ -83,12 +92,17 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "angle_source": ("", "", "sensor that the angles are of"),
         "range_source": ("", "", "sensor that the range is of; null without one"),
         **_TRUE,
+        "measured_s": ("s", "", "when the angles were measured; all that is true is of then"),
+        **_ERRING_POSE,
+        **_ERRORS,
     },
     "tracks": {
         "target": ("", "", "name of the target"),
         **_MEASURED,
-        "age_s": ("s", "", "time since the target's last update"),
+        "age_s": ("s", "", "time since what is held was measured"),
         "updated_by": ("", "", "sensors of that update, joined by +"),
+        "measured_s": ("s", "", "when it was measured"),
+        **_ERRING_POSE,
     },
     "alerts": {
         "target": ("", "", "name of the target"),

@@ -68,6 +68,7 @@ class Camera(Sensor):
         "area": "(cells) -> area in m² to add to each cell's",
         "contrast": "(cells) -> factor of each cell's contrast",
         "signature": "(cells) -> what to add to each cell's signature",
+        "darkness": "whether it is too dark to see anything",
     }
     effects: ClassVar[tuple[Effect, ...]] = (
         DynamicSignature(),
@@ -97,6 +98,8 @@ class Camera(Sensor):
         self._areas = self.built("area")
         self._contrast_factors = self.built("contrast")
         self._signatures = self.built("signature")
+        if any(self.built("darkness")):
+            self.reach = replace(self.reach, enabled=False)
         if not self.context.simulate_everything:
             farthest_m = farthest_detection_m(self, self.areas, self.contrasts)
             nearer_m = min(self.reach.range_max_m, farthest_m)

@@ -31,7 +31,7 @@ from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_effects import TimeBudget, time_report
-from components.radar.weather_effects import WEATHER_EFFECTS
+from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
@@ -151,6 +151,10 @@ class LinkBudgetRadar(Radar):
             model=model,
         )
         return float(10.0 * np.log10(snr))
+
+    def left_out(self) -> list[str]:
+        """Say what the air would take that the scene leaves out."""
+        return [*super().left_out(), *gas_left_out(self)]
 
     def warnings(self) -> list[str]:
         """Say which values no radar has, and what its false alarm probability comes to."""

@@ -3,6 +3,8 @@
 import pytest
 
 from components.evidence.benchmark.pairs import PAIRS, measured
+from components.evidence.benchmark.rates import RATES
+from components.evidence.benchmark.rates import measured as measured_rate
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 
@@ -43,3 +45,23 @@ def test_a_pair_is_measured(pair):
     low, high = row["times_quartiles"]
     assert 0.0 < low <= row["times"] <= high
     assert row["wanted"] == pair.wanted
+
+
+def test_the_alerting_of_a_pair_sees_the_tracks_of_the_same_chain():
+    alerted, plain = FORMS["alerting"]
+    assert set(alerted.blocks) - set(plain.blocks) == {"alerting"}
+    (_, tables), (_, same) = run(alerted), run(plain)
+    assert tables["tracks"].equals(same["tracks"])
+    assert tables["alerts"].num_rows > 100
+
+
+@pytest.mark.parametrize("rate", RATES, ids=lambda rate: rate.name)
+def test_a_rate_is_measured(rate):
+    assert measured_rate(rate, quick=True, repeats=1)["per_s"] > 0.0
+
+
+def test_the_states_of_a_rate_have_alerts_and_bands():
+    (bands,) = (rate for rate in RATES if rate.name == "bands")
+    kinds = bands.prepare(60)()
+    assert all(any(len(one.bands) > 1 for one in kind) for kind in kinds)
+    assert any(one.recovery is not None for kind in kinds for one in kind)

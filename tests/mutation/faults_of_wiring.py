@@ -11,9 +11,16 @@ _FLIGHT = "wiring/test_flight_keys.py"
 _AIRCRAFT = "wiring/test_aircraft_keys.py"
 _HOST = "wiring/test_host_plane_keys.py"
 
+_BANDS = "wiring/test_infrared_bands_and_night.py"
 _EARTH = "wiring/test_what_the_earth_hides.py"
 
 FAULTS = [
+    *in_file(
+        _GROUP, "components/optical/weather_effects.py", _BANDS,
+        ("humidity-of-the-band-forgotten", "clear = long_wave_transmission(*path, density)",
+         "clear = long_wave_transmission(*path)"),
+        ("infrared-night", 'getattr(block.p, "band", "eo") == "ir"', "False"),
+    ),
     *in_file(
         _GROUP, "components/line_of_sight/earth_effects.py", _EARTH,
         ("limb-always-of-the-sea", "surface_m = terrain.height_m or 0.0", "surface_m = 0.0"),

@@ -8,6 +8,7 @@ from typing import Any
 
 from components.evidence.benchmark.cases import BenchmarkCase, chosen
 from components.evidence.benchmark.pairs import PAIRS, Pair
+from components.evidence.benchmark.rates import RATES, Rate
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file
 from dsa_des.files.output_names import named
@@ -30,7 +31,9 @@ def run_benchmark(
     if embed and (scenes or compare):
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
     pairs = [] if embed else [pair for pair in PAIRS if not scenes or pair.name in scenes]
-    names = [name for name in scenes if name not in {pair.name for pair in pairs}]
+    rates = [] if embed else [rate for rate in RATES if not scenes or rate.name in scenes]
+    others = {pair.name for pair in pairs} | {rate.name for rate in rates}
+    names = [name for name in scenes if name not in others]
     cases = [] if embed or (scenes and not names) else chosen(names)
     before = {} if compare is None else _read(Path(compare))
     target = None if json_file is None else named(json_file, "--json")
@@ -51,6 +54,8 @@ def run_benchmark(
             rows += _measured_cases(console, cases, quick, repeats, before)
         if pairs:
             rows += _measured_pairs(console, pairs, quick, repeats)
+        if rates:
+            rows += _measured_rates(console, rates, quick, repeats)
     if target is not None:
         try:
             write_json(target, rows)
@@ -104,6 +109,27 @@ def _measured_pairs(
         rows.append(row)
     console.print(table)
     console.print("times: CPU of building and running, by that without it", style="dim")
+    return rows
+
+
+def _measured_rates(
+    console: Any, rates: list[Rate], quick: bool, repeats: int | None
+) -> list[dict[str, Any]]:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for heading in ("what is done often", "per s", "at least"):
+        justify: Any = "left" if heading == "what is done often" else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    rows = []
+    for rate in rates:
+        console.print(f"{rate.name}: {rate.what} ...", style="dim")
+        options = [f"--repeats={repeats or (2 if quick else 5)}", *(["--quick"] if quick else [])]
+        row = _fresh("rates", [rate.name, *options])
+        table.add_row(rate.name, f"{row['per_s']:,.0f}", f"{rate.wanted:,.0f}")
+        rows.append(row)
+    console.print(table)
+    console.print("per s of CPU, on one core", style="dim")
     return rows
 
 

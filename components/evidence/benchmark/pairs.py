@@ -13,9 +13,10 @@ from typing import Any
 
 from components.evidence.benchmark.cases import CLOCKED, chosen, scene_of
 from components.evidence.benchmark.measure import engine_run, pin
+from components.examples import folder
 from dsa_des.record.recording import MemorySink
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.scene import Scene
+from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal.terminal import say_json
 
 #: A processor that the three sensors of a scene share, and that is busy a third of the time.
@@ -72,6 +73,12 @@ def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
     return scene_of(found, quick=quick, sets=_SHARED), scene_of(found, quick=quick)
 
 
+def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
+    duration_s = "40" if quick else None
+    with_it, plain = folder() / "alerting" / f"{case}.toml", folder() / f"{case}.toml"
+    return load_scene(with_it, duration_s=duration_s), load_scene(plain, duration_s=duration_s)
+
+
 PAIRS = (
     Pair(
         "unused_effects",
@@ -86,6 +93,13 @@ PAIRS = (
         5.0,
         "clocks",
         _processor,
+    ),
+    Pair(
+        "alerting",
+        "first light with alert levels of its tracks at 1 Hz, or without",
+        2.0,
+        "first_light",
+        _alerting,
     ),
 )
 

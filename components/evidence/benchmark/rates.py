@@ -1,0 +1,114 @@
+"""Time functions by what they do in a second: alert levels of pairs, and bands of states.
+
+``python -m components.evidence.benchmark.rates RATE`` prints one JSON object; the command starts it
+anew for every rate.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from components.alert_configuration.conf_file import read_conf
+from components.alerting.levels import due_levels, violation_times_s
+from components.evidence.benchmark.measure import pin
+from components.examples import folder
+from components.guidance.bands import guidance_of_many
+from components.guidance.kinds import KINDS
+from components.guidance.regions import GuidedIntruders
+from components.guidance.situation import State
+from dsa_des.terminal.terminal import say_json
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Something done many times.
+
+    Parameters
+    ----------
+    name, what : str
+    wanted : float
+        At least so many in a second of CPU.
+    count : int
+        How many at once.
+    prepare : callable
+        From the count to what does them.
+    """
+
+    name: str
+    what: str
+    wanted: float
+    count: int
+    prepare: Callable[[int], Callable[[], object]]
+
+
+def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[State, State]:
+    """Return ownships at the origin, and an intruder of each, in flight in all directions."""
+    random = np.random.default_rng(seed)
+
+    def flown(position: list[Any]) -> State:
+        track, speed = random.uniform(0.0, 2.0 * np.pi, count), random.uniform(25.0, 130.0, count)
+        climb = random.normal(0.0, 3.0, count)
+        east_mps, north_mps = speed * np.sin(track), speed * np.cos(track)
+        return State(position[0], position[1], position[2], east_mps, north_mps, climb)
+
+    up, zero = random.uniform(500.0, 3000.0, count), np.zeros(count)
+    east, north = random.uniform(-within_m, within_m, (2, count))
+    return flown([zero, zero, up]), flown([east, north, up + random.normal(0.0, apart_m, count)])
+
+
+def _levels(count: int) -> Callable[[], object]:
+    configuration = read_conf(folder() / "alerting" / "do365b.conf")
+    levels, lookahead_s = configuration.alerters[0].levels, configuration["lookahead_time"]
+    own, intruder = states(count, 10_000.0, 200.0, 1)
+    relative = own.less(intruder)
+    return lambda: due_levels(levels, violation_times_s(levels, relative, lookahead_s, None))
+
+
+def _bands(count: int) -> Callable[[], object]:
+    configuration = read_conf(folder() / "alerting" / "do365b.conf")
+    own, intruder = states(count, 6_000.0, 150.0, 2)
+    level = np.zeros(count, dtype=np.int64)
+    intruders = [GuidedIntruders(intruder, configuration.alerters[0], level)]
+    return lambda: [guidance_of_many(kind, configuration, own, intruders) for kind in KINDS]
+
+
+RATES = (
+    Rate("pair_alerts", "levels of pairs of aircraft, three volumes each", 1e6, 200_000, _levels),
+    Rate("bands", "states of an ownship and an intruder, four kinds of bands", 1e3, 1000, _bands),
+)
+
+
+def measured(rate: Rate, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return how many are done in a second of CPU, the median of some repetitions."""
+    count = rate.count // 10 if quick else rate.count
+    do = rate.prepare(count)
+    do()
+    found = []
+    for _ in range(repeats):
+        started = time.process_time()
+        do()
+        found.append(count / (time.process_time() - started))
+    return {"scene": rate.name, "per_s": median(found), "wanted": rate.wanted}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure one rate and print what was found."""
+    parser = argparse.ArgumentParser(prog="python -m components.evidence.benchmark.rates")
+    parser.add_argument("rate", choices=[rate.name for rate in RATES])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--repeats", type=int, default=5)
+    options = parser.parse_args(arguments)
+    pin()
+    (rate,) = (rate for rate in RATES if rate.name == options.rate)
+    say_json(measured(rate, options.quick, options.repeats))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
