@@ -25,7 +25,9 @@ With `fluctuation_correlation_s` the echo of each target is a complex Gauss-Mark
 correlation of its power falls as exp(-2 |dt| / τ), whenever the radar looks, and a look is detected
 with a steady target's Pd at the power it meets. Over looks far apart that is the Swerling model's
 own Pd; a radar that looks again soon meets the same fade again. Swerling I and III last, and II and
-IV where a look is one pulse; without the key each scan draws its own fade.
+IV where a look is one pulse; without the key each scan draws its own fade. With
+`scintillation_extent_m` the echo is that of scatterers spread over the target, and changes as fast
+as the target turns or passes; both together forget by either.
 
 Range in km by which 95 % are declared ({m} of {n}), and its mean; in brackets computed by recursion
 of amplitudes from look to look (`components/evidence/scan_rate/fading.py`), {trials:,} times:
@@ -183,6 +185,7 @@ def _draw(
             axes.set_title(title, fontsize=10)
             axes.set_xlabel("scan rate, Hz")
             axes.set_xticks(_TICKS_HZ, [f"{tick:g}" for tick in _TICKS_HZ])
+            axes.set_xticks([], minor=True)
             axes.set_ylim(0, None)
         both[0].set_ylabel("range of declaration, km")
         legend_below(both[0], 3)

@@ -227,6 +227,7 @@ def draw(
             axes.set_title(title, fontsize=10)
             axes.set_xlabel("scan rate, Hz")
             axes.set_xticks(_TICKS_HZ, [f"{tick:g}" for tick in _TICKS_HZ])
+            axes.set_xticks([], minor=True)
         left.set_ylabel("range of declaration, km")
         for budget, colour in (("free", GREY), ("dwell", RADAR)):
             for rate in rates:
