@@ -225,7 +225,11 @@ class TrafficSource(Component):
         )
 
     def flights(
-        self, own: Trajectory, columns: IntArray, time_s: FloatArray
+        self,
+        own: Trajectory,
+        columns: IntArray,
+        time_s: FloatArray,
+        ahead_s: FloatArray | float = 0.0,
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
@@ -236,6 +240,8 @@ class TrafficSource(Component):
         columns : (targets,) of int
         time_s : (rows, targets)
             With an ``update_rate_hz``, the last publication up to then counts.
+        ahead_s : (rows, targets)
+            They are wanted so much later than that.
 
         Returns
         -------
@@ -245,6 +251,7 @@ class TrafficSource(Component):
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
             time_s = np.floor(time_s * rate) / rate
+        time_s = time_s + ahead_s
         columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
         others = self.fleet.each(columns_each, times)
         if self._culling is not None:

@@ -147,8 +147,8 @@ FAULTS = [
          'azimuth, _ = block.axes(found["body_azimuth_rad"], found["body_elevation_rad"])',
          'azimuth = found["body_azimuth_rad"]'),
         ("beam-from-the-message-s-tick",
-         "start = at_start.tick if at_start.state_tick is None else at_start.state_tick",
-         "start = at_start.tick"),
+         "start = targets.tick if targets.state_tick is None else targets.state_tick",
+         "start = targets.tick"),
     ),
     *in_file(
         _GROUP, "components/traffic/source.py",
