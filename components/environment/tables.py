@@ -42,6 +42,16 @@ class Weather(Parameters):
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
     )
 
+    wind_mps: float = Field(
+        default=0.0,
+        ge=0,
+        le=150,
+        description="Speed of the wind, the same everywhere, m/s. Flights keep their tracks over "
+        "the ground, and noses turn into the wind.",
+    )
+    wind_from_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Where the wind comes from, deg from north."
+    )
     night: bool = Field(
         default=False,
         description="Whether there is no daylight: cameras for visible light then see nothing.",

@@ -16,6 +16,17 @@ _EARTH = "wiring/test_what_the_earth_hides.py"
 
 FAULTS = [
     *in_file(
+        _GROUP, "components/traffic/wind.py", "wiring/test_wind.py",
+        ("wind-blows-to-where-it-comes-from", "cls(-speed_mps * math.sin(turn), -speed_mps",
+         "cls(speed_mps * math.sin(turn), speed_mps"),
+        ("bank-of-a-turn-in-still-air", "np.tan(roll_rad) * across", "np.tan(roll_rad)"),
+        ("climb-over-the-ground", "np.arctan2(climb, airspeed)", "np.arctan2(climb, speed)"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/wind_effect.py", "wiring/test_wind.py",
+        ("fixed-yaw-turns-into-the-wind", "np.where(keep[0], np.nan, speed)", "speed"),
+    ),
+    *in_file(
         _GROUP, "components/optical/weather_effects.py", _BANDS,
         ("humidity-of-the-band-forgotten", "clear = long_wave_transmission(*path, density)",
          "clear = long_wave_transmission(*path)"),
