@@ -249,7 +249,7 @@ FAULTS = [
         ("chi-square-of-two-for-all", "range(2 if model in (3, 4) else 1)", "range(1)"),
         ("one-amplitude-s-parts-alike", "process(keys, instant_ns, 2 * number + part)",
          "process(keys, instant_ns, 2 * number)"),
-        ("aspect-without-roll", "        cells.target_roll_rad,\n",
+        ("scatterers-without-roll", "        cells.target_roll_rad,\n",
          "        np.zeros(len(cells)),\n"),
         ("scatterers-that-never-change", "None if process is None else pair", "None"),
         ("fades-by-scan-number", "nanosecond_of(cells.scan_ticks, ticks_per_s)[cells.row]",
