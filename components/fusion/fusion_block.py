@@ -81,6 +81,10 @@ class Fusion(Component):
         """Return what is recorded: where navigation errs, with the believed pose."""
         return [FusedWithPose if navigation_errs(self.context) else FusedDetections]
 
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return {producer.block: producer.offer for producer in self.context.producers}
+
     def serves_replicas(self) -> bool:
         """Say no to a gate that would reach from one replica into the one before."""
         return super().serves_replicas() and self.window_s() <= self.context.duration_s
@@ -128,7 +132,7 @@ class Fusion(Component):
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
         names = (*_VALUES, *_RATES) if self.by_range_rate else _VALUES
-        values = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
+        values: dict[str, Any] = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
         measured_tick = np.zeros(count, dtype=np.int64)
         pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
