@@ -41,6 +41,13 @@ class SwerlingParameters(LinkBudgetParameters):
         description="How long a sampled RCS lasts, s: the correlation of its power falls as "
         "exp(-2 |dt| / it), whenever it is looked at. By default each scan draws its own.",
     )
+    scintillation_extent_m: float | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="Extent of a target's scatterers, m: the sampled RCS changes with the aspect, "
+        "within about wavelength / (2 extent). By default aspect changes the mean only.",
+    )
     model: Literal["auto"] | None = Field(
         default=None,
         description="'auto' has `detection` picked by error and cost, and `explain` say why.",
@@ -81,7 +88,8 @@ class SwerlingParameters(LinkBudgetParameters):
     @property
     def samples_rcs(self) -> bool:
         """Whether each look has an RCS of its own and a steady target's Pd at it."""
-        return self.fluctuation == "sampled" or self.fluctuation_correlation_s is not None
+        lasting = (self.fluctuation_correlation_s, self.scintillation_extent_m)
+        return self.fluctuation == "sampled" or any(given is not None for given in lasting)
 
 
 class SwerlingRadar(LinkBudgetRadar):
