@@ -102,7 +102,7 @@ rows of one run (`components/evidence/clutter/ranges.py`).
 
 Left: clutter takes two thirds of the range at -20 dB; behind a filter, little of it. A threshold
 that stays at the noise would have it grow. Right, over ground of -20 dB: the notch at 0, and the
-blind speed of {blind:.0f} m/s, which an intruder seen at 1 km only, down a slope of 30 deg, has along
+blind speed of {blind:.0f} m/s, which an intruder that is seen at 1 km only, 30 deg below, has along
 the line of sight when it flies 15 % faster.
 
 Detections of such an encounter, {seeds} runs each:
