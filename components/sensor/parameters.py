@@ -92,7 +92,7 @@ class SensorParameters(ErrorParameters):
             ("elevation", reach.elevation_rad),
         ):
             step_deg = getattr(self, f"{angle}_resolution_deg")
-            if high - low >= TWO_PI:
+            if not step_deg or high - low >= TWO_PI:
                 continue
             try:
                 Grid(math.radians(step_deg), limit_low=low, limit_high=high)

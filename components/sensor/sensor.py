@@ -111,10 +111,12 @@ class Sensor(Component):
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
+        reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
+            reach = Mounting().build(self).reach(reach)
         return SensorOffer(
-            self.measures_range, resolution_rad, "range_rate" in self.steps, **constant
+            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach, **constant
         )
 
     @cached_property
