@@ -15,7 +15,7 @@ from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
 from components.messages.alerts import MOST_LEVELS, AlertLevels
-from components.messages.detections import FusedDetections, Tracks
+from components.messages.detections import WITHOUT_POSE, FusedDetections, Tracks
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, ScenePath
@@ -69,6 +69,10 @@ class DaidalusAlerting(Component):
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
     windowed = True
+
+    def request(self, port: str) -> Any:
+        """Ask for no poses beside what is fused: the ownship's own come with the states."""
+        return WITHOUT_POSE if port == "fused" else None
 
     def setup(self) -> None:
         """Read the configuration and find out what is believed."""
@@ -134,24 +138,25 @@ class DaidalusAlerting(Component):
         row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
         new = np.isfinite(sights.range_m) & (sights.target >= 0)
         if self._source == "tracks":
-            new &= sights.age_s == 0.0  # older ones came with an earlier row
-        # The attitude of the same instant, of those that have arrived.
+            new &= sights.updated  # others came with an earlier row
+        # The attitude of when it was measured, of those that have arrived.
         place = np.minimum(
-            np.searchsorted(self._own_tick, sights.tick, side="right"),
-            np.searchsorted(self._own_came, arrived.tick, side="right"),
+            np.searchsorted(self._own_tick, sights.measured_tick, side="right"),
+            np.searchsorted(self._own_came, arrived.tick[row], side="right"),
         )
-        new &= place[row] > 0
-        row = row[new]
-        place = place[row] - 1
+        new &= place > 0
+        row, place = row[new], place[new] - 1
         yaw, pitch, roll = self._attitude[place].T
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
         range_m = sights.range_m[new]
         level = range_m * np.cos(elevation)
         body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
-        position = np.full((len(sights), len(self._roster), 3), np.nan)
-        position[row, sights.target[new]] = np.stack([east, north, -down], axis=-1)
-        self._fit.add(arrived.tick, sights.tick / self.context.ticks_per_s, position)
+        # A row of its own for every instant of measurement.
+        line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
+        position = np.full((len(made), len(self._roster), 3), np.nan)
+        position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
+        self._fit.add(came, made / self.context.ticks_per_s, position)
 
     def _levels(self, ticks: IntArray) -> AlertLevels:
         """Return the levels at some scans."""
@@ -217,3 +222,21 @@ class DaidalusAlerting(Component):
             "north_mps": -north / time_s,
             "climb_mps": (now[:, 2] - then[:, 2]) / time_s,
         }
+
+
+def _by_instant(
+    tick: IntArray, came: IntArray, row: IntArray, measured: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the line of each entry, and when each line came and was measured.
+
+    Parameters
+    ----------
+    tick, came : (rows,)
+        Instants of a message's rows, and when they came.
+    row, measured : (entries,)
+        Row of each entry, and when it was measured.
+    """
+    if np.array_equal(measured, tick[row]):
+        return row, came, tick
+    pairs, line = np.unique(np.stack([row, measured], axis=1), axis=0, return_inverse=True)
+    return line.reshape(-1), came[pairs[:, 0]], pairs[:, 1]

@@ -18,7 +18,11 @@ class Weather(Parameters):
         default=False, description="Whether oxygen and water vapour attenuate radar (P.676)."
     )
     vapour_density_g_m3: float = Field(
-        default=7.5, ge=0, le=50, description="Water vapour density at sea level, g/m³."
+        default=7.5,
+        ge=0,
+        le=50,
+        description="Water vapour density at sea level, g/m³, for gas attenuation of "
+        "radar and for clear air in infrared bands.",
     )
     rain_rate_mm_h: float = Field(default=0.0, ge=0, le=300, description="Rain rate, mm/h.")
     rain_top_m: float = Field(
@@ -36,6 +40,21 @@ class Weather(Parameters):
         default=None,
         gt=0,
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
+    )
+
+    wind_mps: float = Field(
+        default=0.0,
+        ge=0,
+        le=150,
+        description="Speed of the wind, the same everywhere, m/s. Flights keep their tracks over "
+        "the ground, and noses turn into the wind.",
+    )
+    wind_from_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Where the wind comes from, deg from north."
+    )
+    night: bool = Field(
+        default=False,
+        description="Whether there is no daylight: cameras for visible light then see nothing.",
     )
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@
 
 import inspect
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +31,17 @@ scenes that extend others (`[blocks.traffic.intruders.head_on]`).
 """
 
 
-def recorded_tables() -> dict[str, Mapping[str, str]]:
+def recorded_tables() -> dict[str, dict[str, str]]:
     """Return table → column → type of all that registered blocks and processors record."""
     messages: list[type[Message]] = [Processing]
     for name in registered():
         messages += [output.message for output in find(name).outputs.values()]
-    return {table: columns for m in messages for table, columns in sorted(m.recorded.items())}
+        messages += find(name).also_records
+    found: dict[str, dict[str, str]] = {}
+    for message in messages:
+        for table, columns in sorted(message.recorded.items()):
+            found.setdefault(table, {}).update(columns)
+    return found
 
 
 def page() -> str:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from components.messages.detections import FusedDetections, mask_type
+from components.fusion.fusion_block import poses
+from components.messages.detections import MEASURED, POSE, FusedDetections, mask_type
 from components.messages.false_detections import FALSE_TARGET
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Arrivals
@@ -41,8 +42,10 @@ def pass_false_alarms(
         for name in (
             "target", "azimuth_rad", "elevation_rad", "range_m", "contributors", "angle_source",
             "range_source", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+            "measured_tick", *MEASURED,
         )
     }  # fmt: skip
+    own = [np.stack(list(fused.pose_columns().values()))] if fused.pose_columns() else None
     for index, name in enumerate(fused.sensors):
         if name not in arrivals:
             continue
@@ -55,6 +58,11 @@ def pass_false_alarms(
         for column in ("azimuth_rad", "elevation_rad", "range_m"):
             columns[column].append(getattr(new.message, column)[false])
             columns[f"true_{column}"].append(np.full(len(false), np.nan))
+        for column in MEASURED:
+            columns[column].append(getattr(new.message, column)[false])
+        columns["measured_tick"].append(new.message.measured_ticks()[false])
+        if own is not None:
+            own.append(poses(new.message)[:, false])
         for column, value in (
             ("target", FALSE_TARGET),
             ("contributors", 1 << index),
@@ -70,4 +78,7 @@ def pass_false_alarms(
     order = np.argsort(joined, kind="stable")
     values: dict[str, Any] = {name: np.concatenate(parts)[order] for name, parts in columns.items()}
     offsets = np.searchsorted(joined[order], np.arange(len(fused) + 1))
+    if own is not None:
+        pose = np.concatenate(own, axis=1)[:, order]
+        values["own_of_entries"] = dict(zip(POSE, pose, strict=True))
     return replace(fused, offsets=offsets, **values)

@@ -4,19 +4,31 @@ from typing import Any
 
 import numpy as np
 
-from components.messages.detections import Detections, FusedDetections, SensorOffer, mask_type
+from components.messages.detections import (
+    POSE,
+    WITHOUT_POSE,
+    Detections,
+    FusedDetections,
+    FusedWithPose,
+    SensorOffer,
+    mask_type,
+)
+from components.navigation.effects import navigation_errs
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
     "azimuth_rad", "elevation_rad", "true_azimuth_rad", "true_elevation_rad", "true_range_m",
+    "azimuth_variance_rad2", "elevation_variance_rad2",
 )  # fmt: skip
-_VALUES = (*_ANGLES, "range_m")
+_RANGES = ("range_m", "range_variance_m2")
+_RATES = ("range_rate_m_s", "range_rate_variance_m2_s2")
+_VALUES = (*_ANGLES, *_RANGES)
 
 
 class Fusion(Component):
@@ -30,6 +42,7 @@ class Fusion(Component):
     mark = FUSION
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
+    also_records = (FusedWithPose,)
     windowed = True
     rewindable = True
 
@@ -52,8 +65,27 @@ class Fusion(Component):
             for name in reversed(best_angles)
             if offers[name].measures_range
         ]
+        self.by_range_rate = [
+            self.sensors.index(name)
+            for name in reversed(best_angles)
+            if offers[name].measures_range_rate
+        ]
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
+        #: How long before a detection another one may have come to be put together with it.
+        self.keep_ticks = self.gate_ticks
         self._recent: dict[str, Arrivals] = {}
+        self._navigation_errs = navigation_errs(self.context)
+        self._with_pose = self._navigation_errs or any(
+            consumer.request != WITHOUT_POSE for consumer in self.context.consumers
+        )
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where navigation errs, with the believed pose."""
+        return [FusedWithPose if navigation_errs(self.context) else FusedDetections]
+
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return {producer.block: producer.offer for producer in self.context.producers}
 
     def serves_replicas(self) -> bool:
         """Say no to a gate that would reach from one replica into the one before."""
@@ -74,7 +106,7 @@ class Fusion(Component):
         latest = max(int(new.tick[-1]) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            keep = slice(int(np.searchsorted(seen.tick, latest - self.gate_ticks)), len(seen.tick))
+            keep = slice(int(np.searchsorted(seen.tick, latest - self.keep_ticks)), len(seen.tick))
             self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
         return dict(sorted(together.items()))
 
@@ -101,7 +133,10 @@ class Fusion(Component):
         contributors: Any = np.zeros(count, dtype=mask_type(len(self.sensors)))
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
-        values = dict(zip(_VALUES, np.full((len(_VALUES), count), np.nan), strict=True))
+        names = (*_VALUES, *_RATES) if self.by_range_rate else _VALUES
+        values: dict[str, Any] = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
+        measured_tick = np.zeros(count, dtype=np.int64)
+        pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self.by_angles:
             name = self.sensors[index]
@@ -109,12 +144,21 @@ class Fusion(Component):
                 contributors[found[name]] |= 1 << index
                 angle_source[found[name]] = index
                 _copy(values, _ANGLES, found[name], arrivals[name], entries[name])
+                chosen, message = entries[name][found[name]], arrivals[name].message
+                measured_tick[found[name]] = message.measured_ticks()[chosen]
+                if pose is not None:
+                    pose[:, found[name]] = poses(message)[:, chosen]
         for index in self.by_range:
             name = self.sensors[index]
             if name in found and len(found[name]):
                 range_source[found[name]] = index
-                _copy(values, ("range_m",), found[name], arrivals[name], entries[name])
-        return FusedDetections(
+                _copy(values, _RANGES, found[name], arrivals[name], entries[name])
+        for index in self.by_range_rate:
+            name = self.sensors[index]
+            if name in found and len(found[name]):
+                _copy(values, _RATES, found[name], arrivals[name], entries[name])
+        message = FusedWithPose if self._navigation_errs else FusedDetections
+        return message(
             tick=ticks,
             offsets=offsets_of(row, len(ticks)),
             target=target,
@@ -123,8 +167,18 @@ class Fusion(Component):
             range_source=range_source,
             roster=next(iter(arrivals.values())).message.roster,
             sensors=self.sensors,
+            measured_tick=measured_tick,
+            own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             **values,
         )
+
+
+def poses(message: Detections) -> FloatArray:
+    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is told."""
+    columns = message.pose_columns()
+    if columns:
+        return np.stack(list(columns.values()))
+    return np.full((len(POSE), len(message.target)), np.nan)
 
 
 def _copy(
@@ -134,6 +188,10 @@ def _copy(
     new: Arrivals,
     entry: IntArray,
 ) -> None:
-    chosen = entry[at]
+    chosen, message = entry[at], new.message
+    if len(at) == len(entry):
+        for column in columns:
+            values[column] = getattr(message, column)[chosen]
+        return
     for column in columns:
-        values[column][at] = getattr(new.message, column)[chosen]
+        values[column][at] = getattr(message, column)[chosen]

@@ -4,12 +4,12 @@ What a sensor says of every detection alike (the variance of its grid, that it m
 rate) would otherwise be a new array in every message.
 """
 
-import math
 from functools import lru_cache
 
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.recorded_columns import nothing_in
 
 _SMALLEST = 64
 
@@ -33,8 +33,7 @@ def constant_column(value: float, count: int) -> FloatArray:
 
 def not_measured(count: int) -> FloatArray:
     """Return a read-only column of NaN: recorded as null."""
-    # Always the same object: two NaN are not equal, and would be kept twice.
-    return constant_column(math.nan, count)
+    return nothing_in(count)
 
 
 @lru_cache(maxsize=256)

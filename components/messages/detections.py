@@ -12,8 +12,10 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.constant_columns import not_measured
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry, per_row, static
+from components.messages.looks import Looks
+from components.messages.reach import Reach
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.message import Message, Text, per_entry, per_entry_tick, per_row, static
 
 _BITS_OF_INT64 = 63
 _COUNTED_BITS = 12
@@ -51,6 +53,9 @@ POSE = {
 }
 
 
+#: What a block that takes fused detections requests if the ownship's pose is nothing to it.
+WITHOUT_POSE = "without pose"
+
 #: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
 MEASURED = (
     "range_rate_m_s",
@@ -76,6 +81,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    reach : Reach or None
+        Where it looks, in the ownship's body axes; None where it does not say.
     """
 
     measures_range: bool
@@ -85,6 +92,7 @@ class SensorOffer:
     elevation_variance_rad2: float | None = None
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
+    reach: Reach | None = None
 
 
 def _target_names(message: Any) -> Text:
@@ -97,6 +105,12 @@ def _contributor_names(message: Any) -> Text:
 
 def _measured() -> Any:
     return per_entry(column="float64", default=None, kw_only=True)
+
+
+def _fill_measured(message: Any) -> None:
+    for name in MEASURED:
+        if getattr(message, name) is None:
+            setattr(message, name, not_measured(len(message.target)))
 
 
 @dataclass(eq=False)
@@ -145,6 +159,9 @@ class Detections(Message):
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
+    ticks_after : (entries,) of int, or None
+        How long after its row's tick each entry was measured, where that differs: a beam that
+        sweeps. `measured_ticks` gives the instants in any case.
     roster : Roster
     """
 
@@ -181,11 +198,10 @@ class Detections(Message):
     elevation_variance_rad2: FloatArray = _measured()
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
+    ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        for name in MEASURED:
-            if getattr(self, name) is None:
-                setattr(self, name, not_measured(len(self.target)))
+        _fill_measured(self)
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""
@@ -203,6 +219,11 @@ class Detections(Message):
         counts = np.diff(self.offsets)
         pose = {name: getattr(self, name) for name in POSE}
         return {n: np.repeat(v, counts) for n, v in pose.items() if v is not None}
+
+    def measured_ticks(self) -> IntArray:
+        """Return the instant at which each entry was measured."""
+        ticks = np.repeat(self.tick, np.diff(self.offsets))
+        return ticks if self.ticks_after is None else ticks + self.ticks_after
 
 
 @dataclass(eq=False)
@@ -222,6 +243,16 @@ class FusedDetections(Message):
     angle_source, range_source : (entries,) of int
         Index into `sensors`; -1 for none.
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
+    measured_tick : (entries,) of int
+        When the angles were measured, whenever that came here: pose, variances of the angles and
+        everything true are of this instant. By default that of the row.
+    own_of_entries : dict of (entries,), or None
+        The ownship's pose as it believed it to be then, by column (`POSE`); None where nobody asks.
+    range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
+    range_rate_variance_m2_s2 : (entries,)
+        As the sensors that gave the values stated them; NaN where they did not.
+    looks : Looks or None
+        Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
     sensors : tuple of str
         Those with range first, each group by name.
@@ -246,6 +277,32 @@ class FusedDetections(Message):
     true_range_m: FloatArray = per_entry(column="float64")
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
+    measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
+    own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
+    range_rate_m_s: FloatArray = _measured()
+    azimuth_variance_rad2: FloatArray = _measured()
+    elevation_variance_rad2: FloatArray = _measured()
+    range_variance_m2: FloatArray = _measured()
+    range_rate_variance_m2_s2: FloatArray = _measured()
+    looks: Looks | None = per_row(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        _fill_measured(self)
+        if self.measured_tick is None:
+            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
+
+    def pose_columns(self) -> dict[str, FloatArray]:
+        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
+        return self.own_of_entries or {}
+
+
+@dataclass(eq=False)
+class FusedWithPose(FusedDetections):
+    """The same where navigation errs: the ownship's believed pose is recorded beside each line."""
+
+    own_of_entries: dict[str, FloatArray] | None = per_entry(
+        columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
+    )
 
 
 @dataclass(eq=False)
@@ -259,11 +316,15 @@ class Tracks(Message):
     azimuth_rad, elevation_rad, range_m : (entries,)
         Held measurement, ownship's body axes; range NaN when it had none.
     age_s : (entries,)
-        Time since the target's last update.
+        Time since what is held was measured.
     contributors : (entries,) of int
         Sensors of the last update, as in `FusedDetections`.
     roster : Roster
     sensors : tuple of str
+    measured_tick : (entries,) of int
+        When it was measured. By default the row's tick.
+    updated : (entries,) of bool
+        Whether it came at this row's instant; others were held. By default what has no age.
     """
 
     entry_table = "tracks"
@@ -277,6 +338,14 @@ class Tracks(Message):
     contributors: IntArray = per_entry(column="text", name="updated_by", value=_contributor_names)
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
+    measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
+    updated: BoolArray = per_entry(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.measured_tick is None:
+            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
+        if self.updated is None:
+            self.updated = self.age_s <= 0.0
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:
@@ -289,6 +358,19 @@ class Tracks(Message):
             np.zeros(1, dtype=np.int64), offsets, zero, none, none, none, none, zero,
             Roster.of([]), (),
         )  # fmt: skip
+
+
+@dataclass(eq=False)
+class TracksWithPose(Tracks):
+    """The same where navigation errs.
+
+    Parameters
+    ----------
+    own_of_entries : dict of (entries,)
+        The ownship's pose as it believed it to be when what is held was measured.
+    """
+
+    own_of_entries: dict[str, FloatArray] = per_entry(columns=POSE, kw_only=True)
 
 
 def mask_type(sensors: int) -> type:

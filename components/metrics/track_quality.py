@@ -20,7 +20,6 @@ from components.metrics.rows import (
 )
 from components.metrics.single_sensor import only_feed
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.message import Text
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Result, recorded_by
 
@@ -65,24 +64,19 @@ def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) 
 
 
 class AgeOfInformation(TargetMetric):
-    """Age of the newest detection that the fusion holds of a target, over its time in view.
+    """Age of the newest measurement that the fusion holds of a target, over its time in view.
 
-    Between two arrivals the age grows with time; the mean and the 95th percentile are over time,
-    from the first arrival to the last. Delays of the wires into the fusion count, random lateness
-    on them does not.
+    An age counts from when the measurement was made, so whatever kept it on its way is in it.
+    Between two arrivals it grows with time; the mean and the 95th percentile are over time, from
+    the first arrival to the last.
     """
 
     Parameters = TargetParameters
-    tables = {FUSED: ("target", "sensors", "time_s", "block")}
+    tables = {FUSED: ("target", "measured_s", "time_s", "block")}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         self.fusion = recorded_by(scene, FUSED)[0]
-        self.delay_s = {
-            wire.source: float(wire.total_delay_s)
-            for wire in scene.wires
-            if wire.target == self.fusion
-        }
 
     def results(self) -> list[Result]:
         """Return mean and 95th percentile."""
@@ -94,10 +88,11 @@ class AgeOfInformation(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return mean and percentile of every replica."""
         columns = group.tables[FUSED]
-        lines = _Lines(columns, of_target(columns, self.p.target), "sensors")
-        delays = self._delays(lines.rows["sensors"])[lines.order]
-        # What arrives now may be older than what is held: the newest origin counts.
-        origin = _running_max(lines.time_s - delays, lines)
+        lines = _Lines(columns, of_target(columns, self.p.target), "measured_s")
+        # A sweeping beam measures after its scan has begun, which is when its report is sent.
+        made_s = np.minimum(lines.rows["measured_s"][lines.order], lines.time_s)
+        # What arrives now may be older than what is held: the newest counts.
+        origin = _running_max(made_s, lines)
         low = lines.time_s[lines.end - 1] - origin[lines.end - 1]
         high = low + lines.gap_s
         count = len(group)
@@ -123,14 +118,6 @@ class AgeOfInformation(TargetMetric):
             p95 = age_quantile_s(period_s, feed.through, 0.95)
             found["age_of_information_p95_s"] = feed.delay_s + p95
         return found
-
-    def _delays(self, column: Any) -> FloatArray:
-        assert isinstance(column, Text)
-        shortest = [
-            min((self.delay_s.get(name, 0.0) for name in names.split("+")), default=0.0)
-            for names in column.names
-        ]
-        return np.array([*shortest, 0.0])[column.codes]
 
 
 def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
@@ -168,6 +155,19 @@ def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
     return total[place] + (len(ascending) - place) * at
 
 
+def _updated(columns: Any, rows: BoolArray) -> BoolArray:
+    """Return which of the rows hold another measurement than the one before of their line."""
+    lines = _Lines(columns, rows, "measured_s", "updated_by")
+    made_s = lines.rows["measured_s"][lines.order]
+    sensors = lines.rows["updated_by"].codes[lines.order]
+    new = np.ones(len(made_s), dtype=bool)
+    end = lines.end
+    new[end] = (made_s[end] != made_s[end - 1]) | (sensors[end] != sensors[end - 1])
+    found = np.zeros(len(rows), dtype=bool)
+    found[np.flatnonzero(rows)[lines.order]] = new
+    return found
+
+
 class TrackParameters(TargetParameters):
     """Parameters of track metrics."""
 
@@ -179,11 +179,12 @@ class TrackParameters(TargetParameters):
 class TrackUpdates(TargetMetric):
     """How often tracks are updated, and how much of the time they are not broken.
 
-    A track is broken from `break_after_s` after an update until the next one.
+    A track is broken from `break_after_s` after an update until the next one. An update is a row
+    that holds another measurement than the target's row before.
     """
 
     Parameters = TrackParameters
-    tables = {"tracks": ("target", "time_s", "age_s", "block")}
+    tables = {"tracks": ("target", "time_s", "measured_s", "updated_by", "block")}
 
     def results(self) -> list[Result]:
         """Return interval, continuity and breaks."""
@@ -197,8 +198,7 @@ class TrackUpdates(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all four of every replica."""
         columns: Any = group.tables["tracks"]
-        updated = of_target(columns, self.p.target) & (columns["age_s"] <= 0.0)
-        lines = _Lines(columns, updated)
+        lines = _Lines(columns, _updated(columns, of_target(columns, self.p.target)))
         count = len(group)
         broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)
         span = _sums(lines.of_gap, lines.gap_s, count)

@@ -20,6 +20,7 @@ from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.error_model import attitude_with_error, position_with_error
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.time.clock import nanosecond_of
 
@@ -29,6 +30,20 @@ Three = tuple[float, float, float]
 _SCAN_BITS = 48
 
 
+def navigation_errs(context: Context) -> bool:
+    """Return whether the scene has errors of navigation."""
+    return bool(_errors_of(context))
+
+
+def _errors_of(context: Context) -> list[str]:
+    navigation = context.sections.get("navigation")
+    return [
+        f"{key} is {[float(value) for value in values]}"
+        for key, values in (() if navigation is None else navigation)
+        if any(values)
+    ]
+
+
 class _Navigation(Effect):
     name = "navigation"
     neutral = False
@@ -36,12 +51,7 @@ class _Navigation(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[navigation]``."""
-        navigation = block.context.sections.get("navigation")
-        found = [
-            f"{key} is {[float(value) for value in values]}"
-            for key, values in (() if navigation is None else navigation)
-            if any(values)
-        ]
+        found = _errors_of(block.context)
         if found:
             return Verdict(True, f"[navigation] {' and '.join(found)}")
         return Verdict(False, "[navigation] has no bias and no noise")

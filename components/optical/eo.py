@@ -8,6 +8,7 @@ from components.optical.area_of_cells import area_of_cells
 from components.optical.background import Background
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import VISIBLE
+from components.optical.weather_effects import Night
 from components.sensor.look import Cells
 from components.sensor.marks import EO
 from dsa_des.arrays.types import FloatArray
@@ -51,7 +52,7 @@ class ElectroOptical(Camera):
     Parameters = ElectroOpticalParameters
     lockstep = True
     areas, contrasts = "eo", "contrast"
-    effects = (Background(), *Camera.effects)
+    effects = (Background(), Night(), *Camera.effects)
     ladders = (VISIBLE,)
 
     def area(self, cells: Cells) -> FloatArray:

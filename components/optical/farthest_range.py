@@ -10,6 +10,8 @@ from components.aircraft.known_targets import known_targets
 # Covers the rounding of areas, pixels and signatures many times over.
 _MARGIN = 1.0 + 1e-9
 _MARGIN_M = 1.0
+# Effects on the contrast that only take from it.
+_TAKING = ("visibility", "extinction in the band")
 
 
 def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
@@ -35,7 +37,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         for effect in type(camera).effects
         if effect.name in camera.context.effects
         and effect.acts_on in ("area", "contrast", "signature")
-        and effect.name != "visibility"
+        and effect.name not in _TAKING
     ]
     if (
         not areas

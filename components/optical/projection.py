@@ -8,6 +8,7 @@ from pydantic import Field
 
 from components.optical.camera import Camera, CameraParameters
 from components.optical.ladder import INFRARED, VISIBLE
+from components.optical.weather_effects import Night
 from components.sensor.look import Cells
 from components.sensor.marks import EO
 from dsa_des.arrays.types import FloatArray
@@ -33,6 +34,7 @@ class Projection(Camera):
     mark = EO
     Parameters = ProjectionParameters
     lockstep = True
+    effects = (Night(), *Camera.effects)
     ladders = (VISIBLE,)
 
     @classmethod

@@ -5,9 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from components.atmosphere.infrared import (
+    BANDS,
+    band_extinction_per_m,
+    long_wave_transmission,
+    mid_wave_transmission,
+    precipitable_water_mm,
+)
 from components.atmosphere.visibility import (
+    KOSCHMIEDER,
     combined_visibility_m,
     fog_visibility_m,
+    rain_extinction_per_m,
     rain_visibility_m,
 )
 from components.environment.tables import Weather
@@ -30,6 +39,8 @@ class Visibility(Effect):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
         weather = block.context.sections["weather"]
+        if own_band(block) is not None:
+            return Verdict(False, f"band is {block.p.band!r}: the air takes what it takes there")
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -47,13 +58,84 @@ class Visibility(Effect):
     def build(self, block: Any) -> Callable[[Cells], FloatArray]:
         """Return the factor on every cell's contrast."""
         visibility_m = scene_visibility_m(block.context.sections["weather"])
-        if visibility_m is None:
+        if visibility_m is None or own_band(block) is not None:
             return lambda cells: np.ones(len(cells))
 
         def factor(cells: Cells) -> FloatArray:
             return visibility_transmission(cells.range_m, visibility_m)
 
         return factor
+
+
+class BandExtinction(Effect):
+    """What clear air, haze, fog and rain take from an infrared band's contrast."""
+
+    lockstep = True
+    name = "extinction in the band"
+    acts_on = "contrast"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``band``."""
+        return Verdict(own_band(block) is not None, f"band is {block.p.band!r}")
+
+    def build(self, block: Any) -> Callable[[Cells], FloatArray]:
+        """Return the factor on every cell's contrast."""
+        band = own_band(block)
+        if band is None:
+            return lambda cells: np.ones(len(cells))
+        weather = block.context.sections["weather"]
+        density = weather.vapour_density_g_m3
+        extinction = band_extinction_per_m(band, *_obscuration(weather))
+
+        def factor(cells: Cells) -> FloatArray:
+            path = cells.range_m, cells.of_row("own_alt_m"), cells.alt_m
+            if band == "lwir":
+                clear = long_wave_transmission(*path, density)
+            else:
+                clear = mid_wave_transmission(precipitable_water_mm(*path, density))
+            with np.errstate(under="ignore"):
+                return np.asarray(clear * np.exp(-extinction * cells.range_m))
+
+        return factor
+
+
+class Night(Effect):
+    """Without daylight a camera for visible light sees nothing; lights are not simulated."""
+
+    lockstep = True
+    name = "night"
+    acts_on = "darkness"
+    neutral = False
+    outside_the_proof = "a camera in the dark is off"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[weather] night``."""
+        night = block.context.sections["weather"].night
+        if night and getattr(block.p, "band", "eo") == "ir":
+            return Verdict(False, "band is 'ir': warm areas need no daylight")
+        return Verdict(night, f"[weather] night is {str(night).lower()}")
+
+    def build(self, block: Any) -> bool:
+        """Return that it is dark."""
+        return True
+
+
+def own_band(block: Any) -> str | None:
+    """Return the infrared band of a camera whose air is that of its band, or None."""
+    band = getattr(block.p, "band", None)
+    return band if band in BANDS else None
+
+
+def _obscuration(weather: Weather) -> tuple[float | None, float]:
+    """Return the visibility in haze or fog alone (m), and the extinction by rain (1/m)."""
+    rain = float(rain_extinction_per_m(weather.rain_rate_mm_h))
+    if weather.visibility_km is not None:
+        # The scene's visibility is that of all together: what rain does not take is haze.
+        total = KOSCHMIEDER / (weather.visibility_km * 1000.0)
+        return (KOSCHMIEDER / (total - rain), rain) if total > rain else (None, total)
+    if weather.fog_water_g_m3 > 0:
+        return float(fog_visibility_m(weather.fog_water_g_m3)), rain
+    return None, rain
 
 
 def scene_visibility_m(weather: Weather) -> float | None:

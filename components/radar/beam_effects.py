@@ -119,7 +119,8 @@ class Sweep:
         scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
         own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
-        return replace(detections, extras=extras, own_of_entries=own)
+        after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
+        return replace(detections, extras=extras, own_of_entries=own, ticks_after=after)
 
     def _start_s(self, targets: RelativeTargets) -> FloatArray:
         """Return when the picture of each row was; one that came late goes on from there."""

@@ -13,6 +13,7 @@ from components.radar.parameters import RadarParameters
 from components.radar.plausible import clutter_as_signal
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.range_rate import RangeRate
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.sensor.look import Cells, Look
@@ -68,7 +69,14 @@ class RangeBoundary(Radar):
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
-    effects = (BlindRange(), BoundaryClutter(), CellAveraging(), OneReportByCell(), BeamSweep())
+    effects = (
+        RangeRate(),
+        BlindRange(),
+        BoundaryClutter(),
+        CellAveraging(),
+        OneReportByCell(),
+        BeamSweep(),
+    )
     ladders = (DETECTION,)
     _clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
     _cfar: Averaging | None = None

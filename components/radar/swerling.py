@@ -15,6 +15,7 @@ from components.radar.fading import Fading, LastingFluctuation
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
+from components.radar.signal_errors import heard
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
@@ -162,7 +163,8 @@ class SwerlingRadar(LinkBudgetRadar):
             pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
         detected = echo & (cells.draws(self._draws) < pd)
-        return Look(detected, confidence, {"snr_db": snr_db, "detection_probability": pd})
+        extras = {"snr_db": snr_db, "detection_probability": pd}
+        return Look(detected, confidence, extras, heard(snr, cnr))
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""

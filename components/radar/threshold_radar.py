@@ -1,6 +1,6 @@
 """A radar that detects above a fixed SNR (``radar.threshold``, thesis §3.5.1)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -27,11 +27,13 @@ from components.radar.plausible import (
 )
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.range_rate import RangeRate
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
+from components.radar.signal_errors import heard, signal_variances
 from components.radar.time_effects import TimeBudget, time_report
-from components.radar.weather_effects import WEATHER_EFFECTS
+from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
@@ -60,6 +62,7 @@ class LinkBudgetRadar(Radar):
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
+        RangeRate(),
         BlindRange(),
         GroundClutter(),
         CellAveraging(),
@@ -130,6 +133,10 @@ class LinkBudgetRadar(Radar):
             return None
         return self.echo_snr(cells, self._clutter_rcs_m2(cells))
 
+    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the variances that follow from the ratio of signal to noise and clutter."""
+        return signal_variances(self.p, signal["snr"])
+
     def received(self, cells: Cells) -> tuple[FloatArray, FloatArray | None]:
         """Return the SNR of each echo that stands for its cell, and the CNR if there is ground."""
         return self.resolved(cells, self.snr(cells)), self.clutter_cnr(cells)
@@ -151,6 +158,10 @@ class LinkBudgetRadar(Radar):
             model=model,
         )
         return float(10.0 * np.log10(snr))
+
+    def left_out(self) -> list[str]:
+        """Say what the air would take that the scene leaves out."""
+        return [*super().left_out(), *gas_left_out(self)]
 
     def warnings(self) -> list[str]:
         """Say which values no radar has, and what its false alarm probability comes to."""
@@ -219,4 +230,4 @@ class ThresholdRadar(LinkBudgetRadar):
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
-        return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db})
+        return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db}, heard(snr, cnr))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.atmosphere.altitude_table import AttenuationTable, attenuation_table
+from components.atmosphere.gas import gas_specific_attenuation
 from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
 from components.environment.tables import Weather
 from components.radar.radar_block import CellFactor
@@ -86,6 +87,47 @@ class Gas(Attenuation):
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return gas only; with no gas called for, a table without it."""
         return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
+
+
+# Below it clear air takes less than 0.04 dB/km both ways from an echo; no radar's range notices.
+_GAS_MATTERS_HZ = 10e9
+_RANGE_WITHOUT_ONE_M = 10e3
+
+
+def gas_left_out(block: Any) -> list[str]:
+    """Say what clear air would take from a radar above 10 GHz in a scene without gas.
+
+    It is not on by default: a radar calibrated by a range that was measured through air has the
+    air in its calibration already, and scenes keep their values.
+
+    Parameters
+    ----------
+    block : a radar with a link budget
+
+    Returns
+    -------
+    list of str
+        Empty where gas is simulated, or where it hardly matters.
+    """
+    weather = block.context.sections.get("weather")
+    frequency_hz = SPEED_OF_LIGHT_M_S / block.budget.wavelength
+    if weather is None or weather.gas or frequency_hz <= _GAS_MATTERS_HZ:
+        return []
+    calibrated = getattr(block.p, "calibrate", None)
+    range_m = block.stated_reach.range_max_m
+    if calibrated is not None:
+        range_m = 1000.0 * calibrated.range_km
+    elif not math.isfinite(range_m):
+        range_m = _RANGE_WITHOUT_ONE_M
+    db_km = float(
+        gas_specific_attenuation(frequency_hz, vapour_density_g_m3=weather.vapour_density_g_m3)
+    )
+    return [
+        f"gas attenuation: at {frequency_hz / 1e9:.3g} GHz clear air at sea level would take "
+        f"{2e-3 * range_m * db_km:.2g} dB from an echo at {range_m / 1000:.4g} km, there and back; "
+        "[weather] gas = true simulates it"
+        + (" (the range calibrated by is then one without air)" if calibrated is not None else "")
+    ]
 
 
 class Rain(Attenuation):

@@ -5,23 +5,33 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import FusedDetections, Tracks
+from components.messages.detections import (
+    POSE,
+    WITHOUT_POSE,
+    FusedDetections,
+    FusedWithPose,
+    Tracks,
+    TracksWithPose,
+)
 from components.messages.true_entries import true_entries
+from components.navigation.effects import navigation_errs
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
-_HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "tick")
+_HELD = ("azimuth_rad", "elevation_rad", "range_m", "contributors", "measured_tick")
 
 
 class StubParameters(Parameters):
     """Parameters of the tracker stub."""
 
     drop_after_s: float | None = Field(
-        default=None, gt=0, description="Age at which a held measurement is dropped, s."
+        default=None,
+        gt=0,
+        description="Age at which a held measurement is dropped, from when it was made, s.",
     )
 
 
@@ -29,17 +39,27 @@ class TrackerStub(Component):
     """Holds the last fused measurement of each target, its age, and which sensors gave it.
 
     Tracks are sent at every instant at which at least one target was updated: that is when the
-    measurement has come, whenever the fusion sent it, and ages count from then on. A false alarm
-    belongs to no target and is left out: a stub does not start tracks.
+    measurement has come. Ages count from when it was made, however long it was on its way. Of a
+    target's measurements the last one to come is held. A false alarm belongs to no target and is
+    left out: a stub does not start tracks.
     """
 
     mark = TRACKER
     inputs = {"fused": Input(FusedDetections, "trigger", "Fused lines of sight.")}
     outputs = {"tracks": Output(Tracks, "What is held of every target.")}
+    also_records = (TracksWithPose,)
     Parameters = StubParameters
     windowed = True
     lockstep = True
     rewindable = True
+
+    def request(self, port: str) -> str:
+        """Ask for what is held: the pose is not."""
+        return WITHOUT_POSE
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where navigation errs, with the pose believed then."""
+        return [TracksWithPose if navigation_errs(self.context) else Tracks]
 
     def setup(self) -> None:
         """Start with no tracks."""
@@ -62,7 +82,7 @@ class TrackerStub(Component):
             self._targets = self._targets[:0]
         self._replica = int(replica[-1])
         targets = _present(self._targets, fused.target, len(fused.roster))
-        pool, start = self._pool(fused, wake.ticks, counts)
+        pool, start = self._pool(fused)
         last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
         last[0, targets.searchsorted(self._targets)] = np.arange(start)
         rows: Any = 1
@@ -76,18 +96,18 @@ class TrackerStub(Component):
         self._targets = targets[at_end]
         held_at_end = last[-1][at_end]
         self._held = {name: values[held_at_end] for name, values in pool.items()}
-        return self._tracks(fused, wake.ticks[updated], targets, last[1:], pool)
+        first = np.concatenate(([start], start + np.cumsum(counts[updated])[:-1]))
+        return self._tracks(fused, wake.ticks[updated], targets, last[1:], pool, first)
 
-    def _pool(
-        self, fused: FusedDetections, ticks: IntArray, counts: IntArray
-    ) -> tuple[dict[str, Any], int]:
+    def _pool(self, fused: FusedDetections) -> tuple[dict[str, Any], int]:
         """Return everything that may be held: what was, then the new entries."""
         start = len(self._targets)
-        new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD if name != "tick"}
-        new["tick"] = np.repeat(ticks, counts)
+        new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD}
+        if isinstance(fused, FusedWithPose):
+            new |= fused.pose_columns()
         if start == 0:
             return new, 0
-        return {name: np.concatenate([self._held[name], new[name]]) for name in _HELD}, start
+        return {name: np.concatenate([self._held[name], new[name]]) for name in new}, start
 
     def _tracks(
         self,
@@ -96,16 +116,23 @@ class TrackerStub(Component):
         targets: IntArray,
         last: IntArray,
         pool: dict[str, Any],
+        first: IntArray,
     ) -> Tracks:
+        """Return the tracks of each row; `first` is the first of its own entries in the pool."""
+        # A sweeping beam measures after its scan has begun, which is when its report is sent.
         age_s: FloatArray = (
-            ticks[:, np.newaxis] - pool["tick"][np.maximum(last, 0)]
+            np.maximum(ticks[:, np.newaxis] - pool["measured_tick"][np.maximum(last, 0)], 0)
         ) / self.context.ticks_per_s
         held = last >= 0
         if self.p.drop_after_s is not None:
             held &= age_s < self.p.drop_after_s
         row, column = held.nonzero()
         entry = last[row, column]
-        return Tracks(
+        pose: dict[str, Any] = {}
+        message: type[Tracks] = Tracks
+        if isinstance(fused, FusedWithPose):
+            message, pose = TracksWithPose, {n: pool[n][entry] for n in POSE}
+        return message(
             tick=ticks,
             offsets=offsets_of(row, len(ticks)),
             target=targets[column],
@@ -116,6 +143,9 @@ class TrackerStub(Component):
             contributors=pool["contributors"][entry],
             roster=fused.roster,
             sensors=fused.sensors,
+            measured_tick=pool["measured_tick"][entry],
+            updated=entry >= first[row],
+            **({"own_of_entries": pose} if pose else {}),
         )
 
 

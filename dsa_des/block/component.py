@@ -5,7 +5,7 @@ scans, or as its own SimPy process. In the first two the engine calls `Component
 `dsa_des.block.wake.Wake`; rows of its messages are scans, so the same array code serves both.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -139,11 +139,15 @@ class Producer:
         Our input.
     offer : object
         What its `Component.offer` returned for the output it feeds us from.
+    latest_s : Fraction
+        How late its messages come at most: latency, delay and jitter of the wire; what waits for
+        a processor may come later still.
     """
 
     block: str
     port: str
     offer: Any
+    latest_s: Fraction = Fraction(0)
 
 
 @dataclass
@@ -216,6 +220,8 @@ class Component:
     effects: ClassVar[tuple[Effect, ...]] = ()
     #: Models that can fill this block, from crude to exact (`dsa_des.block.ladder`).
     ladders: ClassVar[tuple[Ladder, ...]] = ()
+    #: Message types that `records` may name beside those of the outputs.
+    also_records: ClassVar[tuple[type[Message], ...]] = ()
     #: Why a scene with this block cannot be run as a whole, and what to do; empty where it can.
     needs_host: ClassVar[str] = ""
     #: How figures mark it; a neutral one by default.
@@ -257,6 +263,14 @@ class Component:
     def offer(self, port: str) -> Any:
         """Return what this block says of the output `port` to the blocks it feeds, or None."""
         return None
+
+    def records(self) -> Sequence[type[Message]]:
+        """Return the message types whose tables this block fills, once effects are known.
+
+        By default those of its outputs. A block that sends a subclass, or has a table that a scene
+        may ask for, says so here.
+        """
+        return [output.message for output in self.outputs.values()]
 
     def setup(self) -> None:
         """Prepare for the run; called once, after every block downstream was set up."""

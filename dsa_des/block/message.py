@@ -12,7 +12,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.recorded_columns import Columns, DerivedColumns, Text, recorded_as
+from dsa_des.block.recorded_columns import (
+    RECORDED,
+    Columns,
+    DerivedColumns,
+    FieldColumns,
+    Text,
+    recorded_as,
+)
 
 # How a field of a message depends on its rows.
 PER_ROW = "row"  # first axis is the rows
@@ -61,6 +68,12 @@ def per_row(
 def per_row_tick(**kwargs: Any) -> Any:
     """Declare a field with an instant per row, in ticks, beside `Message.tick`."""
     return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
+
+
+def per_entry_tick(*, name: str, **kwargs: Any) -> Any:
+    """Declare a field with an instant per entry, in ticks; recorded as seconds in column `name`."""
+    how = FieldColumns({name: "float64"}, many=False, value=None, in_entries=False, instant=True)
+    return field(metadata={"per": PER_ENTRY, "is_tick": True, RECORDED: how}, **kwargs)
 
 
 def per_entry(

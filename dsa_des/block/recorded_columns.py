@@ -31,10 +31,44 @@ class Text:
         return len(self.codes)
 
 
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """A column of instants: ticks, which are recorded as seconds since the start of the run.
+
+    Parameters
+    ----------
+    ticks : ndarray of int64
+    """
+
+    ticks: IntArray
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def __getitem__(self, rows: Any) -> "Instants":
+        return Instants(self.ticks[rows])
+
+
 #: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
 #: In float64, NaN means null.
+#: Beside arrays and text, `Instants` on the way to a recorder, which makes seconds of them.
 Columns = dict[str, AnyArray | Text]
 Schema = dict[str, str]
+
+
+def nothing_in(rows: int) -> AnyArray:
+    """Return a float64 column that is null in all rows: one NaN, seen `rows` times."""
+    column: AnyArray = np.ndarray((rows,), np.float64, buffer=_NAN, strides=(0,))
+    return column
+
+
+def is_empty(values: Any) -> bool:
+    """Return whether a column is known to be null in all rows, without a look at them."""
+    return isinstance(values, np.ndarray) and values.base is _NAN
+
+
+_NAN = np.full((), np.nan)
+_NAN.flags.writeable = False
 
 #: Key of the metadata of a field that says how it is recorded.
 RECORDED = "recorded"
@@ -55,12 +89,15 @@ class FieldColumns:
         Given the message, returns what is recorded, where that is not the field itself.
     in_entries : bool
         Whether a column per row is repeated for each of the row's entries too.
+    instant : bool
+        Whether the field holds ticks, to be recorded as seconds.
     """
 
     kinds: Mapping[str, str]
     many: bool
     value: Callable[[Any], Any] | None
     in_entries: bool
+    instant: bool = False
 
 
 def recorded_as(
@@ -164,6 +201,8 @@ class DerivedColumns:
                 dicts.append(item)
                 continue
             values = getattr(message, item.field) if item.value is None else item.value(message)
+            if item.instant:
+                values = Instants(values)
             if item.in_entries and counts is not None:
                 values = _repeated(values, counts)
             columns[item.name] = values
@@ -186,7 +225,7 @@ class _Filled:
         self.field, self.many, self.in_entries = field_name, how.many, how.in_entries
         self.kinds = {name or field_name: kind for name, kind in how.kinds.items()}
         self.name = next(iter(self.kinds))
-        self.value = how.value
+        self.value, self.instant = how.value, how.instant
 
 
 def _repeated(values: Any, counts: IntArray) -> Any:

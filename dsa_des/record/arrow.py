@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
-from dsa_des.block.recorded_columns import Columns, Schema, Text
+from dsa_des.block.recorded_columns import Columns, Schema, Text, is_empty, nothing_in
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.
 ROW_GROUP = 65536
@@ -54,6 +54,8 @@ def _array(values: Any, kind: str) -> pa.Array:
     if isinstance(values, Text):
         return _dictionary(values.codes, values.names).cast(pa.string())
     if kind == "float64":
+        if is_empty(values):
+            return pa.nulls(len(values), _TYPES[kind])
         missing = np.isnan(values)
         count = np.count_nonzero(missing)
         if count == len(values):
@@ -188,6 +190,8 @@ def _written_schema(schema: Schema) -> pa.Schema:
 def _joined(parts: list[Any]) -> Any:
     if len(parts) == 1:
         return parts[0]
+    if all(is_empty(part) for part in parts):
+        return nothing_in(sum(len(part) for part in parts))
     if isinstance(parts[0], Text):
         # A recorder only ever adds names: the last piece knows them all.
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)

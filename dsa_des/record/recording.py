@@ -12,7 +12,7 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
-from dsa_des.block.recorded_columns import Columns, Schema, Text
+from dsa_des.block.recorded_columns import Columns, Instants, Schema, Text, is_empty, nothing_in
 from dsa_des.record.attempts import attempt
 from dsa_des.record.declared_columns import DeclaredColumns
 from dsa_des.time.timeline import own_scans
@@ -162,11 +162,26 @@ class Recorder:
             text = self._texts.setdefault((table, name), _TextCodes(name))
             codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
             return Text(codes if order is None else codes[order], text.names)
-        parts = [_values(columns.get(name), kind, len(columns["tick"])) for _, columns in pieces]
+        if kind == "float64" and all(_is_missing(columns.get(name)) for _, columns in pieces):
+            return nothing_in(len(ticks))
+        parts = [
+            _values(self._in_seconds(columns.get(name), columns), kind, len(columns["tick"]))
+            for _, columns in pieces
+        ]
         values = np.concatenate(parts) if len(parts) > 1 else parts[0]
         if name == "scan" and self._span_ticks:
             values = own_scans(values)
         return values if order is None else values[order]
+
+    def _in_seconds(self, values: Any, columns: Columns) -> Any:
+        """Return instants as seconds since the start of the run that their row belongs to."""
+        if not isinstance(values, Instants):
+            return values
+        ticks = values.ticks
+        if self._span_ticks:
+            row: Any = columns["tick"]
+            ticks = ticks - row // self._span_ticks * self._span_ticks
+        return ticks / self._ticks_per_s
 
     def _time_column(self, name: str, ticks: IntArray) -> AnyArray:
         if name == "replica":
@@ -210,6 +225,10 @@ class _TextCodes:
         if len(self._place) > len(self.names):
             self.names = tuple(self._place)
         return lookup
+
+
+def _is_missing(values: Any) -> bool:
+    return values is None or is_empty(values)
 
 
 def _values(values: Any, kind: str, count: int) -> AnyArray:

@@ -243,8 +243,9 @@ class Simulation:
 
     def _open_recorder(self) -> None:
         if self.recorder is not None:
-            outputs = [o for c in self.components.values() for o in c.outputs.values()]
-            messages: list[type[Message]] = [output.message for output in outputs]
+            messages: list[type[Message]] = [
+                message for block in self.components.values() for message in block.records()
+            ]
             if self.scene.processors:
                 messages.append(Processing)
             self.recorder.open(messages, self.ticks_per_s, self.span_ticks)

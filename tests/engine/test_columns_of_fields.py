@@ -20,8 +20,10 @@ COLUMNS = {
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2",
     "fused": "target sensors azimuth_rad elevation_rad range_m angle_source range_source "
-    "true_azimuth_rad true_elevation_rad true_range_m",
-    "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by",
+    "true_azimuth_rad true_elevation_rad true_range_m measured_s "
+    "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
+    "range_rate_variance_m2_s2",
+    "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by measured_s",
     "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps",
 }
 KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared"]}

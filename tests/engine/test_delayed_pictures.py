@@ -162,20 +162,21 @@ def test_a_tracker_is_updated_when_the_measurement_has_come(tmp_path):
     assert tracks["tick"] == [tick + 10**8 for tick in before["tick"]]
     for column in ("target", "range_m", "azimuth_rad", "updated_by"):
         assert tracks[column] == before[column]
-    assert set(tracks["age_s"]) == {0.0}
+    assert set(tracks["age_s"]) == {0.1}  # from when it was measured
+    assert tracks["measured_s"] == before["time_s"]
 
 
-def test_ages_count_from_when_a_measurement_came(tmp_path):
+def test_ages_count_from_when_a_measurement_was_made(tmp_path):
     """A second target leaves the radar's reach: from then on its track grows old."""
     leaves = AWAY.replace("away", "leaves").replace("2000", "9900")
     two = {**BLOCKS, "traffic": BLOCKS["traffic"].replace(AWAY, f"{AWAY}, {leaves}")}
     tables = run(scene(tmp_path, sets=["blocks.fusion.latency_s=0.3"], tables=two))
     rows = [row for row in tables["tracks"].to_pylist() if row["target"] == "leaves"]
-    fresh = max(row["time_s"] for row in rows if row["age_s"] == 0.0)
-    assert fresh == pytest.approx(1.0 + 0.3)  # 10 km away after 1 s
-    left = [row for row in rows if row["time_s"] > fresh]
+    last = max(row["measured_s"] for row in rows)
+    assert last == pytest.approx(1.0)  # 10 km away after 1 s
+    left = [row for row in rows if row["time_s"] > last + 0.3]
     assert len(left) > 5
-    assert np.allclose([r["age_s"] for r in left], [r["time_s"] - fresh for r in left])
+    assert np.allclose([r["age_s"] for r in left], [r["time_s"] - last for r in left])
 
 
 KITCHEN = {
