@@ -9,9 +9,7 @@ from dsa_des.commands.plain_errors import plain_errors
 
 @click.command()
 @click.argument("run", metavar="RUN")
-@click.option(
-    "--out", metavar="FILE.html", help="The page [default: view.html in RUN, or beside the file]."
-)
+@click.option("--out", metavar="FILE.html", help="The page [default: beside RUN, with its name].")
 @plain_errors
 def view(**options: Any) -> None:
     """Make a page that replays RUN: plan, altitudes, scans, detections, tracks, alerts.

@@ -22,7 +22,7 @@ def make_view(run: str, out: str | None) -> None:
     source = Path(run)
     if source.is_dir():
         picture = run_picture(source)
-        target = source / "view.html"
+        target = source.resolve().with_name(f"{source.resolve().name}.html")
     elif source.suffix == ".daa" and source.is_file():
         picture = encounter_picture(source)
         target = source.with_suffix(".html")
