@@ -5,9 +5,13 @@ Beside the messages' ``recorded``, which has the types; a test sees that none is
 
 from collections.abc import Mapping
 
+from components.messages.state_tracks import COVARIANCE
+
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
 _WGS84 = "WGS 84"
+_FRAME = "north-east-down at the frame's origin"
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _TURNED = "north-east-down to body: yaw, pitch, roll"
 
 #: Unit, frame, meaning.
@@ -103,6 +107,45 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "updated_by": ("", "", "sensors of that update, joined by +"),
         "measured_s": ("s", "", "when it was measured"),
         **_ERRING_POSE,
+    },
+    "state_tracks": {
+        "track": ("", "", "the tracker's own number of the track, from 1"),
+        "track_status": ("", "", "tentative, confirmed, coasted, or deleted (told once)"),
+        "existence": ("", "", "probability that there is something"),
+        **{
+            f"{axis}_m{per_s}": (unit, _FRAME, f"estimated {what}; null without a range")
+            for per_s, unit, what in (("", "m", "position"), ("_s", "m/s", "velocity"))
+            for axis in ("north", "east", "down")
+        },
+        "azimuth_rad": ("rad", _FRAME, "direction from the ownship at its last look, from north"),
+        "elevation_rad": ("rad", _FRAME, "its elevation, upward"),
+        "azimuth_variance_rad2": ("rad²", _FRAME, "variance of that azimuth"),
+        "elevation_variance_rad2": ("rad²", _FRAME, "variance of that elevation"),
+        "has_range": ("", "", "whether any range was measured"),
+        "age_s": ("s", "", "time since the track was started"),
+        "state_s": ("s", "", "the instant that the state speaks of"),
+        "updated_s": ("s", "", "when the last measurement in it was made"),
+        "contributors": ("", "", "sensors that ever updated it, joined by +"),
+        "updated_by": ("", "", "sensors of its last update, joined by +"),
+        "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
+        "origin_lon_deg": ("deg", _WGS84, "its longitude"),
+        "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        **{
+            name: (
+                ("m²", "m²/s", "m²/s²")[(i > 2) + (j > 2)],
+                _FRAME,
+                f"covariance of {_STATE[i]} with {_STATE[j]}; null without a range",
+            )
+            for (i, j), name in COVARIANCE.items()
+        },
+        **{
+            f"acceleration_{axis}_m_s2": ("m/s²", _FRAME, f"estimated acceleration {axis}")
+            for axis in ("north", "east", "down")
+        },
+        "turn_rate_rad_s": ("rad/s", _FRAME, "estimated rate of turn, positive to the right"),
+        "probability_velocity": ("", "", "of the model of constant velocity"),
+        "probability_turn": ("", "", "of the model of a coordinated turn"),
+        "probability_acceleration": ("", "", "of the model of constant acceleration"),
     },
     "alerts": {
         "target": ("", "", "name of the target"),

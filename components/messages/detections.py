@@ -12,6 +12,8 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.messages.constant_columns import not_measured
+from components.messages.looks import Looks
+from components.messages.reach import Reach
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, per_entry_tick, per_row, static
 
@@ -79,6 +81,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    reach : Reach or None
+        Where it looks, in the ownship's body axes; None where it does not say.
     """
 
     measures_range: bool
@@ -88,6 +92,7 @@ class SensorOffer:
     elevation_variance_rad2: float | None = None
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
+    reach: Reach | None = None
 
 
 def _target_names(message: Any) -> Text:
@@ -246,6 +251,8 @@ class FusedDetections(Message):
     range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
     range_rate_variance_m2_s2 : (entries,)
         As the sensors that gave the values stated them; NaN where they did not.
+    looks : Looks or None
+        Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
     sensors : tuple of str
         Those with range first, each group by name.
@@ -277,6 +284,7 @@ class FusedDetections(Message):
     elevation_variance_rad2: FloatArray = _measured()
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
+    looks: Looks | None = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         _fill_measured(self)

@@ -17,9 +17,10 @@ from components.geometry.state import TrajectoryState
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Gives the states of the ownship and of some targets (columns of the roster) at times
-#: (rows, columns), as two `TrajectoryState` with arrays of that shape; or what was made of them
+#: (rows, columns), and so many seconds after what is known of them then, if a third argument says
+#: so: as two `TrajectoryState` with arrays of that shape; or what was made of them
 #: (`KnownFlights.seen_by`), as arrays of that shape by name.
-Flights = Callable[[IntArray, FloatArray], Any]
+Flights = Callable[..., Any]
 
 
 class KnownFlights:
@@ -50,6 +51,37 @@ class KnownFlights:
             for number, here in zip(known, rows, strict=True)
         ]
         return _joined(parts, np.argsort(np.concatenate(rows), kind="stable"))
+
+    def each(
+        self, row: IntArray, column: IntArray, time_s: FloatArray, ahead_s: FloatArray
+    ) -> Mapping[str, AnyArray]:
+        """Return what is seen of single targets, each as its own row knows it.
+
+        Parameters
+        ----------
+        row, column : (n,) of int
+            Row of the message, and index of the target in the roster.
+        time_s, ahead_s : (n,)
+            So long after what is known at a time: where positions are published at a rate of their
+            own, after the last publication.
+
+        Returns
+        -------
+        dict of (n,) arrays
+        """
+        known = self.of_row[row]
+        numbers = np.unique(known).tolist()
+        if len(numbers) == 1:
+            return _flat(self.flights[numbers[0]](column, time_s[np.newaxis], ahead_s[np.newaxis]))
+        places = [np.flatnonzero(known == number) for number in numbers]
+        parts = [
+            _flat(self.flights[number](column[of], time_s[np.newaxis, of], ahead_s[np.newaxis, of]))
+            for number, of in zip(numbers, places, strict=True)
+        ]
+        joined: Mapping[str, AnyArray] = _joined(
+            parts, np.argsort(np.concatenate(places), kind="stable")
+        )
+        return joined
 
     def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
         """Return the same for who looks at the states through `seen`, which takes both."""
@@ -82,8 +114,19 @@ class _Seen:
     flight: Flights
     seen: Callable[..., Mapping[str, AnyArray]]
 
-    def __call__(self, columns: IntArray, time_s: FloatArray) -> Mapping[str, AnyArray]:
-        return self.seen(*self.flight(columns, time_s))
+    def __call__(
+        self, columns: IntArray, time_s: FloatArray, *ahead_s: FloatArray
+    ) -> Mapping[str, AnyArray]:
+        return self.seen(*self.flight(columns, time_s, *ahead_s))
+
+
+def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
+    """Return the single row of what is seen of targets; what is in tables, with their names."""
+    found = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
+    for table, columns in seen.items():
+        if isinstance(columns, Mapping):
+            found |= {f"{table}_{name}": values[0] for name, values in columns.items()}
+    return found
 
 
 def _joined(parts: Sequence[Any], order: IntArray) -> Any:

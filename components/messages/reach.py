@@ -47,6 +47,8 @@ class Reach:
         Largest relative error of the range that leaves what the sensor says within ``[accuracy]``.
     exact_because : str
         Why only an exact line of sight will do; empty where another one may.
+    lasts_s : float
+        Above 0 where the flights are wanted too, so long after the instants of the scans.
     """
 
     azimuth_rad: tuple[float, float]
@@ -55,6 +57,7 @@ class Reach:
     enabled: bool = True
     range_slack: float = math.inf
     exact_because: str = ""
+    lasts_s: float = 0.0
 
     @property
     def steepest_rad(self) -> float:
@@ -136,6 +139,7 @@ def farthest_look(requests: Iterable[object]) -> FarthestLook:
                     ((request.range_max_m, request.steepest_rad),),
                     request.range_slack,
                     request.exact_because,
+                    request.lasts_s,
                 )
             )
     return FarthestLook(

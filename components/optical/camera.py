@@ -1,14 +1,16 @@
 """The base class of EO and IR cameras: pixels, signature, threshold (thesis §3.5.2)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
 from components.geometry.field_of_view import sector_width_rad
 from components.optical.area_of_cells import check_silhouette
+from components.optical.centroid_accuracy import centroid_variance
 from components.optical.dynamic_signature import DynamicSignature
 from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
@@ -48,9 +50,33 @@ class CameraParameters(SensorParameters):
         default="exact",
         description="How the line of sight's rate is formed: turning angle, or eq. 16-17.",
     )
+    errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
+        default="grid",
+        description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "
+        "the standard deviations and biases that the scene gives; 'signal', those that follow from "
+        "a target's pixels and contrast, beside the stated ones.",
+    )
+    noise_equivalent_contrast: float | None = Field(
+        default=None,
+        gt=0,
+        description="Contrast gain of a target that stands out by as much as a pixel's noise, for "
+        "errors = 'signal'.",
+    )
+    blur_pixels: float = Field(
+        default=0.5, gt=0, description="Standard deviation of the picture's blur, pixels."
+    )
     false_alarms_per_frame: float = Field(
         default=0.0, ge=0, le=1, description="Probability that a frame brings a false alarm."
     )
+
+    @model_validator(mode="after")
+    def _noise_is_known(self) -> Self:
+        if self.errors == "signal" and self.noise_equivalent_contrast is None:
+            raise ValueError(
+                "errors is 'signal' and noise_equivalent_contrast is not given: errors are a share "
+                "of the picture by how much it stands out of noise"
+            )
+        return self
 
 
 class Camera(Sensor):
@@ -161,4 +187,20 @@ class Camera(Sensor):
         for added in self._signatures:
             signature = signature + added(cells)
         margin = signature - self.p.threshold
-        return Look(margin >= 0.0, margin, {"pixels": pixels})
+        signal = {"pixels": pixels, "contrast": contrast}
+        return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
+
+    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the variances of the angles to the target's centre in the picture."""
+        ratio = signal["contrast"] / self.p.noise_equivalent_contrast
+        variance = centroid_variance(signal["pixels"], ratio, self.p.blur_pixels)
+        return {
+            "azimuth": self.pixel_azimuth_rad**2 * variance,
+            "elevation": self.pixel_elevation_rad**2 * variance,
+        }
+
+    def signal_at_threshold(self, count: int) -> dict[str, FloatArray]:
+        """Return the signal of so many targets of one pixel that just reach the threshold."""
+        weight = self.p.static_weight
+        contrast = max(self.p.threshold, 0.0) / weight if weight else 0.0
+        return {"pixels": np.ones(count), "contrast": np.full(count, contrast)}

@@ -69,9 +69,10 @@ class AddedFalseAlarms:
             lowest_elevation_rad=reach.elevation_rad[0],
             highest_elevation_rad=reach.elevation_rad[1],
         )
-        azimuth, elevation, _ = block.measure(across, upward, np.full(len(row), np.nan))
-        measured = block.grid_variances(azimuth, elevation)
-        azimuth, elevation = block.axes.to_body(azimuth, elevation)
+        where = {"azimuth": across, "elevation": upward, "range": np.full(len(row), np.nan)}
+        azimuth, elevation, _, measured = block.report_noise(
+            where, block.signal_at_threshold(len(row))
+        )
         return add_false_detections(
             detections,
             row,

@@ -93,17 +93,19 @@ class NoiseReports:
         across, upwards, outwards, power = (
             self._places.uniform(number, scan, draw) for draw in range(4)
         )
-        azimuth, elevation, range_m = self._block.measure(
-            _between(across, self._cells.azimuth_rad),
-            _between(upwards, self._cells.elevation_rad),
-            _between(outwards, self._cells.range_m),
-        )
-        measured = self._block.grid_variances(azimuth, elevation)
-        azimuth, elevation = self._block.axes.to_body(azimuth, elevation)
         summed = self._block.p.pulses_summed
         snr = false_alarm_snr(power, false_alarm_probability=self._pfa, pulses=summed)
         # Noise may barely cross a low threshold; -60 dB stands for nothing.
         snr_db = 10.0 * np.log10(np.maximum(snr, 1e-6))
+        where = {
+            "azimuth": _between(across, self._cells.azimuth_rad),
+            "elevation": _between(upwards, self._cells.elevation_rad),
+            "range": _between(outwards, self._cells.range_m),
+        }
+        if self._block.p.measures_range_rate:
+            rate = self._block.noise_range_rate(self._places.uniform(number, scan, 4))
+            where["range_rate"] = rate
+        azimuth, elevation, range_m, measured = self._block.report_noise(where, {"snr": snr})
         return add_false_detections(
             detections,
             row,

@@ -7,14 +7,15 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.clutter_parameters import ClutterParameters
+from components.radar.error_parameters import RadarErrorParameters, SignalErrorParameters
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
 from components.radar.plausible import implausible
-from components.radar.resolution_parameters import ResolutionParameters
+from components.radar.signal_errors import check_signal_errors
 from components.radar.time_parameters import TimeBudgetParameters
 from dsa_des.block.component import Parameters
 
 
-class RadarParameters(ResolutionParameters, ClutterParameters):
+class RadarParameters(RadarErrorParameters, ClutterParameters):
     """Parameters of every radar."""
 
     beam_sweep: bool = Field(
@@ -35,7 +36,7 @@ class Calibration(Parameters):
     )
 
 
-class LinkBudgetParameters(RadarParameters, TimeBudgetParameters):
+class LinkBudgetParameters(SignalErrorParameters, RadarParameters, TimeBudgetParameters):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
 
     power_w: float = Field(gt=0, description="Transmitted power, W.")
@@ -97,6 +98,7 @@ class LinkBudgetParameters(RadarParameters, TimeBudgetParameters):
                 "calibrate is given and budget is 'dwell': how long was the look that the range "
                 "was stated for? Give dwell_s or pulses_per_dwell"
             )
+        check_signal_errors(self)
         return self
 
     @property

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
+from components.radar.range_rate import LASTS_S
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
 from components.sensor.marks import RADAR
@@ -16,6 +18,8 @@ from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
 
 CellFactor = Callable[[Cells], FloatArray]
+#: Of noise that looks like an aircraft: the range rate of two fast ones that meet.
+FASTEST_M_S = 500.0
 
 
 class Radar(Sensor):
@@ -25,6 +29,8 @@ class Radar(Sensor):
     measures_range = True
     hooks = {
         "SNR": "(cells) -> factor of each cell's SNR",
+        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
+        "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
         "one report by cell": "(cells, power) -> power of the echo that stands for its "
         "resolution cell, 0 of the others",
     }
@@ -33,10 +39,13 @@ class Radar(Sensor):
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
         self._merging: Merging | None = None
+        self.doppler: Any = None
+        self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+        (self.doppler,) = self.built("Doppler") or [None]
         (self._merging,) = self.built("one report by cell") or [None]
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
@@ -50,9 +59,35 @@ class Radar(Sensor):
     def request(self, port: str) -> Any:
         """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
         reach = super().request(port)
+        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
         if self._sweep is None:
-            return reach
-        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
+            return replace(reach, lasts_s=lasts_s)
+        return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+
+    @cached_property
+    def _rates(self) -> list[Any]:
+        return self.built("range rate")
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """Grid step of each quantity that is measured: rad, m and m/s."""
+        measured = getattr(self.p, "measures_range_rate", False)
+        rate = {"range_rate": self.range_rate_step_m_s} if measured else {}
+        return {**super().steps, **rate}
+
+    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
+        """Return the true range rates of some cells, m/s; None where they are not measured."""
+        return self._rates[0](cells, found) if self._rates else None
+
+    def noise_range_rate(self, uniform: FloatArray) -> FloatArray:
+        """Return range rates that noise alone gives: any that is unambiguous, m/s.
+
+        Parameters
+        ----------
+        uniform : (n,) array
+            In [0, 1).
+        """
+        return FASTEST_M_S * (2.0 * uniform - 1.0)
 
     def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
         """Return the targets at the instants at which the beam lights them."""

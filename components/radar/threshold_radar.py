@@ -1,6 +1,6 @@
 """A radar that detects above a fixed SNR (``radar.threshold``, thesis §3.5.1)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
 from components.radar.clutter_effects import GroundClutter, terrain_of
+from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
@@ -27,9 +28,11 @@ from components.radar.plausible import (
 )
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
+from components.radar.range_rate import RangeRate
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
+from components.radar.signal_errors import heard, signal_variances
 from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out
 from components.sensor.look import Cells, Look
@@ -60,8 +63,10 @@ class LinkBudgetRadar(Radar):
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
+        RangeRate(),
         BlindRange(),
         GroundClutter(),
+        DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
         FalseAlarms(),
@@ -74,6 +79,7 @@ class LinkBudgetRadar(Radar):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.budget = parameters.link_budget()
+        self.wavelength_m = self.budget.wavelength
         # Until the scene's effects are known, all that the parameters and targets call for.
         self._echo_budget = self.budget
         #: Each cell's mean RCS, m².
@@ -130,9 +136,20 @@ class LinkBudgetRadar(Radar):
             return None
         return self.echo_snr(cells, self._clutter_rcs_m2(cells))
 
+    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the variances that follow from the ratio of signal to noise and clutter."""
+        return signal_variances(self.p, signal["snr"])
+
     def received(self, cells: Cells) -> tuple[FloatArray, FloatArray | None]:
-        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground."""
-        return self.resolved(cells, self.snr(cells)), self.clutter_cnr(cells)
+        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground.
+
+        Both as the detector has them: behind a moving-target filter, where there is one.
+        """
+        snr, cnr = self.snr(cells), self.clutter_cnr(cells)
+        if self.doppler is not None:
+            passed, residue = self.doppler(cells)
+            snr, cnr = snr * passed, None if cnr is None else cnr * residue
+        return self.resolved(cells, snr), cnr
 
     def false_alarm_zero_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
@@ -223,4 +240,4 @@ class ThresholdRadar(LinkBudgetRadar):
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
-        return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db})
+        return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db}, heard(snr, cnr))

@@ -1,6 +1,7 @@
 """The grid on which a sensor reports lines of sight, and the variance of rounding to it."""
 
 import math
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -10,10 +11,14 @@ from components.geometry.wrapping import TWO_PI, past, wrap_pi
 from components.sensor.resolution import Grid
 from dsa_des.arrays.types import FloatArray
 
-#: Columns of `Detections` that hold variances.
-AZIMUTH = "azimuth_variance_rad2"
-ELEVATION = "elevation_variance_rad2"
-RANGE = "range_variance_m2"
+#: Columns of `Detections` that hold variances, by measured quantity.
+VARIANCE_OF = {
+    "azimuth": "azimuth_variance_rad2",
+    "elevation": "elevation_variance_rad2",
+    "range": "range_variance_m2",
+    "range_rate": "range_rate_variance_m2_s2",
+}
+AZIMUTH, ELEVATION = VARIANCE_OF["azimuth"], VARIANCE_OF["elevation"]
 
 # Grids are the same in every run of a scene: they are made once.
 _grid = lru_cache(maxsize=256)(Grid)
@@ -25,36 +30,30 @@ def variance_of_step(step: float) -> float:
 
 
 class SensorGrid:
-    """The grid of a sensor's azimuth, elevation and range, within its field of view.
+    """The grid of what a sensor measures, within its field of view.
 
     Parameters
     ----------
     azimuth_field_rad, elevation_field_rad : (first, last)
         Field of view in the sensor's axes, azimuth clockwise from the first.
-    azimuth_step_rad, elevation_step_rad : float
-    range_step_m : float or None
-        None where no range is measured.
+    steps : mapping
+        Of ``azimuth`` and ``elevation`` (rad), and of ``range`` (m) and ``range_rate`` (m/s) where
+        they are measured.
     """
 
     def __init__(
         self,
         azimuth_field_rad: tuple[float, float],
         elevation_field_rad: tuple[float, float],
-        azimuth_step_rad: float,
-        elevation_step_rad: float,
-        range_step_m: float | None,
+        steps: Mapping[str, float],
     ) -> None:
         self._field = azimuth_field_rad
         self._heights = elevation_field_rad
-        self._azimuth_step, self._elevation_step = azimuth_step_rad, elevation_step_rad
-        self._range_step = range_step_m
+        self._azimuth_step, self._elevation_step = steps["azimuth"], steps["elevation"]
+        self._range_step = steps.get("range")
+        self._rate_grid = _grid(steps.get("range_rate", 0.0))
         #: Of rounding, by the column that it fills.
-        self.variances = {
-            AZIMUTH: variance_of_step(azimuth_step_rad),
-            ELEVATION: variance_of_step(elevation_step_rad),
-        }
-        if range_step_m is not None:
-            self.variances[RANGE] = variance_of_step(range_step_m)
+        self.variances = {VARIANCE_OF[name]: variance_of_step(step) for name, step in steps.items()}
 
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
@@ -71,6 +70,10 @@ class SensorGrid:
         if self._range_step is None:
             return azimuth, elevation, np.full(len(range_m), np.nan)
         return azimuth, elevation, self._range_grid.round(range_m)
+
+    def round_rate(self, range_rate_m_s: FloatArray) -> FloatArray:
+        """Round range rates."""
+        return self._rate_grid.round(range_rate_m_s)
 
     @cached_property
     def _elevation_grid(self) -> Grid:

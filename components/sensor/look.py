@@ -1,12 +1,16 @@
 """A look: the cells that need a sensor's physics, and what the physics says of each."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.time.clock import NANOSECONDS, nanosecond_of
+from dsa_des.time.timeline import split_scans
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +23,17 @@ class Look:
     confidence : (cells,)
     extras : dict of (cells,)
         Recorded beside the detection: ``snr_db``, ``detection_probability``, ``pixels``.
+    signal : dict of (cells,)
+        What errors of measurement follow from, where it is not among the extras.
+    noise : (cells,) of bool, optional
+        Which detections noise made, where the sensor tells them from those that the target made.
     """
 
     detected: BoolArray
     confidence: FloatArray
     extras: dict[str, AnyArray] = field(default_factory=dict)
+    signal: dict[str, AnyArray] = field(default_factory=dict)
+    noise: BoolArray | None = None
 
 
 class Cells:
@@ -41,6 +51,8 @@ class Cells:
         Scan numbers.
     scan_ticks : (scans,), optional
         When each scan is; needed by what compares one scan with the next.
+    ticks_per_s, span_ticks : int
+        As `dsa_des.block.wake.Wake` has them.
     """
 
     def __init__(
@@ -50,8 +62,11 @@ class Cells:
         wanted: BoolArray,
         scans: IntArray,
         scan_ticks: IntArray | None = None,
+        ticks_per_s: int = NANOSECONDS,
+        span_ticks: int = 0,
     ) -> None:
         self._targets = targets
+        self._ticks_per_s, self._span_ticks = ticks_per_s, span_ticks
         self.message_rows = rows
         self.roster = targets.roster
         place = wanted.ravel().nonzero()[0]
@@ -83,6 +98,60 @@ class Cells:
         gathered = flat if self._everything else flat.take(self._flat)
         self.__dict__[name] = gathered  # the next time it is a plain attribute
         return gathered
+
+    @cached_property
+    def replica(self) -> IntArray:
+        """Replica of each cell, where many run in lock step; else 0."""
+        return split_scans(self.scan)[0]
+
+    @cached_property
+    def instant_ns(self) -> IntArray:
+        """When each cell is looked at, in whole nanoseconds since the start of its run.
+
+        A cell that a sweeping beam lights is looked at when it is lit.
+        """
+        instant = nanosecond_of(self._own(self.scan_ticks[self.row]), self._ticks_per_s)
+        if hasattr(self._targets, "offset_s"):
+            instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
+        return instant
+
+    def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
+        """Return what is seen of some cells a little before or after they are looked at.
+
+        Parameters
+        ----------
+        cells : (n,) of int
+        ahead_s : (n,)
+            How much later, s; each cell by itself.
+
+        Returns
+        -------
+        dict of (n,) arrays
+            Fields of `RelativeTargets` by name, and the ownship's pose as ``own_lat_deg`` and so
+            on. ``present`` says whether both aircraft are there then.
+
+        Raises
+        ------
+        ValueError
+            If the targets can be known only at the instants of the rows.
+        """
+        targets = self._targets
+        if targets.revisit is None:
+            raise ValueError(
+                "the range rate needs to know the targets at instants of its own; the traffic, or "
+                "a block on the way, passes no flights on: set measures_range_rate to false, "
+                "and moving_target_filter to 'none'"
+            )
+        row, column = np.divmod(self._flat[cells], self._width)
+        state = targets.tick if targets.state_tick is None else targets.state_tick
+        time_s = self._own(state[row]) / self._ticks_per_s
+        if hasattr(targets, "offset_s"):
+            time_s = time_s + self.offset_s[cells]
+        return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
+
+    def _own(self, ticks: IntArray) -> IntArray:
+        """Return ticks within their replicas."""
+        return ticks % self._span_ticks if self._span_ticks else ticks
 
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""

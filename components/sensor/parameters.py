@@ -8,8 +8,8 @@ from pydantic import AfterValidator, Field, model_validator
 from components.geometry.field_of_view import rising_sector
 from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
+from components.sensor.error_parameters import ErrorParameters
 from components.sensor.resolution import Grid
-from dsa_des.block.component import ClockedParameters
 
 
 def _azimuths(value: tuple[float, float]) -> tuple[float, float]:
@@ -29,7 +29,7 @@ def _elevations(value: tuple[float, float]) -> tuple[float, float]:
 MisalignmentAngle = Annotated[float, Field(ge=-45, le=45)]
 
 
-class SensorParameters(ClockedParameters):
+class SensorParameters(ErrorParameters):
     """Parameters of every sensor; angles in degrees in the sensor's axes.
 
     Those are the ownship's body axes unless the sensor is mounted otherwise.
@@ -92,7 +92,7 @@ class SensorParameters(ClockedParameters):
             ("elevation", reach.elevation_rad),
         ):
             step_deg = getattr(self, f"{angle}_resolution_deg")
-            if high - low >= TWO_PI:
+            if not step_deg or high - low >= TWO_PI:
                 continue
             try:
                 Grid(math.radians(step_deg), limit_low=low, limit_high=high)

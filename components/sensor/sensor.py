@@ -22,6 +22,7 @@ from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
 from components.sensor.look import Cells, Look
+from components.sensor.measurement_errors import MeasurementErrors, constant_variances
 from components.sensor.mounting import BodyAxes, Mounting
 from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -36,9 +37,17 @@ _FEW_COLUMNS = 8
 
 
 #: Effects that every sensor has, after its own.
-SENSOR_EFFECTS: tuple[Effect, ...] = (Mounting(), DeclarationRule(), NavigationReport())
+SENSOR_EFFECTS: tuple[Effect, ...] = (
+    Mounting(),
+    MeasurementErrors(),
+    DeclarationRule(),
+    NavigationReport(),
+)
 
 _BODY_AXES = BodyAxes()
+
+#: Values by quantity, and variances by column, in the sensor's axes.
+Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
 
 
 class Sensor(Component):
@@ -60,6 +69,7 @@ class Sensor(Component):
     measures_range = False
     hooks: ClassVar[Mapping[str, str]] = {
         "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
         "declaration": "(cells, look) -> look: which detections declare their target",
         "report": "(detections, targets, rows) -> detections: what is sent",
     }
@@ -100,10 +110,14 @@ class Sensor(Component):
     def offer(self, port: str) -> Any:
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
-        constant: dict[str, Any] = dict(self.grid.variances)
+        constant: dict[str, Any] = constant_variances(self.p, self.steps)
+        reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
-            del constant[AZIMUTH], constant[ELEVATION]
-        return SensorOffer(self.measures_range, resolution_rad, **constant)
+            constant = {**constant, AZIMUTH: None, ELEVATION: None}
+            reach = Mounting().build(self).reach(reach)
+        return SensorOffer(
+            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach, **constant
+        )
 
     @cached_property
     def axes(self) -> BodyAxes:
@@ -124,6 +138,10 @@ class Sensor(Component):
     @cached_property
     def _judgements(self) -> list[Any]:
         return self.built("declaration")
+
+    @cached_property
+    def _erring(self) -> list[Any]:
+        return self.built("measurement")
 
     @cached_property
     def _reporting(self) -> list[Any]:
@@ -164,12 +182,9 @@ class Sensor(Component):
         measured: dict[str, Any] = {}
         p, q, r = (cells.body_azimuth_rad[found], cells.body_elevation_rad[found],
                    cells.range_m[found])  # fmt: skip
+        azimuth, elevation, range_m = p, q, r
         if len(found):
-            azimuth, elevation, range_m = self.measure(*self.axes(p, q), r)
-            measured = self.grid_variances(azimuth, elevation)
-            azimuth, elevation = self.axes.to_body(azimuth, elevation)
-        else:
-            azimuth, elevation, range_m = p, q, r
+            azimuth, elevation, range_m, measured = self._measured(cells, found, look, p, q, r)
         detections = self._message(
             tick=wake.ticks,
             scan=wake.scans,
@@ -206,7 +221,9 @@ class Sensor(Component):
         wake : Wake
         """
         rows, reason = self._decide(targets, rows)
-        return Cells(targets, rows, reason == EVALUATE, wake.scans, wake.ticks), reason
+        wanted = reason == EVALUATE
+        clock = wake.ticks_per_s, wake.span_ticks
+        return Cells(targets, rows, wanted, wake.scans, wake.ticks, *clock), reason
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""
@@ -249,40 +266,94 @@ class Sensor(Component):
         """
         return self.grid.round(azimuth_rad, elevation_rad, range_m)
 
-    @cached_property
-    def grid(self) -> SensorGrid:
-        """The grid of reports in the sensor's axes."""
-        return SensorGrid(
-            self.reach.azimuth_rad,
-            self.reach.elevation_rad,
-            self.azimuth_step_rad,
-            self.elevation_step_rad,
-            self.range_step_m if self.measures_range else None,
-        )
+    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
+        """Return the true range rates of some cells, m/s; None where they are not measured."""
+        return None
 
-    def grid_variances(
-        self, azimuth_rad: FloatArray, elevation_rad: FloatArray
-    ) -> dict[str, FloatArray]:
-        """Return the variances of what `measure` gives, by the column that they fill.
+    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return what signals add to the variances, by quantity, in the sensor's axes.
 
         Parameters
         ----------
-        azimuth_rad, elevation_rad : (n,) arrays
-            As measured, in the sensor's axes.
+        signal : mapping of (n,)
+            As in `Look.signal`.
+        """
+        raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """Grid step of each quantity that is measured: rad, m and m/s."""
+        steps = {"azimuth": self.azimuth_step_rad, "elevation": self.elevation_step_rad}
+        return {**steps, "range": self.range_step_m} if self.measures_range else steps
+
+    @cached_property
+    def grid(self) -> SensorGrid:
+        """The grid of reports in the sensor's axes."""
+        return SensorGrid(self.reach.azimuth_rad, self.reach.elevation_rad, self.steps)
+
+    def _measured(
+        self,
+        cells: Cells,
+        found: IntArray,
+        look: Look,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        range_m: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return what is measured of lines of sight in body axes, and columns beside."""
+        azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
+        true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
+        if (rate := self.range_rate(cells, found)) is not None:
+            true["range_rate"] = rate
+        if self._erring:
+            return self._in_body(*self._erring[0](cells, found, look, true))
+        return self._in_body(*self._on_grid(true))
+
+    def report_noise(
+        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return how something that is not there is reported, as if it were.
+
+        Parameters
+        ----------
+        where : mapping of (n,)
+            By quantity, in the sensor's axes.
+        signal : mapping of (n,)
+            As in `Look.signal`.
 
         Returns
         -------
-        dict of (n,) arrays
-            Of angles in body axes, and of range where it is measured: step²/12.
+        azimuth_rad, elevation_rad, range_m : (n,) arrays
+            In body axes.
+        measured : dict of (n,) arrays
+            The other measured columns of `Detections`.
         """
-        variances = {
-            name: constant_column(value, len(azimuth_rad))
-            for name, value in self.grid.variances.items()
-        }
-        azimuth, elevation = self.axes.variances_in_body(
-            azimuth_rad, elevation_rad, variances[AZIMUTH], variances[ELEVATION]
+        if self._erring:
+            return self._in_body(*self._erring[0].of_noise(where, signal))
+        return self._in_body(*self._on_grid(where))
+
+    def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:
+        """Return values on the grid, and their variances: step²/12."""
+        azimuth, elevation, range_m = self.measure(
+            true["azimuth"], true["elevation"], true["range"]
         )
-        return {**variances, AZIMUTH: azimuth, ELEVATION: elevation}
+        values = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
+        if "range_rate" in true:
+            values["range_rate"] = self.grid.round_rate(true["range_rate"])
+        count = len(azimuth)
+        of_grid = self.grid.variances.items()
+        return values, {name: constant_column(value, count) for name, value in of_grid}
+
+    def _in_body(
+        self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return angles in body axes, ranges, and columns beside, of values in the sensor's."""
+        angles = values["azimuth"], values["elevation"]
+        of_angles = self.axes.variances_in_body(*angles, variances[AZIMUTH], variances[ELEVATION])
+        beside = {**variances, AZIMUTH: of_angles[0], ELEVATION: of_angles[1]}
+        if "range_rate" in values:
+            beside["range_rate_m_s"] = values["range_rate"]
+        return *self.axes.to_body(*angles), values["range"], beside
 
 
 def _per_row(mask: BoolArray) -> IntArray:

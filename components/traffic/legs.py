@@ -244,7 +244,8 @@ class ScriptedTrajectory:
         else:
             index = np.searchsorted(self._segment_starts_s, elapsed, side="right") - 1
             columns = tuple(np.empty_like(flat) for _ in range(6))
-            for k in np.unique(index):
+            # Counting is many times faster than np.unique, which hashes.
+            for k in np.flatnonzero(np.bincount(index)):
                 chosen = index == k
                 segment = self.segments[k]
                 state = segment_state(segment, elapsed[chosen] - segment.start_s)

@@ -30,6 +30,7 @@ from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain, check_on_raster
+from components.traffic.wind import Wind, scene_wind
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -99,12 +100,18 @@ class TrafficSource(Component):
     windowed = True
     rewindable = True
     clocked = "demand"
+    hooks = {"attitude": "turns the attitudes that follow from paths, of_own and of_targets"}
 
     own: Trajectory
     fleet: Fleet
     targets: Sequence[Trajectory]
     roster: Roster
     _offered: KnownTraffic | None = None
+
+    @property
+    def wind(self) -> Wind | None:
+        """The scene's wind, or None."""
+        return scene_wind(self.context.sections.get("weather"))
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -125,7 +132,12 @@ class TrafficSource(Component):
 
     def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
+        envelope = traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
+        weather = self.context.sections.get("weather")
+        if weather is not None and weather.wind_mps > 0.0:
+            # In wind a nose may point anywhere.
+            return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
+        return envelope
 
     def serves_replicas(self) -> bool:
         """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
@@ -144,6 +156,7 @@ class TrafficSource(Component):
                 float(self.context.duration_s),
             )
         self._all_columns = np.arange(len(self.roster))
+        self._crabbing: list[Any] = self.built("attitude")
         self._culling: Culling | None = None
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
@@ -198,6 +211,10 @@ class TrafficSource(Component):
             if self._culling is not None:
                 columns, fleet, near = self._culling.cut(time_s)
         states = fleet.at(time_s)
+        for crabbing in self._crabbing:
+            own = crabbing.of_own(self.own, own, time_s)
+            times = np.broadcast_to(time_s[:, np.newaxis], states.lat_deg.shape)
+            states = crabbing.of_targets(columns, states, times)
         present = states.present & own.present[:, np.newaxis]
         culled = None
         if near is not None:
@@ -225,7 +242,11 @@ class TrafficSource(Component):
         )
 
     def flights(
-        self, own: Trajectory, columns: IntArray, time_s: FloatArray
+        self,
+        own: Trajectory,
+        columns: IntArray,
+        time_s: FloatArray,
+        ahead_s: FloatArray | float = 0.0,
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
@@ -236,6 +257,8 @@ class TrafficSource(Component):
         columns : (targets,) of int
         time_s : (rows, targets)
             With an ``update_rate_hz``, the last publication up to then counts.
+        ahead_s : (rows, targets)
+            They are wanted so much later than that.
 
         Returns
         -------
@@ -245,12 +268,17 @@ class TrafficSource(Component):
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
             time_s = np.floor(time_s * rate) / rate
+        time_s = time_s + ahead_s
         columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
         others = self.fleet.each(columns_each, times)
         if self._culling is not None:
             near = self._culling.intervals.holds(columns_each, times)
             others = replace(others, present=others.present & near)
-        return own.at(time_s), others.reshaped(time_s.shape)
+        seen, others = own.at(time_s), others.reshaped(time_s.shape)
+        for crabbing in self._crabbing:
+            seen = crabbing.of_own(own, seen, time_s)
+            others = crabbing.of_targets(columns, others, time_s)
+        return seen, others
 
     def _steer(self, wake: Wake) -> KnownFlights | None:
         """Steer the ownship at the times at which manoeuvres have come.

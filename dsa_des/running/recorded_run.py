@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -167,13 +168,19 @@ def info_of(
         "versions": {
             "dsa_des": __version__,
             "python": sys.version.split()[0],
-            **{name: version(name) for name in _VERSIONS_OF},
+            **_versions(),
         },
         "look_ahead": outcome.windowed,
         "rows": recorder.rows,
         "summary": sections,
         "timings": timings,
     }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Return the versions of the libraries; reading them takes longer than a small run."""
+    return {name: version(name) for name in _VERSIONS_OF}
 
 
 @contextmanager

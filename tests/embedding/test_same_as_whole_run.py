@@ -67,8 +67,8 @@ def test_detections_are_the_same_to_the_bit(configs, flying, sets):
     host = flying.Host(scene, sets=sets)
     simulator = flying.Simulator(scene, sets=sets, beyond_fusion=True)
     host.add_planes(simulator)
-    results = flying.fly(simulator, host, 40.0)
-    tables = flying.run_whole(scene, sets=(*sets, "duration_s=40"))
+    results = flying.fly(simulator, host, 26.0)
+    tables = flying.run_whole(scene, sets=(*sets, "duration_s=26"))
     for table in ("detections", "fused", "tracks", "scans"):
         _assert_same(results, tables, table)
 
@@ -134,8 +134,8 @@ def test_a_call_for_each_plane_gives_what_one_call_for_all_gives(configs, flying
         name = simulator.planes[i]
         return simulator.simulate(own_lla, own_att, lla[i], att[i], time_s, plane=name)
 
-    whole = flying.fly(together, host, 40.0)
-    parts = flying.fly(apart, host, 40.0, plane=one)
+    whole = flying.fly(together, host, 26.0)
+    parts = flying.fly(apart, host, 26.0, plane=one)
     assert len(whole) == len(parts)
     for result, results in zip(whole, parts, strict=True):
         for i, single in enumerate(results):

@@ -16,6 +16,17 @@ _EARTH = "wiring/test_what_the_earth_hides.py"
 
 FAULTS = [
     *in_file(
+        _GROUP, "components/traffic/wind.py", "wiring/test_wind.py",
+        ("wind-blows-to-where-it-comes-from", "cls(-speed_mps * math.sin(turn), -speed_mps",
+         "cls(speed_mps * math.sin(turn), speed_mps"),
+        ("bank-of-a-turn-in-still-air", "np.tan(roll_rad) * across", "np.tan(roll_rad)"),
+        ("climb-over-the-ground", "np.arctan2(climb, airspeed)", "np.arctan2(climb, speed)"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/wind_effect.py", "wiring/test_wind.py",
+        ("fixed-yaw-turns-into-the-wind", "np.where(keep[0], np.nan, speed)", "speed"),
+    ),
+    *in_file(
         _GROUP, "components/optical/weather_effects.py", _BANDS,
         ("humidity-of-the-band-forgotten", "clear = long_wave_transmission(*path, density)",
          "clear = long_wave_transmission(*path)"),
@@ -179,8 +190,8 @@ FAULTS = [
          "radar/test_ground_clutter_effect.py"),
         ("threshold-of-pd-0.9-always", "pd = 0.9 if known is None else known.pd", "pd = 0.9"),
         ("threshold-as-swerling-1",
-         'model = "swerling1" if known is None else f"swerling{known.swerling}"',
-         'model = "swerling1"'),
+         'pd, "swerling1" if known is None else f"swerling{known.swerling}"',
+         'pd, "swerling1"'),
         ("stated-threshold-forgotten", "if parameters.threshold_db is not None:", "if False:"),
         ("threshold-for-one-pulse",
          "pulses=self.p.pulses_summed,\n            false_alarm_probability=self.p.false",
@@ -220,14 +231,14 @@ FAULTS = [
         ("alarms-measured-from-another-model",
          "return self._reference((self.p.swerling or 0) % 5)", "return self._reference(0)"),
         ("detected-above-pd", "cells.draws(self._draws) < pd", "cells.draws(self._draws) > pd"),
-        ("pulses-ignored", "snr, p.pulses_summed, p.false_alarm_probability, f\"swerling{model}\"",
-         "snr, 1, p.false_alarm_probability, f\"swerling{model}\""),
-        ("model-ignored", "p.false_alarm_probability, f\"swerling{model}\", self._method",
-         'p.false_alarm_probability, "swerling1", self._method'),
+        ("pulses-ignored", "snr, p.pulses_summed, p.false_alarm_probability, name, self._method",
+         "snr, 1, p.false_alarm_probability, name, self._method"),
+        ("model-ignored", "snr, p.pulses_summed, p.false_alarm_probability, name, self._method",
+         'snr, p.pulses_summed, p.false_alarm_probability, "swerling1", self._method'),
         ("sampled-for-one-pulse", 'pulses=self.p.pulses_summed, model=f"swerling{model}"',
          'pulses=1, model=f"swerling{model}"'),
-        ("clutter-mean-ignored", 'clutter=self.context.sections["terrain"].clutter_mean',
-         'clutter="fluctuating"'),
+        ("clutter-mean-ignored", 'else self.context.sections["terrain"].clutter_mean',
+         'else "fluctuating"'),
         ("detection-method-ignored", "self._method: str = parameters.detection",
          'self._method: str = "exact"'),
         ("fluctuation-ignored", "if self.p.samples_rcs:\n            return [(0",
@@ -235,9 +246,12 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/fading.py", "wiring/test_fluctuation_that_lasts.py",
-        ("chi-square-of-two-for-all", "parts = 4 if model in (3, 4) else 2", "parts = 2"),
-        ("one-amplitude-s-parts-alike", "process(keys, instant_ns, part)",
-         "process(keys, instant_ns, 0)"),
+        ("chi-square-of-two-for-all", "range(2 if model in (3, 4) else 1)", "range(1)"),
+        ("one-amplitude-s-parts-alike", "process(keys, instant_ns, 2 * number + part)",
+         "process(keys, instant_ns, 2 * number)"),
+        ("scatterers-without-roll", "        cells.target_roll_rad,\n",
+         "        np.zeros(len(cells)),\n"),
+        ("scatterers-that-never-change", "None if process is None else pair", "None"),
         ("fades-by-scan-number", "nanosecond_of(cells.scan_ticks, ticks_per_s)[cells.row]",
          "(cells.scan * 10**9)"),
         ("sweep-fades-at-its-start", "    if offset_s is None:\n", "    if True:\n"),
@@ -248,8 +262,14 @@ FAULTS = [
         _GROUP, "components/radar/swerling.py", "wiring/test_fluctuation_that_lasts.py",
         ("pulses-of-a-look-fade-alike", "(model in (2, 4) and self.p.pulses_summed == 1)",
          "model in (2, 4)"),
-        ("lasting-pd-of-the-model", "return self.fluctuation == \"sampled\" or ",
-         "return self.fluctuation == \"sampled\" and "),
+        ("lasting-pd-of-the-model", "self.fluctuation == \"sampled\" or any(",
+         "self.fluctuation == \"sampled\" and any("),
+    ),
+    *in_file(
+        _GROUP, "components/radar/scatterers.py", "wiring/test_fluctuation_that_lasts.py",
+        ("one-way-phase", "2.0 * math.pi * extent_m / wavelength_m",
+         "math.pi * extent_m / wavelength_m"),
+        ("scatterers-crowd-in-the-middle", "np.cbrt(out)", "out"),
     ),
     *in_file(
         _GROUP, "components/radar/rcs_effects.py",
@@ -267,16 +287,36 @@ FAULTS = [
         ("alarms-of-one-pulse", "pulses=summed)", "pulses=1)"),
         ("alarm-azimuth-as-elevation", "_between(upwards, self._cells.elevation_rad)",
          "_between(across, self._cells.elevation_rad)"),
-        ("alarms-off-the-grid", "azimuth, elevation, range_m = self._block.measure(\n"
-         "            _between(across, self._cells.azimuth_rad),\n"
-         "            _between(upwards, self._cells.elevation_rad),\n"
-         "            _between(outwards, self._cells.range_m),\n        )",
-         "azimuth, elevation, range_m = (\n"
-         "            _between(across, self._cells.azimuth_rad),\n"
-         "            _between(upwards, self._cells.elevation_rad),\n"
-         "            _between(outwards, self._cells.range_m),\n        )"),
         ("alarms-from-zero-snr", "confidence=snr_db - self._block.false_alarm_zero_db()",
          "confidence=snr_db"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/sensor.py", "wiring/test_false_alarms_of_radars.py",
+        ("alarms-off-the-grid", "return self._in_body(*self._on_grid(where))",
+         "return self._in_body(where, self._on_grid(where)[1])"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/quantity_error.py",
+        ("wiring/test_measured_values.py", "lockstep/test_errors_in_lock_step.py"),
+        ("bias-by-its-largest", "stated.bias**2 / (3.0 if drawn_bias else 1.0)", "stated.bias**2"),
+        ("bias-to-one-side", "self._bias * (2.0 * drawn - 1.0)", "self._bias * drawn"),
+        ("bias-of-the-first-replica", "begin = runs * first_scan(1)", "begin = 0 * runs"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/measurement_errors.py", "wiring/test_measured_values.py",
+        ("over-the-top-without-turning", "np.where(over, azimuth + math.pi, azimuth)", "azimuth"),
+        ("negative-ranges", 'np.abs(found["range"])', 'found["range"]'),
+        ("azimuth-left-unwrapped", 'wrap_pi_unchecked(found["azimuth"])', 'found["azimuth"]'),
+    ),
+    *in_file(
+        _GROUP, "components/radar/range_rate.py", "wiring/test_measured_values.py",
+        ("closing-is-positive", "rate[missing] = total / STEP_S",
+         "rate[missing] = -total / STEP_S"),
+        ("flights-that-begin", "(_CENTRAL, _AHEAD, _BEHIND)", "(_CENTRAL,)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/signal_errors.py", "wiring/test_measured_values.py",
+        ("errors-know-no-clutter", "snr if cnr is None else snr / (1.0 + cnr)", "snr"),
     ),
     *in_file(
         _GROUP, "components/radar/clutter_effects.py", "wiring/test_ground_clutter_in_ned.py",
@@ -294,11 +334,11 @@ FAULTS = [
          "self.by_angles = [self.sensors.index(name) for name in reversed(best_angles)]",
          "self.by_angles = [self.sensors.index(name) for name in best_angles]"),
         ("range-of-the-coarsest",
-         "for name in reversed(best_angles)\n            if offers[name].measures_range",
-         "for name in best_angles\n            if offers[name].measures_range"),
+         "for name in reversed(best_angles)\n            if offers[name].measures_range\n",
+         "for name in best_angles\n            if offers[name].measures_range\n"),
         ("true-range-of-the-ranging-sensor",
-         'getattr(new.message, column)[chosen]',
-         'getattr(new.message, column.removeprefix("true_"))[chosen]'),
+         "values[column] = getattr(message, column)[chosen]",
+         'values[column] = getattr(message, column.removeprefix("true_"))[chosen]'),
     ),
     *in_file(
         _GROUP, "components/tracking/stub.py",

@@ -121,3 +121,26 @@ def test_random_phases_average_to_twice_the_gate() -> None:
         for k in range(1000)
     ]
     assert float(np.mean([float(s) for s in shares])) == pytest.approx(float(2 * gate * f1), 0.01)
+
+
+def with_late_radar(scene_file: str, delay_s: str) -> Scene:
+    text = Path(scene_file).read_text()
+    late = f'{{ from = "radar", to = "fusion", delay_s = {delay_s} }}'
+    assert '"radar -> fusion"' in text
+    Path("late.toml").write_text(text.replace('"radar -> fusion"', late))
+    return load_scene("late.toml")
+
+
+def shares_of(scene: Scene) -> dict[str, float]:
+    metric = MetricSpec("fused_share").build(scene)
+    recorded = run_replicas(scene, [Replica(1)], wanted=wanted_by([metric]))
+    group = Group(scene, [Replica(1)], recorded, wanted_by([metric]))  # type: ignore[arg-type]
+    return {name: float(values[0]) for name, values in metric.measure(group).items()}
+
+
+def test_a_fused_row_rests_on_what_had_arrived_by_then(small: Path) -> None:
+    """The radar sees at 0, 1 and 2 s and is heard 0.6 s later, each time just as the IR sees."""
+    scene_of_pair(("1", "1", "0", "3/5", "0"), Fraction(3))
+    found = shares_of(with_late_radar("pair.toml", "0.6"))
+    for name in ("fused_share.radar_with_ir", "fused_share.ir_with_radar"):
+        assert (found[name], found[f"{name}.trials"]) == (1.0, 3.0)

@@ -222,3 +222,26 @@ def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) ->
                 assert values[k : k + 1].tobytes() == alone[key].astype(values.dtype).tobytes(), key
     numbers = [values for values in together.values() if values.dtype != object]
     assert any(np.isfinite(values).any() for values in numbers)
+
+
+def test_an_old_detection_that_comes_late_makes_nothing_older(small: Path) -> None:
+    """The radar is heard 0.9 s late, between two looks of the IR that has none: its age counts.
+
+    So the age goes from 0 to 0.5 s between the IR's looks at 0, 0.5, ... 5.5 s.
+    """
+    text = Path("small.toml").read_text()
+    late = '{ from = "radar", to = "fusion", delay_s = 0.9 }'
+    for old, new in (
+        ('"radar -> fusion"', late), ("fragile:Fragile", "radar.range_boundary"),
+        ("reach_km = 4.8", "reach_km = 9"), ("reach_km", "range_km"),
+        ("scan_rate_hz = 5\n", "scan_rate_hz = 1\noffset_s = 0.2\n"),
+    ):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    Path("late.toml").write_text(text)
+    scene = load_scene("late.toml")
+    metric = MetricSpec("age_of_information").build(scene)
+    recorded = run_replicas(scene, [Replica(1)], wanted=wanted_by([metric]))
+    found = metric.measure(Group(scene, [Replica(1)], recorded, wanted_by([metric])))
+    assert found["age_of_information_mean_s"] == pytest.approx([0.25])
+    assert found["age_of_information_p95_s"] == pytest.approx([0.475])

@@ -1,0 +1,207 @@
+"""Errors of measured values as an effect: stated ones, and those that follow from the signal."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.geometry.wrapping import wrap_pi_unchecked
+from components.messages.constant_columns import constant_column, not_measured
+from components.sensor.error_parameters import StatedError
+from components.sensor.grid import VARIANCE_OF, variance_of_step
+from components.sensor.look import Cells, Look
+from components.sensor.quantity_error import QuantityError, mean_square
+from components.sensor.resolution import Grid
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+
+# A range that comes out below this, a millimetre, is no range.
+_NEAREST_M = 1e-3
+_QUARTER = 0.5 * math.pi
+
+
+class MeasurementErrors(Effect):
+    """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
+
+    lockstep = True
+    name = "measurement errors"
+    acts_on = "measurement"
+    neutral = False
+    outside_the_proof = "without it reports are the truth on a grid"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``errors``."""
+        if block.p.errors == "grid":
+            return Verdict(False, "errors is 'grid': values are rounded to the grid")
+        return Verdict(True, f"errors is '{block.p.errors}'")
+
+    def build(self, block: Any) -> "Erring":
+        """Return what measures with errors."""
+        return Erring(block)
+
+
+class Erring:
+    """Measures with errors; called in place of the sensor's grid.
+
+    Parameters
+    ----------
+    block : Sensor
+    """
+
+    def __init__(self, block: Any) -> None:
+        p = block.p
+        self._block, self._signal = block, p.errors == "signal"
+        self._steps = _steps(p, block.steps)
+        self._places = block.stream("noise places")
+        self._errors = {
+            name: QuantityError(
+                _stated(p, name), drawn_bias=p.biases == "drawn", stream=block.stream, name=name
+            )
+            for name in self._steps
+        }
+        self._variances = _mean_squares(p, self._steps)
+        self._grids = {
+            "azimuth": Grid(self._steps["azimuth"]),
+            "elevation": Grid(self._steps["elevation"], limit_low=-_QUARTER, limit_high=_QUARTER),
+            **{name: Grid(self._steps[name]) for name in self._steps if name.startswith("range")},
+        }
+
+    def __call__(
+        self, cells: Cells, found: IntArray, look: Look, true: Mapping[str, FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """Return what is measured of some cells, and its variances by column.
+
+        Parameters
+        ----------
+        cells : Cells
+        found : (n,) of int
+            Those that are detected.
+        look : Look
+        true : mapping of (n,)
+            The truth by quantity, in the sensor's axes.
+        """
+        of_signal = self._of_signal({name: all_[found] for name, all_ in look.signal.items()})
+        keys = cells.roster.keys_of(cells.target[found])
+        when = cells.scan[found], cells.instant_ns[found], cells.replica[found]
+        if look.noise is not None and self._signal:
+            true, drawn, of_signal = self._in_cells(
+                true, of_signal, look.noise[found], keys, when[0]
+            )
+        else:
+            drawn = of_signal
+        values = {
+            name: true[name] + error(keys, *when, drawn.get(name))
+            for name, error in self._errors.items()
+        }
+        return self._valid(values), self._columns(len(found), of_signal)
+
+    def _in_cells(
+        self,
+        true: Mapping[str, FloatArray],
+        of_signal: Mapping[str, FloatArray],
+        noise: BoolArray,
+        keys: AnyArray,
+        scan: IntArray,
+    ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        """Put what noise made anywhere in the target's cell, which says no more of the target.
+
+        Returns
+        -------
+        places, drawn, stated : mappings of (n,)
+            Values before errors, variances of the errors to be drawn, and variances of both: a
+            target anywhere in a cell and a report anywhere in it are width²/6 apart.
+        """
+        if not noise.any():
+            return true, of_signal, of_signal
+        silent = {"snr": np.zeros(1)}
+        places, drawn, stated = dict(true), dict(of_signal), dict(of_signal)
+        for number, (name, most) in enumerate(self._of_signal(silent).items()):
+            width = math.sqrt(12.0 * float(most[0]))
+            part = self._places.uniform(keys[noise], scan[noise], number)
+            cell = np.rint(true[name][noise] / width)
+            places[name], drawn[name], stated[name] = (
+                values.copy() for values in (true[name], of_signal[name], of_signal[name])
+            )
+            places[name][noise] = (cell + part - 0.5) * width
+            drawn[name][noise] = 0.0
+            stated[name][noise] = width**2 / 6.0
+        return places, drawn, stated
+
+    def of_noise(
+        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """Return how something that is not there is reported: as what is there would be."""
+        columns = self._columns(len(where["azimuth"]), self._of_signal(signal))
+        return self._valid(where), columns
+
+    def _of_signal(self, signal: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+        of_signal: Mapping[str, FloatArray] = {}
+        if self._signal:
+            of_signal = self._block.signal_variances(signal)
+        return of_signal
+
+    def _columns(self, count: int, of_signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return variances by column: what all detections share, and what their signals add."""
+        return {
+            VARIANCE_OF[name]: value + of_signal[name]
+            if name in of_signal
+            else constant_column(value, count)
+            for name, value in self._variances.items()
+        }
+
+    def _valid(self, values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return erring values as they are reported: on the grid, and what their kind can be.
+
+        An elevation beyond the vertical is one on its other side; a range is above 0.
+        """
+        azimuth, elevation = values["azimuth"], wrap_pi_unchecked(values["elevation"])
+        over = np.abs(elevation) > _QUARTER
+        elevation = np.where(over, np.copysign(math.pi, elevation) - elevation, elevation)
+        azimuth = np.where(over, azimuth + math.pi, azimuth)
+        values = {**values, "azimuth": azimuth, "elevation": elevation}
+        found = {name: grid.round(values[name]) for name, grid in self._grids.items()}
+        found["azimuth"] = wrap_pi_unchecked(found["azimuth"])
+        if "range" not in found:
+            found["range"] = not_measured(len(azimuth))
+        else:
+            nearest = self._steps["range"] or _NEAREST_M
+            found["range"] = np.maximum(np.abs(found["range"]), nearest)
+        return found
+
+
+def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
+    """Return the variances that all detections of a sensor share, by column; none by signal.
+
+    Parameters
+    ----------
+    p : ErrorParameters
+    steps : mapping
+        Grid step of each measured quantity.
+    """
+    if p.errors == "signal":
+        return {}
+    return {VARIANCE_OF[name]: v for name, v in _mean_squares(p, _steps(p, steps)).items()}
+
+
+def _steps(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
+    rounded = p.errors == "grid" or p.quantised
+    return {name: step if rounded else 0.0 for name, step in steps.items()}
+
+
+def _mean_squares(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
+    """Return the mean square of what is stated and of rounding, by quantity."""
+    drawn = p.biases == "drawn"
+    return {
+        name: mean_square(_stated(p, name), drawn) + variance_of_step(step)
+        for name, step in steps.items()
+    }
+
+
+def _stated(p: Any, name: str) -> StatedError:
+    """Return what the scene states of a quantity, in radians, metres and m/s."""
+    stated: StatedError = p.stated_error(name)
+    if p.quantities[name] != "deg":
+        return stated
+    deviation, bias = math.radians(stated.deviation), math.radians(stated.bias)
+    return StatedError(deviation, bias, stated.correlation_time_s)

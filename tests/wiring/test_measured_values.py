@@ -1,0 +1,245 @@
+"""What measured values can be, what their errors are keyed by, and true range rates."""
+
+import math
+
+import crooked
+import looks
+import numpy as np
+import pytest
+from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
+from wired import alone, chain, rows, run, sensor
+
+from dsa_des.errors import SceneError
+from dsa_des.library.scenes import load_scene
+
+LOUD = {"errors": "stated", "azimuth_error_deg": 60.0, "elevation_error_deg": 50.0}
+
+
+def columns(kind, *names, **keys):
+    """Return columns of a sensor's detections of the crooked flights."""
+    found = alone(kind, **keys)["detections"]
+    return [found[name].to_numpy(zero_copy_only=False) for name in names]
+
+
+@pytest.mark.parametrize("quantised", [True, False])
+@pytest.mark.parametrize("kind", SENSORS)
+def test_however_large_errors_are_values_stay_what_they_can_be(kind, quantised):
+    steps = {"azimuth_resolution_deg": 7.0, "elevation_resolution_deg": 8.0}
+    radar = kind in RADARS
+    if radar:
+        steps |= {"range_resolution_m": 90.0, "range_error_m": 3000.0}
+    keys = {**LOUD, **steps, "quantised": quantised, "scan_rate_hz": 200}
+    azimuth, elevation, range_m = columns(kind, "azimuth_rad", "elevation_rad", "range_m", **keys)
+    assert len(azimuth) == 400
+    assert (azimuth > -math.pi).all() and (azimuth <= math.pi).all() and azimuth.std() > 1.0
+    assert (np.abs(elevation) <= 0.5 * math.pi).all() and elevation.std() > 0.5
+    if radar:
+        assert (range_m >= (90.0 if quantised else 1e-3)).all() and range_m.std() > 500.0
+
+
+@pytest.mark.parametrize("kind", RADARS)
+def test_errors_near_astern_and_overhead_go_the_short_way(kind):
+    """A target behind us and one above: directions err by what is stated, whatever the angles."""
+    place = {"speed_mps": 70.0, "heading_deg": 217.0, "yaw_deg": 217.0, "climb_mps": 3.0}
+    targets = [
+        {"name": "astern", "east_m": 1805.4, "north_m": 2395.9, "up_m": 0.0, **place},
+        {"name": "above", "east_m": 3.0, "north_m": 2.0, "up_m": 3000.0, **place},
+    ]
+    ownship = {**crooked.OWNSHIP, "yaw_deg": 217.0, "pitch_deg": 0.0, "roll_deg": 0.0}
+    keys = {"errors": "stated", "azimuth_error_deg": 0.5, "elevation_error_deg": 0.5}
+    block = sensor(kind, **keys, scan_rate_hz=500)
+    found = run(chain({"sensor": block}, ownship=ownship, targets=targets))["detections"]
+    table = {name: found[name].to_numpy(zero_copy_only=False) for name in found.column_names}
+    for name in ("astern", "above"):
+        mine = {key: values[table["target"] == name] for key, values in table.items()}
+        angles = zip(mine["azimuth_rad"], mine["elevation_rad"], strict=True)
+        seen = np.array([crooked.direction(*pair) for pair in angles])
+        true = crooked.direction(mine["true_azimuth_rad"][0], mine["true_elevation_rad"][0])
+        off = np.arccos(np.minimum(1.0, seen @ true))
+        expected = math.radians(0.5) * math.sqrt(2.0 if name == "astern" else 1.0)
+        assert np.sqrt(np.mean(np.square(off))) == pytest.approx(expected, rel=0.12)
+    behind = table["azimuth_rad"][table["target"] == "astern"]
+    assert (behind > 3.0).any() and (behind < -3.0).any()
+
+
+@covers("measures_range_rate", of=RADARS)
+@pytest.mark.parametrize("sweep", [False, True])
+@pytest.mark.parametrize("kind", RADARS)
+def test_range_rate_is_that_of_the_two_flights(kind, sweep):
+    found = rows(alone(kind, measures_range_rate=True, scan_rate_hz=2, beam_sweep=sweep))
+    assert len(found) == 4
+    for row in found:
+        target = next(t for t in crooked.TARGETS if t["name"] == row["target"])
+        time_s = row["illuminated_s"] if sweep else row["time_s"]
+
+        def range_m(time_s, target=target):
+            return float(np.linalg.norm(crooked.ned(target, time_s)))
+
+        expected = (range_m(time_s + 0.01) - range_m(time_s - 0.01)) / 0.02
+        assert row["range_rate_m_s"] == pytest.approx(expected, abs=3e-4)
+        assert row["range_rate_variance_m2_s2"] == 0.0
+
+
+def test_range_rate_is_the_slope_of_the_range_to_the_last_scan():
+    scene = chain({"sensor": sensor("radar.threshold", scan_rate_hz=100, measures_range_rate=True)})
+    table = run(scene)["detections"]
+    assert table["target"].to_pylist()[:2] == ["rolling", "diving"]
+    range_m, rate = (table[n].to_numpy().reshape(-1, 2) for n in ("range_m", "range_rate_m_s"))
+    slope = (8.0 * (range_m[3:-1] - range_m[1:-3]) - (range_m[4:] - range_m[:-4])) / 0.12
+    np.testing.assert_allclose(rate[2:-2], slope, atol=1e-6)
+    bend = np.abs(np.diff(rate, axis=0)).max()
+    np.testing.assert_allclose(rate[0], 2.0 * rate[1] - rate[2], atol=bend / 20.0)
+    np.testing.assert_allclose(rate[-1], 2.0 * rate[-2] - rate[-3], atol=bend / 20.0)
+
+
+def test_range_rate_of_published_positions_is_that_of_the_flight():
+    """Between publications positions stand still; what flies does not."""
+    block = sensor("radar.threshold", scan_rate_hz=10, measures_range_rate=True)
+    scene = chain({"sensor": block})
+    exact = run(scene)["detections"]["range_rate_m_s"].to_numpy()
+    scene["blocks"]["traffic"]["update_rate_hz"] = 2
+    held = run(scene)["detections"]["range_rate_m_s"].to_numpy()
+    assert (held[:10] == held[0::2][:1].repeat(10)).sum() < 10
+    np.testing.assert_allclose(held[10::10], exact[10::10], rtol=1e-9)
+    np.testing.assert_allclose(held[:10:2], exact[0], rtol=1e-9)
+
+
+def test_range_rate_begins_and_ends_with_a_flight():
+    short = {**crooked.ROLLING, "start_time_s": 0.2, "end_time_s": 0.8}
+    keys = {"measures_range_rate": True, "scan_rate_hz": 10}
+    found = rows(alone("radar.threshold", targets=[short], **keys))
+    assert [row["scan"] for row in found] == [2, 3, 4, 5, 6, 7, 8]
+    rates = np.array([row["range_rate_m_s"] for row in found])
+    np.testing.assert_allclose(np.diff(rates), np.diff(rates).mean(), rtol=0.1)
+
+
+@covers("range_rate_resolution_m_s", of=RADARS)
+@pytest.mark.parametrize("kind", RADARS)
+def test_range_rates_are_on_their_grid(kind):
+    keys = {"measures_range_rate": True, "range_rate_resolution_m_s": 7.0}
+    for row, exact in zip(
+        rows(alone(kind, **keys)), rows(alone(kind, measures_range_rate=True)), strict=True
+    ):
+        assert row["range_rate_m_s"] == 7.0 * round(exact["range_rate_m_s"] / 7.0)
+        assert row["range_rate_variance_m2_s2"] == pytest.approx(49.0 / 12.0)
+
+
+@covers("biases", "azimuth_bias_deg", "elevation_bias_deg", of=SENSORS)
+@pytest.mark.parametrize("kind", SENSORS)
+def test_a_drawn_bias_is_one_for_a_run_and_uniform_over_runs(kind):
+    keys = {
+        "errors": "stated",
+        "quantised": False,
+        "azimuth_bias_deg": 4.0,
+        "elevation_bias_deg": 2.0,
+    }
+    if kind in RADARS:
+        keys |= {"range_bias_m": 15.0}
+    block = sensor(kind, **keys, scan_rate_hz=3)
+    biases = []
+    for seed in range(40 if kind == "radar.threshold" else 2):
+        table = run({**chain({"sensor": block}), "seed": seed})["detections"]
+        off = {
+            name: table[measured].to_numpy() - table[true].to_numpy()
+            for name, (measured, true, _) in looks.COLUMNS.items()
+            if name != "range_rate"
+        }
+        assert np.ptp(off["azimuth"]) < 1e-12 and np.ptp(off["elevation"]) < 1e-12
+        sizes = math.radians(4.0), math.radians(2.0), 15.0
+        biases.append([values[0] / size for values, size in zip(off.values(), sizes, strict=True)])
+        expected = math.radians(4.0) ** 2 / 3.0
+        np.testing.assert_allclose(table["azimuth_variance_rad2"].to_numpy(), expected)
+    drawn = np.array(biases)[:, : 3 if kind in RADARS else 2]
+    assert (np.abs(drawn) < 1.0).all() and len(np.unique(drawn)) == drawn.size
+    if len(drawn) > 2:
+        share = np.sort(drawn.ravel()) / 2.0 + 0.5
+        steps = np.arange(1, share.size + 1) / share.size
+        assert np.abs(share - steps).max() < 1.63 / math.sqrt(share.size)  # Kolmogorov, 99 %
+
+
+@covers("azimuth_beamwidth_deg", "elevation_beamwidth_deg", of=LINK_BUDGETS)
+@covers("angle_measurement", of=LINK_BUDGETS)
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_a_scanning_beam_splits_worse_than_monopulse(kind):
+    keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False}
+    names = ("azimuth_variance_rad2", "elevation_variance_rad2")
+    pair, scan = (columns(kind, *names, **keys, angle_measurement=m) for m in ("monopulse", "scan"))
+    np.testing.assert_allclose(np.divide(scan, pair), 1.33 * (1.6 / 1.66) ** 2, rtol=1e-9)
+    wide = columns(kind, *names, **{**keys, "azimuth_beamwidth_deg": 6.0})
+    np.testing.assert_allclose(np.divide(wide, pair), [[4.0, 4.0], [1.0, 1.0]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_range_rate_resolves_by_the_time_of_a_look(kind):
+    """35 GHz for 10 ms: 0.4283 m/s."""
+    keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "measures_range_rate": True}
+    found = columns(
+        kind, "snr_db", "range_rate_variance_m2_s2", **keys, budget="free", dwell_s=0.01
+    )
+    expected = 0.428274940 / np.sqrt(2.0 * 10.0 ** (found[0] / 10.0))
+    np.testing.assert_allclose(np.sqrt(found[1]), expected, rtol=1e-6)
+
+
+def test_errors_in_clutter_follow_the_ratio_to_noise_and_clutter():
+    """Confidence counts clutter as noise, the recorded SNR does not."""
+    keys = {**looks.SIGNAL_KEYS["radar.threshold"], "errors": "signal", "quantised": False}
+    grid = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 9.0}
+    terrain = {"height_m": 1850.0, "clutter_gamma_db": -45.0}
+    block = sensor("radar.threshold", **keys, **grid)
+    (row,) = rows(run(chain({"sensor": block}, terrain=terrain, targets=[crooked.DIVING])))
+    ratio_db = row["confidence"] - 250.0
+    assert 10.0 < ratio_db < row["snr_db"] - 1.0
+    expected = 40.0**2 / (2.0 * 10.0 ** (ratio_db / 10.0))
+    assert row["range_variance_m2"] == pytest.approx(expected, rel=1e-9)
+
+
+@covers("noise_equivalent_contrast", "blur_pixels", of=CAMERAS)
+@pytest.mark.parametrize("kind", CAMERAS)
+def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
+    """Thompson, Larson & Webb's term for background noise."""
+
+    def spread(noise, blur):
+        keys = {"errors": "signal", "quantised": False, "noise_equivalent_contrast": noise,
+                "blur_pixels": blur}  # fmt: skip
+        return columns(kind, "pixels", "azimuth_variance_rad2", "elevation_variance_rad2", **keys)
+
+    pixel = math.radians(360.0) / 36000.0
+    for noise, blur in ((0.01, 0.5), (0.04, 0.5), (0.01, 1.7)):
+        pixels, across, upward = spread(noise, blur)
+        s2 = blur**2 + (pixels + 1.0) / 12.0
+        contrast = np.array([1.0, 1.0])
+        expected = 8.0 * math.pi * s2**2 / (pixels * contrast / noise) ** 2
+        np.testing.assert_allclose(across / pixel**2, expected, rtol=1e-9)
+        np.testing.assert_allclose(upward / pixel**2, expected, rtol=1e-9)
+
+
+ANGLE = "azimuth_error_deg"
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "said"),
+    [
+        ("optical.eo", {"errors": "stated", ANGLE: -1.0}, "azimuth_error_deg"),
+        ("optical.eo", {ANGLE: 1.0}, "errors is 'grid', which knows no errors but rounding"),
+        ("optical.eo", {"errors": "stated", ANGLE: 1.0, "azimuth_correlation_time_s": 0.0},
+         "azimuth_correlation_time_s"),
+        ("radar.threshold", {"errors": "stated", "range_correlation_time_s": 3.0},
+         "range_correlation_time_s is given and range_error_m is 0"),
+        ("radar.threshold", {"errors": "stated", "range_rate_error_m_s": 3.0},
+         "range_rate_error_m_s is 3 and measures_range_rate is false"),
+        ("radar.range_boundary", {"errors": "signal"}, "'grid' or 'stated'"),
+        ("radar.swerling", {"errors": "signal", "range_resolution_m": 10.0},
+         "azimuth_beamwidth_deg is not given"),
+        ("radar.swerling", {"errors": "signal", "azimuth_beamwidth_deg": 3.0,
+                            "elevation_beamwidth_deg": 3.0}, "range_resolution_m is 0"),
+        ("radar.swerling", {**looks.SIGNAL_KEYS["radar.swerling"], "errors": "signal",
+                            "measures_range_rate": True}, "time of a look"),
+        ("optical.ir", {"errors": "signal"}, "noise_equivalent_contrast is not given"),
+        ("optical.eo", {"errors": "gird"}, "errors"),
+    ],
+)  # fmt: skip
+def test_what_no_sensor_can_have_is_one_clear_error(kind, keys, said):
+    with pytest.raises(SceneError) as caught:
+        load_scene(chain({"sensor": sensor(kind, **keys)}))
+    text = str(caught.value)
+    assert said in text and text.count("sensor") >= 1
