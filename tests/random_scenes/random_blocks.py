@@ -147,6 +147,8 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
     if table["type"] == "optical.ir":
         if dice.chance(0.2, "plume"):
             table["plume"] = True
+        if dice.chance(0.3, "infrared band"):
+            table["band"] = dice.pick("mwir", "lwir")
     elif dice.chance(0.4, "background"):
         table["background"] = dice.pick("auto", "sky", "ground")
         dice.maybe(table, "sky", 0.5, "clear", "partly_cloudy", "overcast")
@@ -214,6 +216,8 @@ def sections(dice: Dice) -> dict[str, Any]:
             "rain": {"rain_rate_mm_h": dice.pick(1, 20, 100)},
             "fog": {"fog_water_g_m3": dice.pick(0.05, 1), "fog_top_m": dice.pick(500, 2000)},
             "visibility": {"visibility_km": dice.pick(1, 23)},
+            "wind": {"wind_mps": dice.pick(3, 25), "wind_from_deg": dice.pick(0, 217)},
+            "night": {"night": dice.pick(True, False)},
         }.items():
             if dice.chance(0.4, feature):
                 weather |= values
@@ -222,6 +226,10 @@ def sections(dice: Dice) -> dict[str, Any]:
         found["terrain"] = {"height_m": dice.pick(-10, 50)}
         dice.maybe(found["terrain"], "clutter_gamma_db", 0.5, -20, 0, 20)
         dice.maybe(found["terrain"], "clutter_mean", 0.5, "constant", "fluctuating")
+    if dice.chance(0.2, "what the Earth hides"):
+        terrain = found.setdefault("terrain", {})
+        dice.maybe(terrain, "horizon", 0.8, True)
+        dice.maybe(terrain, "refraction", 0.5, "four_thirds")
     if dice.chance(0.25, "navigation"):
         navigation: dict[str, Any] = {}
         dice.maybe(navigation, "position_bias_m", 0.5, [5, -3, 2])
