@@ -267,7 +267,8 @@ def _seen(table: Table, pose: Mapping[str, Any], plane: Plane) -> dict[str, AnyA
     body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
     if known.any():
         north, east, down = (np.full(len(azimuth), np.nan) for _ in range(3))
-        parts = body_to_ned(*(b[known] for b in body), heading[known], pitch[known], roll[known])
+        forward, right, below = (part[known] for part in body)
+        parts = body_to_ned(forward, right, below, heading[known], pitch[known], roll[known])
         north[known], east[known], down[known] = parts
         bearing = np.arctan2(east, north)
         ranged = known & np.isfinite(range_m)
@@ -275,9 +276,9 @@ def _seen(table: Table, pose: Mapping[str, Any], plane: Plane) -> dict[str, AnyA
             offsets = (r[ranged] * range_m[ranged] for r in (east, north, -down))
             end[:, ranged] = enu_to_geodetic(
                 *offsets,
-                reference_lat_deg=lat[ranged],  # type: ignore[arg-type]
-                reference_lon_deg=lon[ranged],  # type: ignore[arg-type]
-                reference_alt_m=alt[ranged],  # type: ignore[arg-type]
+                reference_lat_deg=lat[ranged],
+                reference_lon_deg=lon[ranged],
+                reference_alt_m=alt[ranged],
             )
     east_m, north_m = plane.east_north_m(*end)
     return {
