@@ -145,7 +145,8 @@ class RangeBoundary(Radar):
         """Return the margin over what is in the cell, in dB, from that over noise."""
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
-        signal, noise = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        signal, alone = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        noise = alone
         residue = np.ones(len(cells))
         if self.doppler is not None:
             signal, residue = self.doppler(cells)
@@ -155,7 +156,9 @@ class RangeBoundary(Radar):
                 signal = signal + clutter
             else:
                 noise = noise + needed * clutter
-        margin_db: FloatArray = 10.0 * np.log10(signal / noise)
+        # Where nothing is added, no bit is: that margin is the one over noise.
+        same = (signal == 1.0) & (noise == alone)
+        margin_db: FloatArray = np.where(same, over_noise_db, 10.0 * np.log10(signal / noise))
         if self._cfar is not None:
             margin_db = margin_db - self._cfar.loss_db(p.boundary_pd, "swerling1")
         return margin_db
