@@ -71,6 +71,8 @@ class Fusion(Component):
             if offers[name].measures_range_rate
         ]
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
+        #: How long before a detection another one may have come to be put together with it.
+        self.keep_ticks = self.gate_ticks
         self._recent: dict[str, Arrivals] = {}
         self._navigation_errs = navigation_errs(self.context)
         self._with_pose = self._navigation_errs or any(
@@ -104,7 +106,7 @@ class Fusion(Component):
         latest = max(int(new.tick[-1]) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            keep = slice(int(np.searchsorted(seen.tick, latest - self.gate_ticks)), len(seen.tick))
+            keep = slice(int(np.searchsorted(seen.tick, latest - self.keep_ticks)), len(seen.tick))
             self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
         return dict(sorted(together.items()))
 

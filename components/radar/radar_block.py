@@ -29,6 +29,7 @@ class Radar(Sensor):
     measures_range = True
     hooks = {
         "SNR": "(cells) -> factor of each cell's SNR",
+        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
         "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
         "one report by cell": "(cells, power) -> power of the echo that stands for its "
         "resolution cell, 0 of the others",
@@ -38,11 +39,13 @@ class Radar(Sensor):
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
         self._merging: Merging | None = None
+        self.doppler: Any = None
         self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+        (self.doppler,) = self.built("Doppler") or [None]
         (self._merging,) = self.built("one report by cell") or [None]
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
@@ -56,7 +59,7 @@ class Radar(Sensor):
     def request(self, port: str) -> Any:
         """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
         reach = super().request(port)
-        lasts_s = LASTS_S if self._rates else 0.0
+        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)
         return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)

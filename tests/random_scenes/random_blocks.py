@@ -55,6 +55,14 @@ def common(dice: Dice, table: dict[str, Any]) -> None:
         table["declare_m"], table["declare_n"] = dice.pick((1, 1), (1, 3), (2, 3), (3, 5))
     if dice.chance(0.03, "sensor switched off"):
         table["enabled"] = False
+    if dice.chance(0.25, "stated errors"):
+        table |= {"errors": "stated", "azimuth_error_deg": dice.pick(0.3, 9, 120)}
+        dice.maybe(table, "azimuth_correlation_time_s", 0.5, 0.001, 2, 100000)
+        dice.maybe(table, "azimuth_bias_deg", 0.5, -3, 20)
+        dice.maybe(table, "elevation_error_deg", 0.5, 0.2, 70)
+        dice.maybe(table, "elevation_bias_deg", 0.5, 0.5)
+        dice.maybe(table, "biases", 0.3, "fixed")
+        dice.maybe(table, "quantised", 0.3, False)
 
 
 def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
@@ -65,6 +73,14 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
             dice.features.add("sweeping beam in a loop")
     dice.maybe(table, "range_resolution_m", 0.3, 10, 76.2)
     dice.maybe(table, "minimum_range_m", 0.15, 10, 500)
+    if dice.chance(0.2, "range rate"):
+        table["measures_range_rate"] = True
+        dice.maybe(table, "range_rate_resolution_m_s", 0.5, 2.5)
+    if table.get("errors") == "stated":
+        dice.maybe(table, "range_error_m", 0.7, 21, 400)
+        dice.maybe(table, "range_bias_m", 0.5, 125)
+        if "range_error_m" in table:
+            dice.maybe(table, "range_correlation_time_s", 0.5, 0.1, 30)
     if table["type"] == "radar.range_boundary":
         table["range_km"] = dice.pick(1, 5, 15)
         return
@@ -87,6 +103,14 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
             "azimuth_deg": [-60, 60], "elevation_deg": [-10, 10],
             "cell_false_alarm_probability": dice.pick(0.001, 0.01),
         }  # fmt: skip
+    if dice.chance(0.2, "errors by the signal"):
+        table |= {
+            "errors": "signal", "azimuth_beamwidth_deg": 4, "elevation_beamwidth_deg": 6,
+            "budget": "free", "range_resolution_m": table.get("range_resolution_m", 30),
+        }  # fmt: skip
+        if "measures_range_rate" in table:
+            table.setdefault("dwell_s", 0.01)
+        dice.maybe(table, "angle_measurement", 0.3, "scan")
     if table["type"] == "radar.threshold":
         dice.maybe(table, "threshold_db", 0.3, -3.0, 10.0)
         return
@@ -106,6 +130,8 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
     dice.maybe(table, "range_km", 0.4, 1, 5, 15)
     table |= {"azimuth_pixels": dice.pick(640, 2048), "elevation_pixels": 512}
     table["threshold"] = dice.pick(0.1, 1, 5)
+    if dice.chance(0.2, "errors by contrast"):
+        table |= {"errors": "signal", "noise_equivalent_contrast": dice.pick(0.02, 0.5)}
     if dice.chance(0.3, "dynamic signature"):
         table["dynamic_weight"] = dice.pick(0.5, 20)
         dice.maybe(table, "rate", 0.5, "exact", "thesis")
@@ -121,6 +147,8 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
     if table["type"] == "optical.ir":
         if dice.chance(0.2, "plume"):
             table["plume"] = True
+        if dice.chance(0.3, "infrared band"):
+            table["band"] = dice.pick("mwir", "lwir")
     elif dice.chance(0.4, "background"):
         table["background"] = dice.pick("auto", "sky", "ground")
         dice.maybe(table, "sky", 0.5, "clear", "partly_cloudy", "overcast")
@@ -188,6 +216,8 @@ def sections(dice: Dice) -> dict[str, Any]:
             "rain": {"rain_rate_mm_h": dice.pick(1, 20, 100)},
             "fog": {"fog_water_g_m3": dice.pick(0.05, 1), "fog_top_m": dice.pick(500, 2000)},
             "visibility": {"visibility_km": dice.pick(1, 23)},
+            "wind": {"wind_mps": dice.pick(3, 25), "wind_from_deg": dice.pick(0, 217)},
+            "night": {"night": dice.pick(True, False)},
         }.items():
             if dice.chance(0.4, feature):
                 weather |= values
@@ -196,6 +226,10 @@ def sections(dice: Dice) -> dict[str, Any]:
         found["terrain"] = {"height_m": dice.pick(-10, 50)}
         dice.maybe(found["terrain"], "clutter_gamma_db", 0.5, -20, 0, 20)
         dice.maybe(found["terrain"], "clutter_mean", 0.5, "constant", "fluctuating")
+    if dice.chance(0.2, "what the Earth hides"):
+        terrain = found.setdefault("terrain", {})
+        dice.maybe(terrain, "horizon", 0.8, True)
+        dice.maybe(terrain, "refraction", 0.5, "four_thirds")
     if dice.chance(0.25, "navigation"):
         navigation: dict[str, Any] = {}
         dice.maybe(navigation, "position_bias_m", 0.5, [5, -3, 2])

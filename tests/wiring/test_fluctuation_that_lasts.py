@@ -108,15 +108,18 @@ def test_a_faster_radar_sees_the_same_fades_at_the_same_instants():
 
 
 def test_windows_and_replicas_together_change_nothing():
-    keys = {"fluctuation_correlation_s": 0.7, "power_w": 3.5, "beam_sweep": True}
-    whole = looks(5, 3, **keys)
-    assert 20 < len(whole) < 140
+    keys = {
+        "fluctuation_correlation_s": 0.7, "power_w": 3.5, "beam_sweep": True,
+        "scintillation_extent_m": 5.0, "swerling": 3,
+    }  # fmt: skip
+    whole = looks(5, 2, **keys)
+    assert 20 < len(whole) < 100
     for window in (1, 7):
-        assert looks(5, 3, window=window, **keys).equals(whole)
-    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=3)
+        assert looks(5, 2, window=window, **keys).equals(whole)
+    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=2)
     study = dsa_des.study(
         scene, metrics=["first_detection"], axes={"blocks.sensor.scan_rate_hz": [5, 10]},
-        replicas=2, workers=1,
+        replicas=1, workers=1,
     )  # fmt: skip
     for row in study.runs.to_pylist():
         again = [f"blocks.sensor.scan_rate_hz={row['sensor.scan_rate_hz']:g}"]
@@ -133,6 +136,63 @@ def test_a_beam_that_sweeps_meets_the_fade_of_its_own_instant():
     ratio = np.abs(np.log(swept[:-1] / started[:-1]))
     late = np.nanmean(ratio, axis=0)
     assert np.nanmin(late) < 0.3 < np.nanmax(late)
+
+
+def ball(x: Any) -> Any:
+    """Return the Fourier transform of an even ball of radius 1, over its volume."""
+    return 3.0 * (np.sin(x) - x * np.cos(x)) / x**3
+
+
+@covers("scintillation_extent_m", of=("radar.swerling",))
+@pytest.mark.parametrize("turned", [{"yaw_deg": 0.03}, {"roll_deg": 0.08}, {"pitch_deg": 0.06}])
+@pytest.mark.parametrize("extent_m", [4.0, 8.0])
+def test_an_echo_scintillates_as_the_target_turns(turned, extent_m):
+    """Correlation of the scatterers in a ball, over the turn of the line of sight by pymap3d."""
+    count, seen, sides = 500, [], []
+    attitude = {"yaw_deg": 31.0, "pitch_deg": 11.0, "roll_deg": 38.0}
+    for more in ({}, turned):
+        angles = {key: value + more.get(key, 0.0) for key, value in attitude.items()}
+        targets = [{**target, **angles} for target in formation(count)]
+        radar = {**RADAR, **LOUD, "scintillation_extent_m": extent_m, "scan_rate_hz": 1}
+        found = rows(dsa_des.run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
+        by_name = {row["target"]: 10.0 ** (0.1 * row["snr_db"]) for row in found}
+        power = np.array([by_name.get(target["name"], np.nan) for target in targets])
+        seen.append(power / np.nanmean(power))
+        sides.append([crooked.aspect(target) for target in targets])
+    one, other = (np.array(side) / np.linalg.norm(side, axis=1)[:, np.newaxis] for side in sides)
+    apart = np.linalg.norm(one - other, axis=1)
+    wavelength_m = 299_792_458.0 / 35e9
+    expected = float(np.mean(ball(2.0 * math.pi * extent_m / wavelength_m * apart) ** 2))
+    assert np.nanvar(seen[0]) == pytest.approx(1.0, abs=0.4)
+    found = float(np.nanmean((seen[0] - 1.0) * (seen[1] - 1.0)))
+    assert found == pytest.approx(expected, abs=0.2)
+    assert np.corrcoef(np.nan_to_num(seen))[0, 1] == pytest.approx(expected, abs=0.13)
+
+
+def test_who_is_seen_from_one_side_scintillates_not_and_has_the_model_s_pd_on_average():
+    still = power(scintillation_extent_m=0.5, count=40, duration_s=2)
+    assert np.nanvar(still[0]) > 0.3
+    assert still == pytest.approx(np.broadcast_to(still[0], still.shape), abs=0.03, nan_ok=True)
+    for model in (1, 3):
+        count = 3000
+        keys = {"swerling": model, "power_w": 3.5, "scintillation_extent_m": 6.0}
+        found = looks(count, 0.01, **keys)
+        steady = looks(count, 0.01, **{**keys, "swerling": 0, **LOUD}).to_pydict()["snr_db"]
+        snr = 10.0 ** (0.1 * (np.array(steady) + 10.0 * math.log10(3.5 / LOUD["power_w"])))
+        expected = float(np.mean(detection_probability(
+            snr, false_alarm_probability=PFA, model=f"swerling{model}"
+        )))  # fmt: skip
+        spread = math.sqrt(expected * (1 - expected) / count)
+        assert len(found) / count == pytest.approx(expected, abs=norm.isf(0.005) * spread)
+
+
+def test_time_and_aspect_together_forget_with_the_time_where_the_aspect_stays():
+    values = power(
+        fluctuation_correlation_s=0.5, scintillation_extent_m=6.0, count=60, duration_s=4
+    )
+    product = np.nanmean((values[2:] - 1.0) * (values[:-2] - 1.0))
+    assert product == pytest.approx(math.exp(-2.0 * 0.2 / 0.5), abs=0.15)
+    assert abs(np.nanmean((values[15:] - 1.0) * (values[:-15] - 1.0))) < 0.15
 
 
 def declared_share(lasts_s: float | None, rate_hz: float) -> float:
@@ -194,11 +254,14 @@ def test_it_is_said_and_where_nothing_fluctuates_it_is_left_out():
     assert given.simulated and "correlated with 0.368" in given.because
     assert verdict(fluctuation_correlation_s=0.2, swerling=0).because == "swerling is 0"
     assert not verdict().simulated
+    # 8.57 mm over 17.1 m.
+    assert "aspects 0.029 deg apart" in verdict(scintillation_extent_m=8.566).because
 
 
-@pytest.mark.parametrize("lasts_s", [0, -1.0, 1e8, "long"])
-def test_a_time_that_cannot_be_is_one_error(lasts_s):
+@pytest.mark.parametrize("key", ["fluctuation_correlation_s", "scintillation_extent_m"])
+@pytest.mark.parametrize("value", [0, -1.0, 1e8, "long"])
+def test_a_time_or_an_extent_that_cannot_be_is_one_error(key, value):
     with pytest.raises(SceneError) as caught:
-        load_scene(chain({"sensor": {**RADAR, "fluctuation_correlation_s": lasts_s}}))
+        load_scene(chain({"sensor": {**RADAR, key: value}}))
     assert len(caught.value.problems) == 1
-    assert "blocks.sensor.fluctuation_correlation_s" in str(caught.value)
+    assert f"blocks.sensor.{key}" in str(caught.value)
