@@ -132,6 +132,14 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
         table["model"] = "auto"
     if dice.chance(0.4, "sampled fluctuation"):
         table["fluctuation"] = "sampled"
+    if "fluctuation" in table and dice.chance(0.4, "lasting fluctuation"):
+        table["fluctuation_correlation_s"] = 0.7
+        dice.maybe(table, "scintillation_extent_m", 0.5, 0.5, 8.0)
+        if "pulses" not in table and dice.chance(0.5, "time budget"):
+            table |= {
+                "budget": "dwell", "azimuth_beamwidth_deg": 60, "elevation_beamwidth_deg": 60,
+                "prf_hz": 4000, "pulses_per_dwell": 20, "integration_gain_db": 0,
+            }  # fmt: skip
 
 
 def camera(dice: Dice, table: dict[str, Any]) -> None:
