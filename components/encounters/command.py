@@ -86,3 +86,32 @@ def sample(**options: Any) -> None:
     from components.encounters.sample_command import sample_tracks
 
     sample_tracks(**options)
+
+
+@encounters.command()
+@click.option("--model", metavar="FILE", required=True, help="Encounter model of the ownship.")
+@click.option("--intruder-model", metavar="FILE", help="That of the intruder [default: the same].")
+@click.option("--count", required=True, type=click.IntRange(1, 100_000_000), help="Encounters.")
+@click.option(
+    "--first",
+    type=click.IntRange(0, 2**53),
+    default=0,
+    show_default=True,
+    help="Number of the first; an encounter is the same whichever others are made.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--at",
+    nargs=2,
+    type=float,
+    default=(0.0, 0.0),
+    metavar="LAT LON",
+    help="Where the ownship is at the closest approach, deg [default: 0 0].",
+)
+@click.option("--out", required=True, metavar="SET.parquet", help="The set.")
+@plain_errors
+def generate(**options: Any) -> None:
+    """Make a set of weighted encounters from encounter models."""
+    from components.encounters.generate_command import generate_set
+
+    generate_set(**options)

@@ -139,6 +139,13 @@ class Terrain(Parameters):
         description="Reflectivity of the ground, gamma of sigma0 = gamma sin(grazing angle), dB: "
         "about -20 desert or sea, -15 farmland, -10 woodland, -5 a town (assumption).",
     )
+    clutter_motion_m_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="Standard deviation of the ground's own range rates, m/s: about 0.3 wooded "
+        "hills in a fresh wind, 1 sea (Skolnik, table 3.1); for moving-target filters.",
+    )
     clutter_mean: Literal["constant", "fluctuating"] = Field(
         default="fluctuating",
         description="Whether the clutter's mean fluctuates from look to look (thesis §5.3.2).",
