@@ -108,6 +108,21 @@ class Navigation(Parameters):
     )
 
 
+class Record(Parameters):
+    """What a run folder holds beside what blocks send each other."""
+
+    truth: bool | Literal["auto"] = Field(
+        default="auto",
+        description="Whether the table truth has the ownship and every target at every scan; by "
+        "default where aircraft times seconds are at most 600.",
+    )
+    looks: bool = Field(
+        default=False,
+        description="Whether the table looks has every sensor's look at every target, also those "
+        "without a detection.",
+    )
+
+
 class Terrain(Parameters):
     """The ground: flat, whose echo a radar may hear, and what hides targets; by default none."""
 
