@@ -12,7 +12,8 @@ from components.estimation.motion import (
     Motion,
 )
 from components.tracking.filter_bank import FilterBank
-from components.tracking.tracker import Tracker, TrackerParameters
+from components.tracking.parameters import TrackerParameters
+from components.tracking.tracker import Tracker
 
 Model = Literal["velocity", "turn", "acceleration"]
 

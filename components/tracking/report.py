@@ -12,7 +12,6 @@ from components.estimation.frame import Place
 from components.estimation.measurement import Kind, linearised
 from components.messages.state_tracks import COVARIANCE, StateTracks
 from components.tracking.life import existence
-from components.tracking.scans import Scans
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
@@ -36,22 +35,27 @@ class Reported:
     ----------
     store : TrackStore
     look : (tracks,)
+        The last that was worked on.
+    row : (tracks,)
+        Row of the wake at which it is told.
     """
 
     store: TrackStore
     look: IntArray
+    row: IntArray
 
     @classmethod
-    def of(cls, store: TrackStore, replica: IntArray, looks: IntArray) -> "Reported":
+    def of(
+        cls, store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
+    ) -> "Reported":
         """Return the tracks of some replicas (ascending) after their looks."""
         place = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
         mine = replica[place] == store.replica
-        return cls(store.take(mine), looks[place[mine]])
+        return cls(store.take(mine), looks[place[mine]], rows[place[mine]])
 
 
 def state_tracks(
     reported: Sequence[Reported],
-    scans: Scans,
     places: Place,
     origin: FloatArray,
     rows: IntArray,
@@ -63,7 +67,6 @@ def state_tracks(
     Parameters
     ----------
     reported : sequence of Reported
-    scans : Scans
     places : Place
         Of every look.
     origin : (3, looks)
@@ -80,7 +83,7 @@ def state_tracks(
         empty.sensors = sensors
         return empty
     look = np.concatenate([part.look for part in reported])
-    row = scans.row[look]
+    row = np.concatenate([part.row for part in reported])
     order = np.argsort(row, kind="stable")
     look, row = look[order], row[order]
     store = _Columns(reported, order)

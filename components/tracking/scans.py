@@ -1,7 +1,7 @@
 """What a tracker works on: looks in the order in which they came, and what each detected."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from components.estimation.measurement import Kind
 from components.messages.detections import POSE, FusedDetections
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.wake import Wake
 
 _MEASURED = ("azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s")
 _VARIANCES = (
@@ -151,6 +152,35 @@ def scans_of(fused: FusedDetections) -> Scans:
         variance=variance[:, entries],
         contributors=mask[entries],
     )
+
+
+def when_made(scans: Scans, ahead: Scans | None, wake: Wake) -> tuple[Scans, Scans | None]:
+    """Return the looks that have been made by the rows of a wake, and those that wait.
+
+    A sweeping radar reports a scan as it begins, with instants at which its beam meets the targets
+    later: such a look waits for the first row at or after its own instant.
+
+    Parameters
+    ----------
+    scans : Scans
+        By arrival.
+    ahead : Scans or None
+        Those that have waited.
+    wake : Wake
+    """
+    if ahead is None and not bool((scans.tick > wake.ticks[scans.row]).any()):
+        return scans, None
+    if ahead is not None:
+        scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
+    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick))
+    span = wake.span_ticks or np.iinfo(np.int64).max
+    of_look = scans.tick // span
+    there = np.minimum(row, len(wake) - 1)
+    ready = (row < len(wake)) & (wake.replica[there] == of_look)
+    waiting = ~ready & (of_look == wake.replica[-1])
+    order = np.lexsort((scans.sensors, scans.tick, row))
+    done = replace(scans, row=row).take(order[ready[order]])
+    return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None
 
 
 def _refuse(

@@ -1,10 +1,9 @@
 """The base class of trackers that estimate states: parameters, memory, and the order of looks."""
 
 import math
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from components.estimation.frame import place_in_frame
 from components.estimation.motion import ConstantVelocity
@@ -13,103 +12,29 @@ from components.messages.reach import Reach
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.filter_bank import FilterBank
-from components.tracking.life import LONGEST_WINDOW, LifeRules
+from components.tracking.late_looks import (
+    Before,
+    Memory,
+    Plan,
+    gone_back,
+    rerun_plan,
+    straight_plan,
+)
+from components.tracking.parameters import TrackerParameters
+from components.tracking.replica_memory import Heads, Past
 from components.tracking.report import Reported, state_tracks
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import scans_of
+from components.tracking.scans import Scans, scans_of, when_made
 from components.tracking.step import step
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters
+from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 # What a sensor that tells no reach is taken to see: all around, as far as this.
 _FARTHEST_M = 20_000.0
 _WHOLE_RATE_M_S = 600.0
-
-
-class TrackerParameters(Parameters):
-    """Parameters of every tracker that estimates states."""
-
-    acceleration_intensity_m2_s3: float = Field(
-        default=4.0, gt=0,
-        description="Intensity of the white acceleration that targets are taken to have, m²/s³.",
-    )  # fmt: skip
-    association: Literal["nearest", "gnn", "jpda"] = Field(
-        default="gnn",
-        description="Which detection is whose: the nearest in turn, the least sum over all "
-        "(global nearest neighbour), or all of them weighed (joint probabilistic).",
-    )
-    gate_probability: float = Field(
-        default=0.997, gt=0, lt=1,
-        description="Probability that a target's detection lies in its gate.",
-    )  # fmt: skip
-    detection_probability: float = Field(
-        default=0.9, gt=0, lt=1, description="Probability that a look at a target detects it."
-    )
-    false_alarms_per_scan: float = Field(
-        default=0.1, gt=0,
-        description="False alarms that a sensor is taken to have in a scan of its whole field.",
-    )  # fmt: skip
-    jpda_exact_detections: int = Field(
-        default=10, ge=1, le=16,
-        description="Detections in a cluster up to which `jpda` is exact; belief propagation "
-        "beyond.",
-    )  # fmt: skip
-    initiation: Literal["m_of_n", "likelihood_ratio"] = Field(
-        default="m_of_n", description="The rule that confirms a track."
-    )
-    confirm_m: int = Field(default=3, ge=1, description="Hits that confirm a track (`m_of_n`).")
-    confirm_n: int = Field(
-        default=5, ge=1, le=LONGEST_WINDOW, description="Expected looks in which they must fall."
-    )
-    false_confirmation: float = Field(
-        default=1e-4, gt=0, lt=0.5,
-        description="Share of false tracks that `likelihood_ratio` confirms.",
-    )  # fmt: skip
-    missed_confirmation: float = Field(
-        default=0.01, gt=0, lt=0.5, description="Share of true tracks that it drops."
-    )
-    start_existence: float = Field(
-        default=0.2, gt=0, lt=1,
-        description="Probability that a detection that belongs to no track is of a target.",
-    )  # fmt: skip
-    start_speed_m_s: float = Field(
-        default=70.0, gt=0,
-        description="Standard deviation of a new track's velocity along each axis, m/s.",
-    )  # fmt: skip
-    assumed_range_m: float | None = Field(
-        default=None, gt=0,
-        description="Range that is assumed, to 45 %, of what is seen without one, m; by default "
-        "half of the farthest reach of the sensors.",
-    )  # fmt: skip
-    delete_misses: int = Field(
-        default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
-    )
-    delete_after_s: float = Field(
-        default=6.0, gt=0, description="Time without a detection after which any track ends, s."
-    )
-    delete_above_m: float = Field(
-        default=3000.0, gt=0,
-        description="Standard deviation of a position that ends a track with a range, m.",
-    )  # fmt: skip
-
-    @model_validator(mode="after")
-    def _possible(self) -> Any:
-        if self.confirm_m > self.confirm_n:
-            raise ValueError(
-                f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "
-                "looks; allowed: at most as many"
-            )
-        return self
-
-    def life(self) -> LifeRules:
-        """Return the rules of a track's life."""
-        return LifeRules(
-            self.initiation, self.confirm_m, self.confirm_n, self.false_confirmation,
-            self.missed_confirmation, self.delete_misses,
-        )  # fmt: skip
 
 
 class Tracker(Component):
@@ -136,7 +61,10 @@ class Tracker(Component):
         self.rules: TrackerRules | None = None
         self._sensors: tuple[str, ...] = ()
         self._store = TrackStore.empty(self.bank().sizes, 0)
-        self._heads = _Heads.none()
+        self._heads = Heads.none()
+        self._past: Past | None = None
+        self._ahead: Scans | None = None
+        self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
         self._late = 0
 
     def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
@@ -180,79 +108,82 @@ class Tracker(Component):
         if self.rules is None or fused.sensors != self._sensors:
             self.rules, self._sensors = self._rules(fused.sensors), fused.sensors
             self._store = TrackStore.empty(self.rules.bank.sizes, len(fused.sensors))
-        scans = scans_of(fused)
+        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake)
         if len(scans) == 0:
             return None
         replica = wake.replica[scans.row]
         heads = self._heads.followed_by(replica, scans.pose[:3])
         store = self._store.take(np.isin(self._store.replica, heads.replica))
+        past = self._past
+        begin = 0
+        before: dict[int, Before] = {}
+        memory: dict[int, Memory] = {}
+        if past is not None and past.replica == heads.replica[0]:
+            begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
+            scans = Scans.joined([past.scans, scans])
+            replica = np.concatenate([np.full(begin, past.replica), replica])
         of = np.searchsorted(heads.replica, replica)
-        keep = np.flatnonzero(_in_order(scans.tick, of, heads.tick))
-        self._late += len(scans) - len(keep)
-        if len(keep) < len(scans):
-            scans, replica, of = scans.take(keep), replica[keep], of[keep]
-        if len(scans) == 0:
-            self._store, self._heads = store, heads
-            return None
+        if self.p.late == "rerun":
+            plan, left_out = rerun_plan(scans, of, begin, memory, self._lag_ticks)
+        else:
+            plan, left_out = straight_plan(scans, of, heads.tick)
+        self._late += left_out
         places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose))
         codes = scans.kinds(self.rules.use_range_rate)
-        told = np.append(scans.row[1:] != scans.row[:-1], True)
         reported: list[Reported] = []
-        for looks in _turns(of):
-            mine = of[looks]
+        for works in _turns(plan.of):
+            looks, mine = plan.look[works], plan.of[works]
+            if self.p.late == "rerun":
+                store = self._remember(store, heads, plan, works, before)
             store, heads.next_number[mine] = step(
                 self.rules, store, scans, places, codes, looks, heads.replica[mine],
                 heads.next_number[mine],
             )  # fmt: skip
             heads.tick[mine] = scans.tick[looks]
-            tell = looks[told[looks]]
-            if len(tell) and len(store):
-                reported.append(Reported.of(store, heads.replica[of[tell]], tell))
-        last = heads.replica == heads.replica[-1]
-        self._heads = heads.take(last)
+            tell = plan.tells[works]
+            if len(store) and tell.any():
+                reported.append(
+                    Reported.of(
+                        store, heads.replica[mine[tell]], looks[tell], plan.row[works[tell]]
+                    )
+                )
+        self._heads = heads.take(heads.replica == heads.replica[-1])
         self._store = store.take(store.replica == heads.replica[-1])
-        return state_tracks(
-            reported, scans, places, heads.origin[:, of], np.unique(scans.row), wake, fused.sensors
-        )
+        self._past = Past.of(scans, memory.get(len(heads.replica) - 1), before, heads.replica[-1])
+        if len(plan.look) == 0:
+            return None
+        rows = np.unique(plan.row)
+        return state_tracks(reported, places, heads.origin[:, of], rows, wake, self._sensors)
+
+    def _remember(
+        self,
+        store: TrackStore,
+        heads: "Heads",
+        plan: Plan,
+        works: IntArray,
+        before: dict[int, Before],
+    ) -> TrackStore:
+        """Go back where late looks ask for it, and note how things are before each look."""
+        back = plan.back_to[works]
+        late = np.flatnonzero(back >= 0)
+        if len(late):
+            replicas = heads.replica[plan.of[works[late]]].tolist()
+            states = {
+                number: before[look]
+                for number, look in zip(replicas, back[late].tolist(), strict=True)
+            }
+            store = gone_back(store, states, replicas)
+            heads.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
+        for work in works.tolist():
+            place = int(plan.of[work])
+            before[int(plan.look[work])] = Before(store, int(heads.next_number[place]))
+            for look in plan.forgotten[work]:
+                before.pop(look, None)
+        return store
 
     def report(self) -> dict[str, Any]:
         """Return how many looks came too late."""
         return {"late_looks": {self.name: self._late}}
-
-
-class _Heads:
-    """What is kept of each replica beside its tracks, replicas ascending."""
-
-    def __init__(
-        self, replica: IntArray, next_number: IntArray, tick: IntArray, origin: FloatArray
-    ) -> None:
-        self.replica, self.next_number, self.tick = replica, next_number, tick
-        self.origin = origin
-
-    @classmethod
-    def none(cls) -> "_Heads":
-        """Return those of no replica."""
-        none = np.empty(0, dtype=np.int64)
-        return cls(none, none, none, np.empty((3, 0)))
-
-    def take(self, which: Any) -> "_Heads":
-        """Return some of them."""
-        return _Heads(
-            self.replica[which], self.next_number[which], self.tick[which], self.origin[:, which]
-        )
-
-    def followed_by(self, replica: IntArray, place: FloatArray) -> "_Heads":
-        """Return those of the replicas of some looks; a new one starts at its first look."""
-        found, first = np.unique(replica, return_index=True)
-        new = _Heads(
-            found, np.ones(len(found), dtype=np.int64),
-            np.full(len(found), np.iinfo(np.int64).min), place[:, first].copy(),
-        )  # fmt: skip
-        for old in np.flatnonzero(np.isin(self.replica, found)).tolist():
-            here = int(np.searchsorted(found, self.replica[old]))
-            new.next_number[here], new.tick[here] = self.next_number[old], self.tick[old]
-            new.origin[:, here] = self.origin[:, old]
-        return new
 
 
 def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
@@ -272,16 +203,10 @@ def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArr
     return found
 
 
-def _in_order(tick: IntArray, of: IntArray, newest: IntArray) -> Any:
-    """Return which looks are not older than one that came before, replica by replica."""
-    if len(tick) == 0:
-        return np.zeros(0, dtype=bool)
-    # Replicas lie end to end: what is before a replica's first look is older anyway.
-    return (tick >= np.maximum.accumulate(tick)) & (tick >= newest[of])
-
-
 def _turns(of: IntArray) -> list[IntArray]:
-    """Return the first look of every replica, then the second ones, and so on."""
+    """Return the first work of every replica, then the second ones, and so on."""
+    if len(of) == 0:
+        return []
     counts = np.bincount(of)
     place = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
     order = np.argsort(place, kind="stable")

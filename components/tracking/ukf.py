@@ -5,7 +5,8 @@ from pydantic import Field
 from components.estimation.motion import ConstantVelocity
 from components.estimation.unscented import SigmaPoints
 from components.tracking.filter_bank import FilterBank
-from components.tracking.tracker import Tracker, TrackerParameters
+from components.tracking.parameters import TrackerParameters
+from components.tracking.tracker import Tracker
 
 
 class UnscentedParameters(TrackerParameters):

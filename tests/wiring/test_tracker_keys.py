@@ -150,6 +150,20 @@ def test_who_belongs_to_whom_is_decided_as_said(kind):
     assert rough.max() < 0.5 * all_of_them.min()  # propagation is too sure of itself here
 
 
+@covers("late", "lag_s", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_late_look_is_left_out_or_worked_on_again(kind):
+    """The camera's message takes 1.5 s: a radar's look has come since."""
+    sensors = {"radar": RADAR, "eye": {**SEES_ALL, "latency_s": 1.5, "offset_s": 0.2}}
+
+    def updated_by(**keys):
+        names = [row["contributors"] for row in tracks(kind, sensors=sensors, **keys)]
+        return {name for joined in names for name in joined.split("+")}
+
+    assert updated_by() == updated_by(late="rerun", lag_s=0.5) == {"radar"}
+    assert updated_by(late="rerun", lag_s=2.0) == {"radar", "eye"}
+
+
 @covers("alpha", "beta", "kappa", of=("tracking.ukf",))
 def test_sigma_points_are_spread_as_said():
     def states(**keys):
