@@ -315,6 +315,10 @@ FAULTS = [
         ("flights-that-begin", "(_CENTRAL, _AHEAD, _BEHIND)", "(_CENTRAL,)"),
     ),
     *in_file(
+        _GROUP, "components/sensor/grid.py", "wiring/test_measured_values.py",
+        ("reports-at-range-0", "_grid(step, limit_low=step)", "_grid(step, limit_low=0.0)"),
+    ),
+    *in_file(
         _GROUP, "components/radar/signal_errors.py", "wiring/test_measured_values.py",
         ("errors-know-no-clutter", "snr if cnr is None else snr / (1.0 + cnr)", "snr"),
     ),

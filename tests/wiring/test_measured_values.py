@@ -38,6 +38,12 @@ def test_however_large_errors_are_values_stay_what_they_can_be(kind, quantised):
 
 
 @pytest.mark.parametrize("kind", RADARS)
+def test_nothing_is_reported_at_range_0(kind):
+    ranges = columns(kind, "range_m", range_resolution_m=6000.0)
+    assert ranges[0].tolist() == [6000.0, 6000.0]
+
+
+@pytest.mark.parametrize("kind", RADARS)
 def test_errors_near_astern_and_overhead_go_the_short_way(kind):
     """A target behind us and one above: directions err by what is stated, whatever the angles."""
     place = {"speed_mps": 70.0, "heading_deg": 217.0, "yaw_deg": 217.0, "climb_mps": 3.0}
