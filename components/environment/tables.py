@@ -162,8 +162,8 @@ class Terrain(Parameters):
     )
     raster: RasterFile | None = Field(
         default=None,
-        description="Elevation raster whose ground hides targets: SRTM .hgt, or GeoTIFF with the "
-        "extra geotiff. Beside it no ground is known.",
+        description="Elevation raster whose ground hides targets, or a list of files side by side: "
+        "SRTM .hgt, or GeoTIFF with the extra geotiff. Beside it no ground is known.",
     )
     raster_offset_m: float = Field(
         default=0.0,
