@@ -214,6 +214,8 @@ FAULTS = [
         ("scan-rate-never-checked", "if available_s * (1.0 + 1e-9) < least_s:", "if False:"),
         ("unambiguous-twice-as-far", "highest_hz = 1.0 / round_trip_s",
          "highest_hz = 2.0 / round_trip_s"),
+        ("filters-of-pulses-that-are-not-there", "known is not None and known < needed",
+         "known is not None and known < 0"),
         ("gain-of-pulses-that-are-not-there", "most_db = 10.0 * math", "most_db = 20.0 * math"),
     ),
     *in_file(
