@@ -89,9 +89,12 @@ def sample(**options: Any) -> None:
 
 
 @encounters.command()
-@click.option("--model", metavar="FILE", required=True, help="Encounter model of the ownship.")
+@click.option(
+    "--made", metavar="FILE.toml", help="Encounters made by hand, as a table describes them."
+)
+@click.option("--model", metavar="FILE", help="Encounter model of the ownship.")
 @click.option("--intruder-model", metavar="FILE", help="That of the intruder [default: the same].")
-@click.option("--count", required=True, type=click.IntRange(1, 100_000_000), help="Encounters.")
+@click.option("--count", type=click.IntRange(1, 100_000_000), help="Encounters of models.")
 @click.option(
     "--first",
     type=click.IntRange(0, 2**53),
@@ -111,7 +114,48 @@ def sample(**options: Any) -> None:
 @click.option("--out", required=True, metavar="SET.parquet", help="The set.")
 @plain_errors
 def generate(**options: Any) -> None:
-    """Make a set of weighted encounters from encounter models."""
+    """Make a set of weighted encounters from encounter models, or of some made by hand."""
     from components.encounters.generate_command import generate_set
 
     generate_set(**options)
+
+
+@encounters.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.option(
+    "--weights", metavar="TABLE.csv", help="Weights: columns encounter and weight [default: 1]."
+)
+@click.option(
+    "--at", nargs=2, type=float, metavar="LAT LON", help="Where the origin is put [default: 0 0]."
+)
+@click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
+@click.option("--out", required=True, metavar="FILE", help="SET.parquet, or waypoints: FILE.bin.")
+@plain_errors
+def convert(**options: Any) -> None:
+    """Turn encounters of public formats into a set, or a set into waypoints.
+
+    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or paired tracks (.txt), one
+    encounter each.
+    """
+    from components.encounters.convert_command import convert_sets
+
+    convert_sets(**options)
+
+
+@encounters.command()
+@click.argument("file", metavar="SET.parquet")
+@click.option(
+    "--most",
+    type=click.IntRange(1, 1_000_000),
+    default=2000,
+    show_default=True,
+    help="Of so many encounters, evenly spread, the closest approach is looked for.",
+)
+@click.option("--figure", metavar="FILE.png", help="Histograms and a plan of a sample.")
+@click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
+@plain_errors
+def show(**options: Any) -> None:
+    """Say what is in a set: weights, and the geometry at the closest approaches."""
+    from components.encounters.show_command import show_set
+
+    show_set(**options)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from components.encounters.made_encounters import made_set, read_recipe
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
@@ -17,15 +18,16 @@ from dsa_des.terminal.terminal import say
 
 
 def generate_set(
-    model: str,
+    made: str | None,
+    model: str | None,
     intruder_model: str | None,
-    count: int,
+    count: int | None,
     first: int,
     seed: int,
     at: tuple[float, float],
     out: str,
 ) -> None:
-    """Write a set of paired encounters.
+    """Write a set of paired encounters, or of those that a table describes.
 
     Raises
     ------
@@ -35,6 +37,13 @@ def generate_set(
         If writing fails.
     """
     check_place(at)
+    if made is not None:
+        if model is not None or intruder_model is not None or count is not None:
+            raise UsageError("--made says all of its encounters: no --model and no --count with it")
+        _write_made(made, out)
+        return
+    if model is None or count is None:
+        raise UsageError("either --model FILE and --count N are needed, or --made FILE.toml")
     own = open_model(model)
     intruder = own if intruder_model is None else open_model(intruder_model)
     path = named(out)
@@ -56,6 +65,19 @@ def generate_set(
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {count} encounters of {rules.duration_s} s")
     say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
+
+
+def _write_made(made: str, out: str) -> None:
+    recipe = read_recipe(made)
+    path = named(out)
+    check_file(path)
+    found = made_set(recipe)
+    try:
+        with set_writer(path, {"made_by": "hand", "seed": recipe.seed}) as writer:
+            writer.write(found)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {len(found)} encounters of {recipe.duration_s:g} s")
 
 
 def check_place(at: tuple[float, float]) -> None:

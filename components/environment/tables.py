@@ -108,6 +108,21 @@ class Navigation(Parameters):
     )
 
 
+class Record(Parameters):
+    """What a run folder holds beside what blocks send each other."""
+
+    truth: bool | Literal["auto"] = Field(
+        default="auto",
+        description="Whether the table truth has the ownship and every target at every scan; by "
+        "default where aircraft times seconds are at most 600.",
+    )
+    looks: bool = Field(
+        default=False,
+        description="Whether the table looks has every sensor's look at every target, also those "
+        "without a detection.",
+    )
+
+
 class Terrain(Parameters):
     """The ground: flat, whose echo a radar may hear, and what hides targets; by default none."""
 
@@ -147,8 +162,8 @@ class Terrain(Parameters):
     )
     raster: RasterFile | None = Field(
         default=None,
-        description="Elevation raster whose ground hides targets: SRTM .hgt, or GeoTIFF with the "
-        "extra geotiff. Beside it no ground is known.",
+        description="Elevation raster whose ground hides targets, or a list of files side by side: "
+        "SRTM .hgt, or GeoTIFF with the extra geotiff. Beside it no ground is known.",
     )
     raster_offset_m: float = Field(
         default=0.0,

@@ -5,13 +5,19 @@ Beside the messages' ``recorded``, which has the types; a test sees that none is
 
 from collections.abc import Mapping
 
-from components.messages.state_tracks import COVARIANCE
+#: Column of every element of the covariance's upper triangle, row by row.
+COVARIANCE = {
+    (i, j): f"covariance_{i}{j}_m2{('', '_s', '_s2')[(i > 2) + (j > 2)]}"
+    for i in range(6)
+    for j in range(i, 6)
+}
 
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
 _WGS84 = "WGS 84"
 _FRAME = "north-east-down at the frame's origin"
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_OWN_NED = "north-east-down at the aircraft itself"
 _TURNED = "north-east-down to body: yaw, pitch, roll"
 
 #: Unit, frame, meaning.
@@ -147,6 +153,28 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "probability_turn": ("", "", "of the model of a coordinated turn"),
         "probability_acceleration": ("", "", "of the model of constant acceleration"),
     },
+    "truth": {
+        "target": ("", "", "name of the target; null for the ownship"),
+        "lat_deg": ("deg", _WGS84, "latitude"),
+        "lon_deg": ("deg", _WGS84, "longitude"),
+        "alt_m": ("m", _WGS84, "height above the ellipsoid"),
+        "velocity_north_m_s": ("m/s", _OWN_NED, "velocity over ground, north"),
+        "velocity_east_m_s": ("m/s", _OWN_NED, "east"),
+        "velocity_down_m_s": ("m/s", _OWN_NED, "down"),
+        "heading_rad": ("rad", _TURNED, "where the nose points, from north"),
+        "pitch_rad": ("rad", _TURNED, "pitch, nose up"),
+        "roll_rad": ("rad", _TURNED, "roll, right wing down"),
+    },
+    "looks": {
+        "scan": ("", "", "number of the scan"),
+        "target": ("", "", "name of the target"),
+        "evaluated": ("", "", "whether its physics was evaluated: all else is null without"),
+        "detected": ("", "", "whether it was detected"),
+        **_TRUE,
+        "snr_db": ("dB", "", "signal-to-noise ratio of a radar"),
+        "detection_probability": ("", "", "probability with which the detection was drawn"),
+        "pixels": ("pixels", "", "pixels that the target covers in a camera"),
+    },
     "alerts": {
         "target": ("", "", "name of the target"),
         "level": ("", "", "alert level, 0 without an alert"),
@@ -177,4 +205,9 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "queue_length": ("messages", "", "messages that waited behind it at its outcome"),
         "outcome": ("", "", "whether it was done, dropped or skipped"),
     },
+}
+
+#: The same with what every table begins with: metadata of the recorded tables.
+DESCRIBED: Mapping[str, Mapping[str, Column]] = {
+    table: {**LEADING, **columns} for table, columns in COLUMNS.items()
 }

@@ -133,8 +133,7 @@ class Sweep:
     ) -> dict[str, FloatArray] | None:
         """Return the believed pose at each entry's own instant, with the error of its scan."""
         believed = detections.pose_columns()
-        nobody = not len(targets.roster) or not len(row)
-        if not believed or targets.revisit is None or nobody:
+        if not believed or targets.revisit is None or not len(targets.roster):
             return None
         if len(row) == 0:  # flights need not answer for no instant at all
             return believed

@@ -58,6 +58,12 @@ class ClutterParameters(SensorParameters):
         "instabilities, dB (assumption).",
     )
 
+    range_rate_folds: bool = Field(
+        default=False,
+        description="Whether measured range rates are ambiguous, as those of one PRF are: what is "
+        "beyond the unambiguous velocity, wavelength * prf_hz / 4, folds back within.",
+    )
+
     @model_validator(mode="after")
     def _one_threshold(self) -> Self:
         if self.cfar_reference_cells is not None and self.clutter_threshold == "noise":
@@ -70,6 +76,14 @@ class ClutterParameters(SensorParameters):
     @model_validator(mode="after")
     def _filter(self) -> Self:
         kind = self.moving_target_filter
+        if self.range_rate_folds:
+            for key in ("measures_range_rate", "prf_hz"):
+                if not getattr(self, key, None):
+                    said = "is false" if key == "measures_range_rate" else "is not given"
+                    raise ValueError(
+                        f"range_rate_folds is true and {key} {said}: the unambiguous velocity "
+                        "follows from prf_hz, and what folds is the measured range rate"
+                    )
         if kind != "none" and getattr(self, "prf_hz", None) is None:
             raise ValueError(
                 f"moving_target_filter is {kind!r} and prf_hz is not given: blind speeds and the "

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.geometry.attitude import aspect_angles, unit_vector
 from components.radar.rcs_effects import RcsFluctuation
-from components.radar.scatterers import Scatterers
+from components.radar.scatterers import CHANGING, FIXED, Scatterers
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
@@ -95,7 +95,12 @@ class LastingFluctuation(Effect):
         process = None if lasts_s is None else GaussMarkov(block.stream("fading"), lasts_s)
         scatterers = None
         if extent_m is not None:
-            scatterers = Scatterers(block.stream("scatterers"), extent_m, block.budget.wavelength)
+            scatterers = Scatterers(
+                block.stream("scatterers"),
+                extent_m,
+                block.budget.wavelength,
+                FIXED if process is None else CHANGING,
+            )
         ticks_per_s = block.context.ticks_per_s
 
         def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:

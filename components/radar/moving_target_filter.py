@@ -251,6 +251,7 @@ def folded_range_rate(range_rate_m_s: ArrayLike, unambiguous_m_s: ArrayLike) -> 
     Parameters
     ----------
     range_rate_m_s : array_like
+        NaN stays NaN.
     unambiguous_m_s : array_like
         λ·PRF/4, above 0.
 
@@ -267,6 +268,6 @@ def folded_range_rate(range_rate_m_s: ArrayLike, unambiguous_m_s: ArrayLike) -> 
     limit = as_numbers("unambiguous_m_s", unambiguous_m_s)
     refuse("unambiguous_m_s", limit, ~(limit > 0.0), "be above 0")
     shape, (rate, limit) = broadcast_flat(
-        range_rate_m_s=finite("range_rate_m_s", range_rate_m_s), unambiguous_m_s=limit
+        range_rate_m_s=as_numbers("range_rate_m_s", range_rate_m_s), unambiguous_m_s=limit
     )
     return unflatten(np.mod(rate + limit, 2.0 * limit) - limit, shape)

@@ -1,6 +1,6 @@
 """The base class of radar blocks: it measures range, and effects act on its echoes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
+from components.radar.moving_target_filter import folded_range_rate
 from components.radar.range_rate import LASTS_S
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
@@ -27,6 +28,8 @@ class Radar(Sensor):
 
     mark = RADAR
     measures_range = True
+    #: Of the carrier, m; None where it is not known.
+    wavelength_m: float | None = None
     hooks = {
         "SNR": "(cells) -> factor of each cell's SNR",
         "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
@@ -78,6 +81,18 @@ class Radar(Sensor):
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return self._rates[0](cells, found) if self._rates else None
+
+    def _in_body(
+        self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return what is measured, range rates as one PRF takes them where they fold."""
+        azimuth, elevation, range_m, beside = super()._in_body(values, variances)
+        if self.p.range_rate_folds and "range_rate_m_s" in beside:
+            assert self.wavelength_m is not None
+            limit_m_s = 0.25 * self.wavelength_m * self.p.prf_hz
+            folded = folded_range_rate(beside["range_rate_m_s"], limit_m_s)
+            beside = {**beside, "range_rate_m_s": folded}
+        return azimuth, elevation, range_m, beside
 
     def noise_range_rate(self, uniform: FloatArray) -> FloatArray:
         """Return range rates that noise alone gives: any that is unambiguous, m/s.

@@ -51,21 +51,24 @@ class RangeBoundaryParameters(RadarParameters):
     )
 
     frequency_hz: float | None = Field(
-        default=None, gt=0, description="Carrier, Hz; used with a moving_target_filter only."
+        default=None,
+        gt=0,
+        description="Carrier, Hz; for a moving_target_filter and range_rate_folds.",
     )
     prf_hz: float | None = Field(
         default=None,
         gt=0,
-        description="Pulse repetition frequency, Hz; used with a moving_target_filter only.",
+        description="Pulse repetition frequency, Hz; as frequency_hz.",
     )
 
     @model_validator(mode="after")
     def _carrier(self) -> Self:
-        if self.moving_target_filter != "none" and self.frequency_hz is None:
-            raise ValueError(
-                f"moving_target_filter is {self.moving_target_filter!r} and frequency_hz is not "
-                "given: blind speeds and the width of the notch follow from it"
-            )
+        for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
+            if getattr(self, key) != off and self.frequency_hz is None:
+                raise ValueError(
+                    f"{key} is {getattr(self, key)!r} and frequency_hz is not given: blind speeds "
+                    "and the unambiguous velocity follow from it"
+                )
         if self.prf_hz is not None and self.range_km * 1000.0 > unambiguous_range_m(self.prf_hz):
             raise ValueError(
                 f"prf_hz is {self.prf_hz:g}: echoes are unambiguous up to "

@@ -11,8 +11,11 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.time.randomness import Stream
 
-#: Scatterers of an echo. Their strengths are Gaussian, so its power is exponential for any number.
-COUNT = 16
+#: Scatterers of an echo whose strengths are fixed, and of one whose strengths change with time.
+#: Gaussian strengths make the power exponential for any number, over targets; over all aspects of
+#: one target it has that target's own mean, which varies by 1 / sqrt(number) (0.6 dB), unless
+#: strengths change.
+FIXED, CHANGING = 48, 8
 
 
 class Scatterers:
@@ -25,11 +28,13 @@ class Scatterers:
     extent_m : float
         Diameter of the ball.
     wavelength_m : float
+    count : int
+        Scatterers of an echo.
 
     Notes
     -----
     An echo that goes to a scatterer at r and back has the phase 4π r·u / λ for the direction u to
-    the radar. The sum of COUNT of them with complex Gaussian strengths is a complex Gaussian
+    the radar. The sum of many with complex Gaussian strengths is a complex Gaussian
     amplitude; over targets its correlation between two aspects Δ apart is that of the ball,
     3 (sin x - x cos x) / x³ with x = 2π Δ extent / λ: half of it is left at Δ = 0.40 λ / extent,
     nothing at 0.72 λ / extent. For the usual estimate λ / (2 extent): D. K. Barton, *Modern Radar
@@ -37,8 +42,10 @@ class Scatterers:
     section 2.8.
     """
 
-    def __init__(self, stream: Stream, extent_m: float, wavelength_m: float) -> None:
-        self._stream = stream
+    def __init__(
+        self, stream: Stream, extent_m: float, wavelength_m: float, count: int = FIXED
+    ) -> None:
+        self._stream, self._count = stream, count
         self._reach = 2.0 * math.pi * extent_m / wavelength_m
 
     def echo(
@@ -68,7 +75,7 @@ class Scatterers:
         """
         targets, of_target = np.unique(keys, return_inverse=True)
         real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
-        for number in range(which * COUNT, (which + 1) * COUNT):
+        for number in range(which * self._count, (which + 1) * self._count):
             numbers = np.full(len(targets), number, dtype=np.int64)
             place = self._places(targets, numbers)
             # One after the other, so that an element's sum has one order in any array.
@@ -83,7 +90,8 @@ class Scatterers:
             cosine, sine = np.cos(phase), np.sin(phase)
             real += a * cosine - b * sine
             imaginary += a * sine + b * cosine
-        return real / math.sqrt(COUNT), imaginary / math.sqrt(COUNT)
+        scale = 1.0 / math.sqrt(self._count)
+        return scale * real, scale * imaginary
 
     def _places(self, targets: Any, numbers: IntArray) -> list[FloatArray]:
         """Return where a scatterer is along each axis, as phase per unit of aspect."""

@@ -199,7 +199,12 @@ def _mean_squares(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
 
 
 def _stated(p: Any, name: str) -> StatedError:
-    """Return what the scene states of a quantity, in radians, metres and m/s."""
+    """Return what the scene states of a quantity, in radians, metres and m/s.
+
+    Nothing of a quantity for which a user's sensor has no such parameters.
+    """
+    if name not in p.quantities:
+        return StatedError(0.0, 0.0, None)
     stated: StatedError = p.stated_error(name)
     if p.quantities[name] != "deg":
         return stated

@@ -15,6 +15,7 @@ import numpy as np
 
 from components.messages.constant_columns import constant_column
 from components.messages.detections import Detections, SensorOffer
+from components.messages.every_look import EveryLook, looks_of
 from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
@@ -28,7 +29,7 @@ from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
@@ -63,6 +64,7 @@ class Sensor(Component):
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
+    also_records = (EveryLook,)
     windowed = True
     rewindable = True
     #: Whether detections carry a range.
@@ -136,6 +138,16 @@ class Sensor(Component):
         return message
 
     @cached_property
+    def _says_looks(self) -> bool:
+        """Whether the scene asks for every look."""
+        record = self.context.sections.get("record")
+        return bool(record is not None and record.looks)
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: every look too, where the scene asks for it."""
+        return [self._message, EveryLook] if self._says_looks else [self._message]
+
+    @cached_property
     def _judgements(self) -> list[Any]:
         return self.built("declaration")
 
@@ -159,7 +171,9 @@ class Sensor(Component):
         raise TypeError(f"{type(self).__name__} has no look(cells)")
 
     def run(self, wake: Wake) -> Detections | None:
-        """Look at every target in reach at every scan of the wake."""
+        """Look at every target in reach at every scan of the wake; nothing where switched off."""
+        if not self.p.enabled:
+            return None
         held = wake.held("targets")
         if held is None:
             return None
@@ -203,6 +217,7 @@ class Sensor(Component):
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
+            looks=looks_of(cells, look, len(wake)) if self._says_looks else None,
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from components.messages.known_flights import Flights, KnownFlights
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
+from components.messages.true_states import TrueStates
 from components.traffic.censored import censored_approaches, present_together_s
 from components.traffic.closest_approach import (
     Approaches,
@@ -30,6 +31,7 @@ from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain, check_on_raster
+from components.traffic.true_flights import TrueFlights, truth_is_recorded
 from components.traffic.wind import Wind, scene_wind
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters, PositiveRational
@@ -106,6 +108,7 @@ class TrafficSource(Component):
     fleet: Fleet
     targets: Sequence[Trajectory]
     roster: Roster
+    also_records = (TrueStates,)
     _offered: KnownTraffic | None = None
 
     @property
@@ -166,6 +169,8 @@ class TrafficSource(Component):
         if self.context.producers:
             self.own = SteeredFlight(self.own)
         self._flights_now: Flights = partial(self.flights, self.own)
+        self._says_truth = truth_is_recorded(self.context, len(self.roster))
+        self._truth_now = self._true_flights()
         #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
         self._told: list[tuple[int, Manoeuvre]] = []
 
@@ -201,7 +206,7 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        flights = self._steer(wake)
+        flights, truth = self._steer(wake)
         time_s = wake.time_s
         columns, fleet, near = self._all_columns, self.fleet, None
         if self._steered_culling is not None:
@@ -239,7 +244,13 @@ class TrafficSource(Component):
             columns=columns,
             culled=culled,
             flights=flights,
+            true_flights=truth,
+            run_time_s=None if truth is None else time_s,
         )
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: the truth where a scene is small, or asks for it."""
+        return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
 
     def flights(
         self,
@@ -280,14 +291,15 @@ class TrafficSource(Component):
             others = crabbing.of_targets(columns, others, time_s)
         return seen, others
 
-    def _steer(self, wake: Wake) -> KnownFlights | None:
+    def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
         """Steer the ownship at the times at which manoeuvres have come.
 
         Returns
         -------
-        KnownFlights or None
-            The flights as they are known at each row, where a block asks for them: a row knows
-            the manoeuvres that have come by its own instant, whatever came later in this wake.
+        flights, truth : KnownFlights or None
+            The flights as they are known at each row, where a block asks for them and where the
+            truth is recorded: a row knows the manoeuvres that have come by its own instant,
+            whatever came later in this wake.
         """
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
@@ -297,17 +309,26 @@ class TrafficSource(Component):
         # must not depend on how far a window reached beyond it.
         told = [one for one in self._told if one[0] <= last]
         self._told = self._told[len(told) :]
-        known = [self._flights_now]
+        known, true = [self._flights_now], [self._truth_now]
         for tick, manoeuvre in told:
             assert isinstance(self.own, SteeredFlight)
             self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
             known.append(partial(self.flights, self.own))
-        self._flights_now = known[-1]
-        if not self._flights_asked_for:
-            return None
+            true.append(self._true_flights())
+        self._flights_now, self._truth_now = known[-1], true[-1]
+        if not self._flights_asked_for and self._truth_now is None:
+            return None, None
         # A manoeuvre has come before anything runs at its instant.
         came = np.array([tick for tick, _ in told], dtype=np.int64)
-        return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
+        of_row = np.searchsorted(came, wake.ticks, side="right")
+        return (
+            KnownFlights(known, of_row) if self._flights_asked_for else None,
+            None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
+        )
+
+    def _true_flights(self) -> TrueFlights | None:
+        """Return all flights as they are known now, if the truth is recorded."""
+        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""

@@ -113,8 +113,8 @@ FAULTS = [
         ("rain-outweighs-the-scene-s-visibility",
          "if weather.visibility_km is not None:\n        return",
          "if weather.visibility_km is not None and weather.rain_rate_mm_h == 0:\n        return"),
-        ("fog-visibility-by-rain", "fog_visibility_m(weather.fog_water_g_m3)",
-         "rain_visibility_m(weather.fog_water_g_m3)"),
+        ("fog-visibility-by-rain", "parts.append(fog_visibility_m(weather.fog_water_g_m3))",
+         "parts.append(rain_visibility_m(weather.fog_water_g_m3))"),
     ),
     *in_file(
         _GROUP, "components/optical/dynamic_signature.py", "wiring/test_camera_signature.py",
@@ -214,6 +214,8 @@ FAULTS = [
         ("scan-rate-never-checked", "if available_s * (1.0 + 1e-9) < least_s:", "if False:"),
         ("unambiguous-twice-as-far", "highest_hz = 1.0 / round_trip_s",
          "highest_hz = 2.0 / round_trip_s"),
+        ("filters-of-pulses-that-are-not-there", "known is not None and known < needed",
+         "known is not None and known < 0"),
         ("gain-of-pulses-that-are-not-there", "most_db = 10.0 * math", "most_db = 20.0 * math"),
     ),
     *in_file(
@@ -418,8 +420,8 @@ FAULTS = [
         ("east-for-north",
          "offsets.append((craft.east_m or 0.0, craft.north_m or 0.0, craft.up_m or 0.0))",
          "offsets.append((craft.north_m or 0.0, craft.east_m or 0.0, craft.up_m or 0.0))"),
-        ("speed-is-climb", '"speed_mps": flight.speed_mps,',
-         '"speed_mps": flight.speed_mps + flight.climb_mps,'),
+        ("speed-is-climb", "        return flight.speed_mps",
+         "        return flight.speed_mps + flight.climb_mps"),
     ),
     *in_file(
         _GROUP, "components/traffic/leg_builder.py",

@@ -81,8 +81,20 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
         dice.maybe(table, "range_bias_m", 0.5, 125)
         if "range_error_m" in table:
             dice.maybe(table, "range_correlation_time_s", 0.5, 0.1, 30)
+    dice.maybe(table, "resolution_cells", 0.2, True, False)
+    dice.maybe(table, "clutter_threshold", 0.15, "noise")
+    dice.maybe(table, "cfar_reference_cells", 0.15, 6, 24)
+    if dice.chance(0.2, "moving target filter"):
+        table["moving_target_filter"] = dice.pick(
+            "single_canceller", "double_canceller", "filter_bank"
+        )
+        table["prf_hz"] = dice.pick(900, 5000)
+        dice.maybe(table, "clutter_lock", 0.3, False)
+        dice.maybe(table, "range_rate_folds", 0.3, "measures_range_rate" in table)
     if table["type"] == "radar.range_boundary":
         table["range_km"] = dice.pick(1, 5, 15)
+        if "moving_target_filter" in table:
+            table["frequency_hz"] = 9.4e9
         return
     dice.maybe(table, "range_km", 0.5, 1, 5, 15)
     table |= _OASYS
@@ -234,6 +246,7 @@ def sections(dice: Dice) -> dict[str, Any]:
         found["terrain"] = {"height_m": dice.pick(-10, 50)}
         dice.maybe(found["terrain"], "clutter_gamma_db", 0.5, -20, 0, 20)
         dice.maybe(found["terrain"], "clutter_mean", 0.5, "constant", "fluctuating")
+        dice.maybe(found["terrain"], "clutter_motion_m_s", 0.3, 0.4)
     if dice.chance(0.2, "what the Earth hides"):
         terrain = found.setdefault("terrain", {})
         dice.maybe(terrain, "horizon", 0.8, True)

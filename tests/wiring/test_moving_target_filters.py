@@ -265,7 +265,33 @@ def test_neither_windows_nor_lock_step_change_a_bit(radar):
         assert mine.to_pylist() == whole[seed].to_pylist()
 
 
+@covers("range_rate_folds", of=RADARS)
+@pytest.mark.parametrize("prf_hz", [1500.0, 6000.0])
+@pytest.mark.parametrize("radar", RADARS)
+def test_range_rates_of_one_prf_fold_at_the_unambiguous_velocity(radar, prf_hz):
+    """Within ±λ PRF / 4, whole blind speeds away from the truth; false alarms as well."""
+    blind_m_s = 0.5 * WAVELENGTH_M * prf_hz
+    keys = {"measures_range_rate": True, "prf_hz": prf_hz, "frequency_hz": FREQUENCY_HZ}
+    if radar != "radar.range_boundary":
+        keys |= {"false_alarms": True, "false_alarm_probability": 1e-4, "range_km": 4.0}
+    found = rows(run(chain({"r": sensor(radar, **CELL, **keys, range_rate_folds=True)})))
+    assert len([row for row in found if row["target"]]) == 2
+    for row in found:
+        assert abs(row["range_rate_m_s"]) <= 0.5 * blind_m_s * (1.0 + 1e-12)
+        if row["target"]:
+            off = row["range_rate_m_s"] - range_rate(TARGETS[row["target"]], row["time_s"])
+            assert math.remainder(off, blind_m_s) == pytest.approx(0.0, abs=1e-3)
+    if prf_hz == 1500.0:
+        truth = [range_rate(target, 0.0) for target in crooked.TARGETS]
+        assert any(abs(rate) > 0.5 * blind_m_s for rate in truth)
+
+
 BAD = [
+    ("radar.threshold", {"range_rate_folds": True, "prf_hz": 1e3}, "measures_range_rate is false"),
+    ("radar.swerling", {"range_rate_folds": True, "measures_range_rate": True},
+     "prf_hz is not given"),
+    ("radar.range_boundary", {"range_rate_folds": True, "measures_range_rate": True,
+                              "prf_hz": 1e3}, "frequency_hz is not given"),
     ("radar.swerling", {"moving_target_filter": "triple", "prf_hz": 1e3}, "single_canceller"),
     ("radar.swerling", {"moving_target_filter": "single_canceller"}, "prf_hz is not given"),
     ("radar.range_boundary", {"moving_target_filter": "single_canceller", "prf_hz": 1e3},

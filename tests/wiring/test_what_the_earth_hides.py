@@ -121,6 +121,10 @@ def test_a_ridge_hides_what_is_behind_it(offset_m, tmp_path):
     assert expected == {"at 2", "at 6"}
     assert {row["target"] for row in rows(done)} == expected
     assert rows(done, "scans")[0]["skipped_hidden"] == 2
+    # Beside another tile it is the same; resolved scenes name both files.
+    both = {**terrain, "raster": [terrain["raster"], wall(tmp_path, 0, "S42E179.hgt")]}
+    scene = chain({"radar": RADAR}, ownship=own, targets=targets, terrain=both)
+    assert {row["target"] for row in rows(run(scene))} == expected
     lower = {**terrain, "raster": wall(tmp_path, crest - 20, "S42W180_low.hgt")}
     free = run(chain({"radar": RADAR}, ownship=own, targets=targets, terrain=lower))
     assert len(rows(free)) == 4

@@ -80,13 +80,14 @@ loss then bring it nearer, if its grid has cells that can hold ground.
 
 ## Doppler
 
-`moving_target_filter` (with `prf_hz`) adds up successive pulses so that what moves like the
-ground goes: `single_canceller`, `double_canceller`, or a `filter_bank` of `filter_pulses` pulses
-whose filters near the ground are not used (`notch_m_s`). The notch follows the range rate of the
-ground in the beam (`clutter_lock`), as the ownship flies over it: a target is lost when its *own*
-velocity over ground has no part along the line of sight, and at the blind speeds, multiples of
-λ·PRF/2. Range rates count modulo that; the largest that is unambiguous is λ·PRF/4. What is left
-of the clutter follows from its spread: the beam's width across the ownship's course (0.3 · speed ·
+`moving_target_filter` (with `prf_hz`) adds up successive pulses so that what moves like the ground
+goes: `single_canceller`, `double_canceller`, or a `filter_bank` of `filter_pulses` pulses whose
+filters near the ground are not used (`notch_m_s`). The notch follows the range rate of the ground
+in the beam (`clutter_lock`), as the ownship flies over it: a target is lost when its *own* velocity
+over ground has no part along the line of sight, and at the blind speeds, multiples of λ·PRF/2.
+Measured range rates are the true ones, as if ambiguities were resolved by several PRF; with
+`range_rate_folds = true` they fold at the unambiguous velocity, λ·PRF/4. What is left of the
+clutter follows from its spread: the beam's width across the ownship's course (0.3 · speed ·
 beamwidth · sin), the ground's own motion (`[terrain] clutter_motion_m_s`), and
 `improvement_limit_db`. Cancellers keep the SNR of targets of all speeds on average, and gain for
 some; a bank loses {bank_loss:.1f} dB on average by its window and between its filters.
