@@ -24,7 +24,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/traffic/wind_effect.py", "wiring/test_wind.py",
-        ("fixed-yaw-turns-into-the-wind", "np.where(keep[0], np.nan, speed)", "speed"),
+        ("pitch-by-a-fixed-yaw-for-track", "np.where(keep[0], np.nan, speed)", "speed"),
     ),
     *in_file(
         _GROUP, "components/optical/weather_effects.py", _BANDS,
