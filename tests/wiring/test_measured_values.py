@@ -34,7 +34,14 @@ def test_however_large_errors_are_values_stay_what_they_can_be(kind, quantised):
     assert (azimuth > -math.pi).all() and (azimuth <= math.pi).all() and azimuth.std() > 1.0
     assert (np.abs(elevation) <= 0.5 * math.pi).all() and elevation.std() > 0.5
     if radar:
-        assert (range_m >= (90.0 if quantised else 1e-3)).all() and range_m.std() > 500.0
+        nearest = 90.0 if quantised else 1e-3
+        assert (range_m >= nearest).all() and (range_m == nearest).mean() < 0.1
+
+
+@pytest.mark.parametrize("kind", RADARS)
+def test_nothing_is_reported_at_range_0(kind):
+    ranges = columns(kind, "range_m", range_resolution_m=6000.0)
+    assert ranges[0].tolist() == [6000.0, 6000.0]
 
 
 @pytest.mark.parametrize("kind", RADARS)
@@ -43,7 +50,7 @@ def test_errors_near_astern_and_overhead_go_the_short_way(kind):
     place = {"speed_mps": 70.0, "heading_deg": 217.0, "yaw_deg": 217.0, "climb_mps": 3.0}
     targets = [
         {"name": "astern", "east_m": 1805.4, "north_m": 2395.9, "up_m": 0.0, **place},
-        {"name": "above", "east_m": 3.0, "north_m": 2.0, "up_m": 3000.0, **place},
+        {"name": "above", "east_m": 12.0, "north_m": 10.0, "up_m": 3000.0, **place},
     ]
     ownship = {**crooked.OWNSHIP, "yaw_deg": 217.0, "pitch_deg": 0.0, "roll_deg": 0.0}
     keys = {"errors": "stated", "azimuth_error_deg": 0.5, "elevation_error_deg": 0.5}
