@@ -47,7 +47,7 @@ class RecordedTables:
         if "truth" not in self.tables:
             raise UsageError(
                 f"{self.folder}: has no truth.parquet, which holds the flights: it is recorded "
-                "where it is small; ask for it with [record] truth = true"
+                "where it is small; ask for it with truth = true under [record]"
             )
         truth = self.tables["truth"]
         names = truth["target"].to_pylist()
