@@ -85,7 +85,7 @@ class SensorGrid:
 
     @cached_property
     def _range_grid(self) -> Grid:
-        # Nothing is reported at range 0, where no direction means anything.
+        # Nothing is at range 0, however near it comes: the first step is the nearest report.
         return _grid(self._range_step or 0.0, limit_low=self._range_step or _NEAREST_M)
 
     @cached_property
