@@ -5,7 +5,12 @@ Beside the messages' ``recorded``, which has the types; a test sees that none is
 
 from collections.abc import Mapping
 
-from components.messages.state_tracks import COVARIANCE
+#: Column of every element of the covariance's upper triangle, row by row.
+COVARIANCE = {
+    (i, j): f"covariance_{i}{j}_m2{('', '_s', '_s2')[(i > 2) + (j > 2)]}"
+    for i in range(6)
+    for j in range(i, 6)
+}
 
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
@@ -200,4 +205,9 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "queue_length": ("messages", "", "messages that waited behind it at its outcome"),
         "outcome": ("", "", "whether it was done, dropped or skipped"),
     },
+}
+
+#: The same with what every table begins with: metadata of the recorded tables.
+DESCRIBED: Mapping[str, Mapping[str, Column]] = {
+    table: {**LEADING, **columns} for table, columns in COLUMNS.items()
 }

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.messages.columns import DESCRIBED
 from components.messages.constant_columns import not_measured
 from components.messages.every_look import look_columns
 from components.messages.looks import Looks
@@ -169,6 +170,7 @@ class Detections(Message):
     """
 
     row_table = "scans"
+    described = DESCRIBED
     entry_table = "detections"
 
     scan: IntArray = per_row(column="int64", in_entries=True)
@@ -267,6 +269,7 @@ class FusedDetections(Message):
         Those with range first, each group by name.
     """
 
+    described = DESCRIBED
     entry_table = "fused"
 
     offsets: IntArray
@@ -336,6 +339,7 @@ class Tracks(Message):
         Whether it came at this row's instant; others were held. By default what has no age.
     """
 
+    described = DESCRIBED
     entry_table = "tracks"
 
     offsets: IntArray

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.message import Message
 from dsa_des.block.recorded_columns import Columns, Text
@@ -25,6 +26,7 @@ _NUMBERS = (
 class EveryLook(Message):
     """What a sensor records where looks are asked for; it goes over no wire."""
 
+    described = DESCRIBED
     recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "looks": {
             "scan": "int64",

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from components.messages.columns import COVARIANCE, DESCRIBED
 from components.messages.detections import combination_text
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, static
@@ -15,12 +16,6 @@ STATUSES = ("tentative", "confirmed", "coasted", "deleted")
 TENTATIVE, CONFIRMED, COASTED, DELETED = range(4)
 
 
-#: Column of every element of the covariance's upper triangle, row by row.
-COVARIANCE = {
-    (i, j): f"covariance_{i}{j}_m2{('', '_s', '_s2')[(i > 2) + (j > 2)]}"
-    for i in range(6)
-    for j in range(i, 6)
-}
 #: What some models have besides.
 EXTRAS = {
     "acceleration_north_m_s2": "float64",
@@ -70,6 +65,7 @@ class StateTracks(Message):
     sensors : tuple of str
     """
 
+    described = DESCRIBED
     entry_table = "state_tracks"
 
     offsets: IntArray

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
+from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message
 from dsa_des.block.recorded_columns import Columns, Text
@@ -27,6 +28,7 @@ _NUMBERS = (*_PLACE, *_VELOCITY, *_TURNED.values())
 class TrueStates(Message):
     """What a traffic block records where the truth is asked for; it goes over no wire."""
 
+    described = DESCRIBED
     recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "truth": {"target": "text", **dict.fromkeys(_NUMBERS, "float64")}
     }

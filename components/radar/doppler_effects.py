@@ -63,6 +63,8 @@ class DopplerProcessing:
         -------
         (target, ground) : arrays (cells,)
         """
+        if len(cells) == 0:
+            return np.empty(0), np.empty(0)
         range_rate_m_s, velocity_m_s = motion_of_cells(cells)
         ground_m_s = -self._along_ground(cells, velocity_m_s)
         speed_m_s = np.sqrt(sum(part * part for part in velocity_m_s))

@@ -37,7 +37,7 @@ def run_picture(folder: Path) -> Picture:
     tables = {name: _table(folder / f"{name}.parquet") for name in ("detections", "scans")}
     if tables["scans"] is None or tables["detections"] is None:
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
-    for name in ("truth", "fused", "tracks", "alerts", "manoeuvres"):
+    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres"):
         tables[name] = _table(folder / f"{name}.parquet")
     found: dict[str, Table] = {name: table for name, table in tables.items() if table is not None}
     detections = found["detections"]
@@ -78,6 +78,8 @@ def run_picture(folder: Path) -> Picture:
                 **_seen(table, _pose_at(own, table["time_s"]), plane),
                 **({"age_s": table["age_s"]} if "age_s" in table else {}),
             }
+    if "state_tracks" in found:
+        picture.tables["tracks"] = _estimates(found["state_tracks"], own, plane)
     if "alerts" in found:
         table = found["alerts"]
         picture.tables["alerts"] = {
@@ -233,6 +235,47 @@ def _truth(truth: Table, plane: Plane, targets: Mapping[str, int]) -> dict[str, 
         "east_m": east,
         "north_m": north,
         "alt_m": place[2],
+    }
+
+
+def _estimates(table: Table, own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyArray]:
+    """Return estimated states of tracks that live; their frames are turned like the plane."""
+    keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
+
+    def column(name: str) -> FloatArray:
+        return np.asarray(table[name], dtype=float)[keep]
+
+    time_s = column("time_s")
+    ends = np.full((3, len(keep)), np.nan)
+    known = np.isfinite(column("north_m"))
+    if known.any():
+        ends[:, known] = enu_to_geodetic(
+            column("east_m")[known],
+            column("north_m")[known],
+            -column("down_m")[known],
+            reference_lat_deg=column("origin_lat_deg")[known],
+            reference_lon_deg=column("origin_lon_deg")[known],
+            reference_alt_m=column("origin_alt_m")[known],
+        )
+    east, north = plane.east_north_m(*ends)
+    pose = _pose_at(own, time_s)
+    from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))
+    statuses = [table["track_status"][place] for place in keep.tolist()]
+    return {
+        "time_s": time_s,
+        "number": np.asarray(table["track"])[keep],
+        "tentative": np.array([status == "tentative" for status in statuses], dtype=bool),
+        "from_east_m": from_east,
+        "from_north_m": from_north,
+        "bearing_rad": column("azimuth_rad"),
+        "east_m": east,
+        "north_m": north,
+        "alt_m": ends[2],
+        "east_mps": column("east_m_s"),
+        "north_mps": column("north_m_s"),
+        "variance_north_m2": column("covariance_00_m2"),
+        "covariance_m2": column("covariance_01_m2"),
+        "variance_east_m2": column("covariance_11_m2"),
     }
 
 

@@ -286,6 +286,14 @@ def test_range_rates_of_one_prf_fold_at_the_unambiguous_velocity(radar, prf_hz):
         assert any(abs(rate) > 0.5 * blind_m_s for rate in truth)
 
 
+@pytest.mark.parametrize("radar", RADARS)
+def test_a_look_at_nothing_has_nothing_to_filter(radar):
+    far = [{**crooked.ROLLING, "north_m": -90_000.0}]
+    keys = {"moving_target_filter": "single_canceller", "prf_hz": PRF_HZ, "range_km": 3.0,
+            "frequency_hz": FREQUENCY_HZ}  # fmt: skip
+    assert not rows(run(chain({"r": sensor(radar, **CELL, **keys)}, targets=far)))
+
+
 BAD = [
     ("radar.threshold", {"range_rate_folds": True, "prf_hz": 1e3}, "measures_range_rate is false"),
     ("radar.swerling", {"range_rate_folds": True, "measures_range_rate": True},

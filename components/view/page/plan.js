@@ -149,6 +149,7 @@ const Plan = (() => {
       }
       const [x, y] = place(k.east_m[i], k.north_m[i]);
       if (!inside(x, y)) continue;
+      if (k.tentative && k.tentative[i]) c.setLineDash([3, 3]);
       Symbols.mark(c, "D", x, y, 8, Symbols.colours.track, false);
       if (k.variance_east_m2) {
         ellipse(c, x, y, { xx: k.variance_east_m2[i], yy: k.variance_north_m2[i],
@@ -158,6 +159,7 @@ const Plan = (() => {
         const [u, v] = place(k.east_m[i] + 10 * k.east_mps[i], k.north_m[i] + 10 * k.north_mps[i]);
         c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
       }
+      c.setLineDash([]);
       Symbols.text(c, label, x + 10, y - 6, Symbols.colours.track);
     }
   }
