@@ -9,6 +9,9 @@ import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
 from wired import alone, chain, rows, run, sensor
 
+from components.radar.parameters import RadarParameters
+from components.radar.radar_block import Radar
+from components.sensor.look import Look
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
 
@@ -118,6 +121,35 @@ def test_range_rate_begins_and_ends_with_a_flight():
     assert [row["scan"] for row in found] == [2, 3, 4, 5, 6, 7, 8]
     rates = np.array([row["range_rate_m_s"] for row in found])
     np.testing.assert_allclose(np.diff(rates), np.diff(rates).mean(), rtol=0.1)
+
+
+class PlainRadar(Radar):
+    """A radar of somebody who has not heard of range rates."""
+
+    Parameters = RadarParameters
+
+    def look(self, cells):
+        everything = np.ones(len(cells))
+        return Look(everything > 0.0, everything)
+
+
+def test_a_radar_of_one_s_own_measures_range_rates_too(monkeypatch):
+    monkeypatch.setattr(looks, "PlainRadar", PlainRadar, raising=False)
+    block = {"type": "looks:PlainRadar", "scan_rate_hz": 1, "measures_range_rate": True}
+    block |= {"errors": "stated", "range_rate_error_m_s": 1e-9}
+    own, ours = (
+        run(chain({"sensor": keys}))["detections"]["range_rate_m_s"].to_numpy()
+        for keys in (block, sensor("radar.threshold", measures_range_rate=True))
+    )
+    np.testing.assert_allclose(own, ours, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_pulses_that_are_summed_make_errors_smaller(kind):
+    keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False}
+    names = "range_variance_m2", "azimuth_variance_rad2"
+    one, ten = (np.array(columns(kind, *names, **keys, pulses=pulses)) for pulses in (1, 10))
+    np.testing.assert_allclose(one / ten, 10.0, rtol=1e-9)
 
 
 @covers("range_rate_resolution_m_s", of=RADARS)
