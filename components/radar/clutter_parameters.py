@@ -89,6 +89,14 @@ class ClutterParameters(SensorParameters):
                 f"moving_target_filter is {kind!r} and prf_hz is not given: blind speeds and the "
                 "width of the notch follow from it"
             )
+        needed = {"single_canceller": 2, "double_canceller": 3, "filter_bank": self.filter_pulses}
+        look = getattr(self, "look_energy", None)
+        known = getattr(self, "stated_pulses", None) if look is None else look.pulses
+        if kind != "none" and known is not None and known < needed[kind]:
+            raise ValueError(
+                f"moving_target_filter is {kind!r}: it adds up {needed[kind]} pulses, and a look "
+                f"has {known}; lengthen the dwell, or take a filter of fewer pulses"
+            )
         if kind != "filter_bank" and self.notch_m_s is not None:
             raise ValueError(
                 f"notch_m_s is {self.notch_m_s:g} and moving_target_filter is {kind!r}: only a "

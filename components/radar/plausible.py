@@ -110,6 +110,23 @@ def many_false_alarms(parameters: Any, cells: int) -> list[str]:
     ]
 
 
+def noise_at_targets(parameters: Any) -> list[str]:
+    """Say that looks which noise decides are reported at the target's own place, where they are.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    """
+    steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
+    exact = [step for step in steps if getattr(parameters, step) == 0]
+    if parameters.errors != "grid" or not exact:
+        return []
+    return [
+        f"noise that is taken for a target: {exact[0]} is 0, so it is reported exactly where the "
+        "target is (thesis); a grid has the cell's place, errors = 'signal' any place in the cell"
+    ]
+
+
 def two_thresholds(parameters: Any) -> list[str]:
     """Say that false alarms and detections are counted at two thresholds, where they are.
 

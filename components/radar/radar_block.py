@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,13 +11,15 @@ from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
 from components.radar.moving_target_filter import folded_range_rate
-from components.radar.range_rate import LASTS_S
+from components.radar.range_rate import LASTS_S, RangeRate
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
 from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect
 
+_RANGE_RATE = RangeRate()
 CellFactor = Callable[[Cells], FloatArray]
 #: Of noise that looks like an aircraft: the range rate of two fast ones that meet.
 FASTEST_M_S = 500.0
@@ -37,6 +39,13 @@ class Radar(Sensor):
         "one report by cell": "(cells, power) -> power of the echo that stands for its "
         "resolution cell, 0 of the others",
     }
+
+    effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE,)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if _RANGE_RATE not in cls.effects:  # its key is one of every radar
+            cls.effects = (_RANGE_RATE, *cls.effects)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -66,6 +75,10 @@ class Radar(Sensor):
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)
         return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+
+    def exact_because(self) -> str:
+        """A rate divides the change of an error over hundredths of a second by these."""
+        return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
     def _rates(self) -> list[Any]:

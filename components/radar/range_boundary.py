@@ -16,7 +16,6 @@ from components.radar.plausible import clutter_as_signal
 from components.radar.radar_block import Radar
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
 from components.radar.range_effects import BlindRange
-from components.radar.range_rate import RangeRate
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_budget import unambiguous_range_m
@@ -102,7 +101,6 @@ class RangeBoundary(Radar):
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
     effects = (
-        RangeRate(),
         BlindRange(),
         BoundaryClutter(),
         DopplerFilter(),

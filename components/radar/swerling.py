@@ -13,6 +13,7 @@ from components.radar.detection import detection_probability, probability_of_cel
 from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.fading import Fading, LastingFluctuation
 from components.radar.parameters import LinkBudgetParameters
+from components.radar.plausible import noise_at_targets
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.signal_errors import heard
@@ -136,7 +137,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def left_out(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
-        said = super().left_out()
+        said = [*super().left_out(), *noise_at_targets(self.p)]
         return said if self.p.model is None else [*said, *picked_method(self, self._method)]
 
     def range_slack(self) -> float:

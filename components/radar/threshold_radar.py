@@ -28,7 +28,6 @@ from components.radar.plausible import (
 )
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
-from components.radar.range_rate import RangeRate
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
@@ -63,7 +62,6 @@ class LinkBudgetRadar(Radar):
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
-        RangeRate(),
         BlindRange(),
         GroundClutter(),
         DopplerFilter(),

@@ -16,7 +16,7 @@ import numpy as np
 from components.messages.constant_columns import constant_column
 from components.messages.detections import Detections, SensorOffer
 from components.messages.every_look import EveryLook, looks_of
-from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
+from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
 from components.sensor.believed_pose import believed_pose
@@ -188,7 +188,9 @@ class Sensor(Component):
             self._idle = None if len(cells) else look
         found = look.detected.nonzero()[0]
         culled = None if targets.culled is None else targets.culled[rows]
-        evaluated, skipped = _counted(reason, len(targets.roster), culled)
+        evaluated, skipped = _counted(
+            reason, len(targets.roster), culled, targets.hidden is not None
+        )
         if len(wake) == 1:
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
@@ -382,18 +384,23 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 
 def _counted(
-    reason: ReasonArray, on_roster: int, culled: IntArray | None
+    reason: ReasonArray, on_roster: int, culled: IntArray | None, hides: bool
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return how many targets were evaluated at each scan, and skipped by reason.
 
-    Which of the culled ones the arrays hold, as absent, depends on the window that they came in:
-    what is counted does not.
+    Only where something `hides` targets are hidden ones looked for. Which of the culled ones the
+    arrays hold, as absent, depends on the window that they came in: what is counted does not.
     """
     if len(reason) == 1:  # one pass instead of one for each reason
         count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
         of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
-        of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
+        of = {
+            code: _per_row(reason == code)
+            for code in (EVALUATE, *SKIP_REASONS.values())
+            if hides or code != HIDDEN
+        }
+        of.setdefault(HIDDEN, np.zeros(len(reason), dtype=np.int64))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = on_roster - reason.shape[1]
     if culled is None:

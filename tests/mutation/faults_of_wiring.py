@@ -24,7 +24,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/traffic/wind_effect.py", "wiring/test_wind.py",
-        ("fixed-yaw-turns-into-the-wind", "np.where(keep[0], np.nan, speed)", "speed"),
+        ("pitch-by-a-fixed-yaw-for-track", "np.where(keep[0], np.nan, speed)", "speed"),
     ),
     *in_file(
         _GROUP, "components/optical/weather_effects.py", _BANDS,
@@ -317,6 +317,19 @@ FAULTS = [
         ("flights-that-begin", "(_CENTRAL, _AHEAD, _BEHIND)", "(_CENTRAL,)"),
     ),
     *in_file(
+        _GROUP, "components/sensor/grid.py", "wiring/test_measured_values.py",
+        ("reports-at-range-0", "_grid(step, limit_low=step)", "_grid(step, limit_low=0.0)"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/grid.py", "wiring/test_variances_of_detections.py",
+        ("variance-of-a-whole-step", "return step**2 / 12.0", "return step**2"),
+    ),
+    *in_file(
+        _GROUP, "components/geometry/angle_variances.py", "wiring/test_variances_of_detections.py",
+        ("variances-not-turned", "sine2 * across + cosine2", "across + 0.0 * cosine2"),
+        ("azimuths-not-shortened", "np.cos(elevation_rad) ** 2 * azimuth", "1.0 * azimuth"),
+    ),
+    *in_file(
         _GROUP, "components/radar/signal_errors.py", "wiring/test_measured_values.py",
         ("errors-know-no-clutter", "snr if cnr is None else snr / (1.0 + cnr)", "snr"),
     ),
@@ -496,6 +509,5 @@ FAULTS = [
          "_grid(self._elevation_step, limit_low=low, limit_high=high)",
          "_grid(self._azimuth_step, limit_low=low, limit_high=high)"),
         ("range-not-on-its-grid", "self._range_grid.round(range_m)", "range_m"),
-        ("variance-of-a-whole-step", "return step**2 / 12.0", "return step**2"),
     ),
 ]  # fmt: skip

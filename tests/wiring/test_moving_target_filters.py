@@ -114,6 +114,24 @@ def test_an_echo_is_let_through_by_its_range_rate(radar, kind, lock):
         assert lost_db == pytest.approx(expected_db, abs=2e-3)
 
 
+def test_a_sweeping_beam_hears_the_motion_of_the_instant_at_which_it_lights_the_target():
+    keys = {"beam_sweep": True, "scan_rate_hz": 0.5, "duration_s": 5}
+    plain = {(row["scan"], row["target"]): row for row in rows(looks("radar.threshold", **keys))}
+    found = rows(
+        looks(
+            "radar.threshold", moving_target_filter="double_canceller", clutter_lock=False, **keys
+        )
+    )
+    assert len(found) > 3
+    for row in found:
+        off = range_rate(TARGETS[row["target"]], row["illuminated_s"])
+        expected_db = 10.0 * math.log10(gain("double_canceller", 3, off))
+        lost_db = row["snr_db"] - plain[row["scan"], row["target"]]["snr_db"]
+        assert lost_db == pytest.approx(expected_db, abs=2e-2)
+        late = range_rate(TARGETS[row["target"]], row["time_s"])
+        assert abs(expected_db - 10.0 * math.log10(gain("double_canceller", 3, late))) > 0.05
+
+
 @covers("filter_pulses", "notch_m_s", "clutter_lock", of=LINK_BUDGETS)
 @pytest.mark.parametrize("radar", LINK_BUDGETS)
 @pytest.mark.parametrize(("pulses", "notch_m_s"), [(8, 25.0), (32, 25.0), (32, 3.0)])
@@ -295,6 +313,10 @@ def test_a_look_at_nothing_has_nothing_to_filter(radar):
 
 
 BAD = [
+    ("radar.threshold", {"moving_target_filter": "double_canceller", "prf_hz": 1e3,
+                         "pulses_per_dwell": 2}, "adds up 3 pulses, and a look has 2"),
+    ("radar.swerling", {"moving_target_filter": "filter_bank", "prf_hz": 1e3, "dwell_s": 0.012},
+     "adds up 16 pulses, and a look has 12"),
     ("radar.threshold", {"range_rate_folds": True, "prf_hz": 1e3}, "measures_range_rate is false"),
     ("radar.swerling", {"range_rate_folds": True, "measures_range_rate": True},
      "prf_hz is not given"),

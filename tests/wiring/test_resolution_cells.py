@@ -111,6 +111,18 @@ VIEW = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [({}, True), (CELL, False), ({"range_resolution_m": 10.0}, True),
+     ({"errors": "stated", "azimuth_error_deg": 1.0}, False)],
+)  # fmt: skip
+def test_explain_says_where_noise_is_reported_exactly_at_the_target(keys, said):
+    radar = sensor("radar.swerling", **keys)
+    simulation = Simulation(dsa_des.load_scene(chain({"radar": radar})))
+    lines = simulation.components["radar"].left_out()
+    assert any("reported exactly where the target is" in line for line in lines) is said
+
+
 def warned(kind: str = "radar.threshold", **keys) -> list[str]:
     radar = {**sensor(kind), **VIEW, **keys}
     found = warnings_of(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
