@@ -126,6 +126,14 @@ class Service:
         if self._least < 1:
             raise ValueError(f"processors.{name}: service_s is shorter than one tick")
 
+    def of(self, block: str, entered: int) -> int:
+        """Return the time for one message."""
+        if not self._spread:
+            return self._least
+        tick = nanosecond_of(np.array([entered], dtype=np.int64), self._ticks_per_s).tolist()[0]
+        key = key_of("job", block, tick)
+        return self._least + round(self._stream.one_uniform(key, 0) * self._spread)
+
     def ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
         """Return the time for each message, by its block and the tick at which it entered."""
         if not self._spread:
@@ -196,6 +204,10 @@ class Processor:
 
     def open_window(self, start: int, end: int) -> None:
         """Do nothing: it works message by message."""
+
+    def let_in(self, block: str, ticks: IntArray, scans: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the instants at which a block is to run: all."""
+        return ticks, scans
 
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
         """Hand in what `block` made at this instant; `deliver` is called when it is worked on."""
