@@ -63,6 +63,7 @@ class RehearsedLines:
         self._record = record
         self._found: Rehearsed | None = None
         self._end = 0
+        self._foreseen = 0, 0
         #: What waits or is worked on: how it is delivered, and the message.
         self._held: dict[Job, tuple[Deliver, Message]] = {}
         self._kept: dict[Job, tuple[Deliver, Message]] = {}
@@ -121,6 +122,9 @@ class RehearsedLines:
             ticks = [node.own_ticks(start, end)]
             ticks += [channel.next_arrivals(end) for channel in node.triggers()]
             woken[name] = sorted_union([each for each in ticks if len(each)] or ticks[:1])
+            if name in self._processor_of and (start, end) != self._foreseen:
+                self._lines[self._processor_of[name]].service.foresee(name, woken[name])
+        self._foreseen = start, end
         self._found, self._end = self._rehearsal.play(self._lines, woken, end, self._roots), end
         self._submitted = {}
         self._kept = dict(self._held)
@@ -187,6 +191,8 @@ class RehearsedLines:
         assert self._found is not None
         self._lines, self._held = self._found.lines, self._kept
         self._roots = {job: self._found.roots[job] for job in self._held}
+        for line in self._lines.values():
+            line.service.forget()
         known = self._rehearsal.known
         self._rehearsal.known = {job: sent for job, sent in known.items() if job[1] >= self._end}
         self._rehearsal.guesses.clear()
