@@ -36,7 +36,9 @@ SCENES = sorted(
 )
 WEATHER = ["weather.rain_rate_mm_h=4", "weather.gas=true"]
 #: What was looked at, and why the rest was not: there the work that was spared shows.
-WORK = {"evaluated", "skipped_field_of_view", "skipped_range", "skipped_culled"}
+WORK = {
+    "evaluated", "skipped_field_of_view", "skipped_range", "skipped_hidden", "skipped_culled",
+}  # fmt: skip
 
 
 def recorded_both_ways(scene: Scene, folder: Path) -> dict[bool, Path]:

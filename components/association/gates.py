@@ -1,5 +1,6 @@
 """Gates: how far from a track a detection of it may lie, for a stated probability."""
 
+import math
 from functools import lru_cache
 
 
@@ -17,8 +18,30 @@ def gate_threshold(probability: float, size: int) -> float:
     Returns
     -------
     float
-        The quantile of the chi-square distribution with `size` degrees of freedom.
+        The quantile of the chi-square distribution with `size` degrees of freedom, by bisection
+        of its distribution in closed form.
     """
-    from scipy.special import gammaincinv
+    low, high = 0.0, 1.0
+    while 1.0 - probability < _beyond(high, size):
+        high *= 2.0
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return high
+        if 1.0 - probability < _beyond(middle, size):
+            low = middle
+        else:
+            high = middle
 
-    return float(2.0 * gammaincinv(0.5 * size, probability))
+
+def _beyond(distance: float, size: int) -> float:
+    """Return the probability of a larger squared distance (Abramowitz, Stegun, 26.4.4 and 5)."""
+    half = 0.5 * distance
+    total = 0.0 if size % 2 == 0 else math.erfc(math.sqrt(half))
+    term = math.exp(-half) * (1.0 if size % 2 == 0 else math.sqrt(half) / math.gamma(1.5))
+    power = 1.0 if size % 2 == 0 else 1.5
+    for _ in range(size // 2):
+        total += term
+        term *= half / power
+        power += 1.0
+    return total

@@ -102,6 +102,9 @@ def exact(weights: FloatArray) -> FloatArray:
 def propagated(weights: FloatArray) -> FloatArray:
     """Return approximate marginals of one cluster, by belief propagation.
 
+    Within 0.1 of exact ones in most clusters; where several tracks share the same detections and
+    misses are rare it is too sure of one way round.
+
     Parameters
     ----------
     weights : (tracks, detections)

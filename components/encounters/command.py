@@ -13,11 +13,13 @@ def encounters() -> None:
 
 
 @encounters.command()
-@click.argument("table", metavar="TABLE.csv")
+@click.argument("table", metavar="TABLE")
 @click.option("--nominal", required=True, metavar="COLUMN", help="Event without avoidance, 0 or 1.")
 @click.option("--mitigated", required=True, metavar="COLUMN", help="Event with avoidance, 0 or 1.")
 @click.option("--weight", metavar="COLUMN", help="Weight of each encounter [default: all 1].")
-@click.option("--by", metavar="COLUMN", help="Also a ratio for each class that this column names.")
+@click.option(
+    "--by", metavar="COLUMN[,...]", help="Also a ratio for each class that these columns name."
+)
 @click.option(
     "--edges",
     metavar="A,B,...",
@@ -45,7 +47,10 @@ def encounters() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON only.")
 @plain_errors
 def risk(**options: Any) -> None:
-    """Risk ratio of a TABLE with one row per encounter, run without and with avoidance."""
+    """Risk ratio of a TABLE with one row per encounter, run without and with avoidance.
+
+    TABLE is a .csv or .parquet file, or the folder of a study.
+    """
     from components.encounters.risk_table import show_risk
 
     show_risk(**options)
@@ -86,3 +91,76 @@ def sample(**options: Any) -> None:
     from components.encounters.sample_command import sample_tracks
 
     sample_tracks(**options)
+
+
+@encounters.command()
+@click.option(
+    "--made", metavar="FILE.toml", help="Encounters made by hand, as a table describes them."
+)
+@click.option("--model", metavar="FILE", help="Encounter model of the ownship.")
+@click.option("--intruder-model", metavar="FILE", help="That of the intruder [default: the same].")
+@click.option("--count", type=click.IntRange(1, 100_000_000), help="Encounters of models.")
+@click.option(
+    "--first",
+    type=click.IntRange(0, 2**53),
+    default=0,
+    show_default=True,
+    help="Number of the first; an encounter is the same whichever others are made.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--at",
+    nargs=2,
+    type=float,
+    default=(0.0, 0.0),
+    metavar="LAT LON",
+    help="Where the ownship is at the closest approach, deg [default: 0 0].",
+)
+@click.option("--out", required=True, metavar="SET.parquet", help="The set.")
+@plain_errors
+def generate(**options: Any) -> None:
+    """Make a set of weighted encounters from encounter models, or of some made by hand."""
+    from components.encounters.generate_command import generate_set
+
+    generate_set(**options)
+
+
+@encounters.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.option(
+    "--weights", metavar="TABLE.csv", help="Weights: columns encounter and weight [default: 1]."
+)
+@click.option(
+    "--at", nargs=2, type=float, metavar="LAT LON", help="Where the origin is put [default: 0 0]."
+)
+@click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
+@click.option("--out", required=True, metavar="FILE", help="SET.parquet, or waypoints: FILE.bin.")
+@plain_errors
+def convert(**options: Any) -> None:
+    """Turn encounters of public formats into a set, or a set into waypoints.
+
+    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or paired tracks (.txt), one
+    encounter each.
+    """
+    from components.encounters.convert_command import convert_sets
+
+    convert_sets(**options)
+
+
+@encounters.command()
+@click.argument("file", metavar="SET.parquet")
+@click.option(
+    "--most",
+    type=click.IntRange(1, 1_000_000),
+    default=2000,
+    show_default=True,
+    help="Of so many encounters, evenly spread, the closest approach is looked for.",
+)
+@click.option("--figure", metavar="FILE.png", help="Histograms and a plan of a sample.")
+@click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
+@plain_errors
+def show(**options: Any) -> None:
+    """Say what is in a set: weights, and the geometry at the closest approaches."""
+    from components.encounters.show_command import show_set
+
+    show_set(**options)

@@ -55,6 +55,7 @@ def fly_euler(
     acceleration_ft_s2: FloatArray,
     climb_ft_s: FloatArray,
     turn_rad_s: FloatArray,
+    start_heading_rad: FloatArray | float = 0.0,
 ) -> Flown:
     """Fly by steps of 1 s that take the values of the second before on their right.
 
@@ -64,22 +65,23 @@ def fly_euler(
         At time 0.
     acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
         Commands, held for a second; the last row commands nothing any more.
+    start_heading_rad : (tracks,), optional
 
     Notes
     -----
     h += ḣ; N, E += v (cos ψ, sin ψ); v += a; ψ += ψ̇. The path over the ground is that of the
     airspeed, as in the published tracks.
     """
-    speed = _summed(speed_ft_s, acceleration_ft_s2)
-    heading = _summed(np.zeros_like(speed_ft_s), turn_rad_s)
+    speed = summed(speed_ft_s, acceleration_ft_s2)
+    heading = summed(np.zeros_like(speed_ft_s) + start_heading_rad, turn_rad_s)
     zero = np.zeros_like(speed_ft_s)
     with np.errstate(divide="ignore", invalid="ignore"):
         pitch = np.arcsin(np.clip(np.nan_to_num(climb_ft_s / speed), -1.0, 1.0))
     return Flown(
         1.0,
-        _summed(zero, speed * np.cos(heading)),
-        _summed(zero, speed * np.sin(heading)),
-        _summed(altitude_ft, climb_ft_s),
+        summed(zero, speed * np.cos(heading)),
+        summed(zero, speed * np.sin(heading)),
+        summed(altitude_ft, climb_ft_s),
         speed,
         heading,
         climb_ft_s,
@@ -88,8 +90,8 @@ def fly_euler(
     )
 
 
-def _summed(start: FloatArray, rates: FloatArray) -> FloatArray:
-    """Return start, start + rates[0], start + rates[0] + rates[1], ..."""
+def summed(start: FloatArray, rates: FloatArray) -> FloatArray:
+    """Return start, start + rates[0], start + rates[0] + rates[1], ... along the first axis."""
     found = np.empty_like(rates)
     found[0] = start
     np.cumsum(rates[:-1], axis=0, out=found[1:])

@@ -10,13 +10,13 @@ the present second, always. Upstream draws bin 1 where a combination of parents 
 here the present bin stays.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from components.encounters.bayes_network import Node
-from components.encounters.draws import EncounterDraws
+from components.encounters.draws import EncounterDraws, Ints
 from components.encounters.model import EncounterModel
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -75,9 +75,7 @@ class TrackSampler:
             for place in model.transition.order
         ]
 
-    def sample(
-        self, numbers: Sequence[int], seconds: int, attempts: Sequence[int] | int = 0
-    ) -> SampledTracks:
+    def sample(self, numbers: Ints, seconds: int, attempts: Ints | int = 0) -> SampledTracks:
         """Return tracks by their numbers.
 
         Parameters
@@ -90,7 +88,7 @@ class TrackSampler:
         """
         model = self.model
         variables, changing = len(model.labels), len(model.dynamic)
-        uniform = self._draws.uniform(numbers, variables + seconds * changing, attempts)
+        uniform = self._draws.few(numbers, variables, attempts)
         bins: IntArray = np.zeros((variables, len(numbers)), dtype=np.int64)
         values, left = np.zeros((2, variables, len(numbers)))
         for place in model.initial.order:
@@ -105,10 +103,13 @@ class TrackSampler:
         for place, source in enumerate(model.sources):
             if source >= 0:
                 now[place] = bins[source]
-        rows = iter(uniform[variables:].reshape(seconds, changing, len(numbers)))
+        count = seconds * changing
+        drawn = self._draws.uniform(numbers, count, attempts) if count else np.empty((0, 0))
+        rows = drawn.reshape(seconds, changing, len(numbers))
+        fixed = [step.fixed(now) for step in self._steps]
         for second, row in enumerate(rows, start=1):
-            for step in self._steps:
-                step.take(now, row, over_time[second - 1], over_time[second])
+            for step, column in zip(self._steps, fixed, strict=True):
+                step.take(now, column, row, over_time[second - 1], over_time[second])
             for step in self._steps:
                 now[step.before] = now[step.place]
         return SampledTracks(np.asarray(numbers, dtype=np.int64), values, bins, left, over_time)
@@ -127,6 +128,10 @@ class _Step:
         variable = model.targets[place]
         self.before = model.sources.index(variable)
         self._node = node = model.transition.nodes[place]
+        moves = {model.sources.index(of) for of in model.targets.values()} | set(model.targets)
+        parts = list(zip(node.parents, node.strides, strict=True))
+        self._static = [part for part in parts if part[0] not in moves]
+        self._moving = [part for part in parts if part[0] in moves]
         self._low, self._width = model.bins[variable].low, model.bins[variable].width
         self._rate = float(model.resample_rates_hz[variable])
         begin, chance = node.edges[:, :-1], np.diff(node.edges, axis=1)
@@ -137,24 +142,38 @@ class _Step:
             each = np.where(empty, 1.0, np.where(chance > 0.0, 1.0 / chance, 1.0))
         self._each = each.reshape(-1)
 
+    def fixed(self, now: IntArray) -> IntArray:
+        """Return what static parents add to the columns, which stays for all of a track."""
+        found: IntArray = np.zeros(now.shape[1], dtype=np.int64)
+        for parent, stride in self._static:
+            found += stride * now[parent]
+        return found
+
     def take(
-        self, now: IntArray, uniform: FloatArray, before: FloatArray, after: FloatArray
+        self,
+        now: IntArray,
+        fixed: IntArray,
+        uniform: FloatArray,
+        before: FloatArray,
+        after: FloatArray,
     ) -> None:
         """Draw the variable's bins into `now` and its values into `after`."""
         u, node = uniform[self._row], self._node
-        column = node.column(now)
+        column = fixed
+        for parent, stride in self._moving:
+            column = column + stride * now[parent]
         present = now[self.before]
         cell = column * node.size + present
         left = (u - self._begin.take(cell)) * self._each.take(cell)
-        stays = (left >= 0.0) & (left < 1.0)
-        held, value = before[self._row], after[self._row]
+        value = after[self._row]
         now[self.place] = present
-        np.copyto(value, held)
-        anew = np.flatnonzero(stays & (left < self._rate))
-        if len(anew):
+        value[:] = before[self._row]
+        # Those below 0 have left their bin: they get their values further down.
+        if self._rate > 0.0:
+            anew = (left < self._rate).nonzero()[0]
             bins = present[anew]
             value[anew] = self._low[bins] + self._width[bins] * (left[anew] / self._rate)
-        moved = np.flatnonzero(~stays)
+        moved = ((left < 0.0) | (left >= 1.0)).nonzero()[0]
         if len(moved):
             bins, rest = _drawn(node, column[moved], u[moved])
             now[self.place, moved] = bins

@@ -30,7 +30,7 @@ from components.encounters.model import (
 )
 from components.encounters.motion import FT_S_PER_KT, Flown, fly_euler, fly_point_mass
 from components.encounters.sampling import SampledTracks, TrackSampler
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 
 DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
@@ -62,6 +62,10 @@ class Commands:
     acceleration_ft_s2: FloatArray
     climb_ft_s: FloatArray
     turn_rad_s: FloatArray
+
+    def some(self, rows: IntArray) -> "Commands":
+        """Return those of some tracks."""
+        return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
     def fly(self, dynamics: str) -> Flown:
         """Return the flights, ``"euler"`` or ``"point_mass"``."""
@@ -106,7 +110,6 @@ class TrackRules:
                 )
             edges = np.array(LAYERS_FT[: bins.size + 1])
         self._edges_ft = edges
-        self._by_edges = bins.edges is not None
         self._given = [p for p in map(model.place, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None]
         self._speed_ft_s, climbs = (
             self._limits(label) * factor
@@ -121,16 +124,21 @@ class TrackRules:
         assert place is not None
         return place
 
+    def layers_ft(self, tracks: SampledTracks) -> tuple[FloatArray, FloatArray]:
+        """Return the edges of the altitude layer of each track."""
+        layer = tracks.initial_bins[self._layer]
+        return self._edges_ft[layer], self._edges_ft[layer + 1]
+
+    def altitude_ft(self, tracks: SampledTracks) -> FloatArray:
+        """Return altitudes at time 0, uniform in their layers."""
+        low, high = self.layers_ft(tracks)
+        found: FloatArray = low + (high - low) * tracks.left[self._layer]
+        return found
+
     def commands(self, tracks: SampledTracks) -> Commands:
         """Return what tracks command, in feet and seconds."""
-        if self._by_edges:
-            altitude_ft = tracks.initial[self._layer]
-        else:
-            layer = tracks.initial_bins[self._layer]
-            low, high = self._edges_ft[layer], self._edges_ft[layer + 1]
-            altitude_ft = low + (high - low) * tracks.left[self._layer]
         return Commands(
-            altitude_ft,
+            self.altitude_ft(tracks),
             tracks.initial[self._at(SPEED)] * FT_S_PER_KT,
             self._over_time(tracks, ACCELERATION) * FT_S_PER_KT,
             self._over_time(tracks, CLIMB) / 60.0,
@@ -146,20 +154,43 @@ class TrackRules:
             tracks.initial[place], (len(tracks.changing), len(tracks.numbers))
         ).copy()
 
-    def accepted(self, tracks: SampledTracks, commands: Commands, flown: Flown) -> BoolArray:
-        """Return which tracks are accepted."""
-        given: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
-        for place in self._given:
-            given = given * self.model.initial.sizes[place] + tracks.initial_bins[place]
-        slowest, fastest = self._speed_ft_s[:, given]
-        good = commands.speed_ft_s > np.abs(commands.climb_ft_s[0])
-        good &= (flown.up_ft >= self._edges_ft[0]).all(axis=0)
-        good &= (flown.up_ft <= self._edges_ft[-1]).all(axis=0)
-        good &= (flown.speed_ft_s >= slowest).all(axis=0)
-        good &= (flown.speed_ft_s <= fastest).all(axis=0)
+    def accepted(self, tracks: SampledTracks, flown: Flown) -> BoolArray:
+        """Return which flights are accepted."""
+        good = self.flies(tracks, flown.climb_ft_s, flown.speed_ft_s)
+        return good & self.inside(flown.up_ft)
+
+    def flies(self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray) -> BoolArray:
+        """Return which tracks keep the limits of speed (ft/s) and vertical rate.
+
+        Parameters
+        ----------
+        tracks : SampledTracks
+        climb_ft_s, speed : (instants, tracks)
+        """
+        slowest, fastest = self._speed_ft_s[:, self._combination(tracks)]
+        good: BoolArray = speed[0] > np.abs(climb_ft_s[0])
+        good &= (speed.min(axis=0) >= slowest) & (speed.max(axis=0) <= fastest)
+        steepest = self.steepest_ft_s(tracks)
+        return good & (climb_ft_s.max(axis=0) <= steepest) & (climb_ft_s.min(axis=0) >= -steepest)
+
+    def inside(self, up_ft: FloatArray) -> BoolArray:
+        """Return which tracks stay within the outer edges of the layers, and above the ground."""
+        lowest = max(float(self._edges_ft[0]), 0.0)
+        good: BoolArray = up_ft.min(axis=0) >= lowest
+        return good & (up_ft.max(axis=0) <= self._edges_ft[-1])
+
+    def steepest_ft_s(self, tracks: SampledTracks) -> FloatArray:
+        """Return the largest vertical rate that is accepted of each track."""
         # Rounding alone must not reject the value on the edge itself.
-        steepest = self._climb_ft_s[given] * (1.0 + 1e-9)
-        return good & (np.abs(flown.climb_ft_s) <= steepest).all(axis=0)
+        found: FloatArray = self._climb_ft_s[self._combination(tracks)] * (1.0 + 1e-9)
+        return found
+
+    def _combination(self, tracks: SampledTracks) -> IntArray:
+        """Return the number of each track's area, airspace and layer."""
+        found: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
+        for place in self._given:
+            found = found * self.model.initial.sizes[place] + tracks.initial_bins[place]
+        return found
 
     def _limits(self, label: str) -> FloatArray:
         """Return the upper edges of the bins with both points, (2, areas x airspaces x layers)."""
@@ -239,7 +270,8 @@ def accepted_tracks(
         for attempt in range(_MOST_ATTEMPTS):
             tracks = sampler.sample([some[k] for k in left], seconds, attempt)
             commands = rules.commands(tracks)
-            good = rules.accepted(tracks, commands, commands.fly(dynamics))
+            flown = commands.fly(dynamics)
+            good = rules.accepted(tracks, flown)
             if kept is None:
                 kept = tracks
             else:

@@ -42,6 +42,16 @@ class Weather(Parameters):
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
     )
 
+    wind_mps: float = Field(
+        default=0.0,
+        ge=0,
+        le=150,
+        description="Speed of the wind, the same everywhere, m/s. Flights keep their tracks over "
+        "the ground, and noses turn into the wind.",
+    )
+    wind_from_deg: float = Field(
+        default=0.0, ge=-360, le=360, description="Where the wind comes from, deg from north."
+    )
     night: bool = Field(
         default=False,
         description="Whether there is no daylight: cameras for visible light then see nothing.",
@@ -98,6 +108,21 @@ class Navigation(Parameters):
     )
 
 
+class Record(Parameters):
+    """What a run folder holds beside what blocks send each other."""
+
+    truth: bool | Literal["auto"] = Field(
+        default="auto",
+        description="Whether the table truth has the ownship and every target at every scan; by "
+        "default where aircraft times seconds are at most 600.",
+    )
+    looks: bool = Field(
+        default=False,
+        description="Whether the table looks has every sensor's look at every target, also those "
+        "without a detection.",
+    )
+
+
 class Terrain(Parameters):
     """The ground: flat, whose echo a radar may hear, and what hides targets; by default none."""
 
@@ -113,6 +138,13 @@ class Terrain(Parameters):
         le=100,
         description="Reflectivity of the ground, gamma of sigma0 = gamma sin(grazing angle), dB: "
         "about -20 desert or sea, -15 farmland, -10 woodland, -5 a town (assumption).",
+    )
+    clutter_motion_m_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=10,
+        description="Standard deviation of the ground's own range rates, m/s: about 0.3 wooded "
+        "hills in a fresh wind, 1 sea (Skolnik, table 3.1); for moving-target filters.",
     )
     clutter_mean: Literal["constant", "fluctuating"] = Field(
         default="fluctuating",
@@ -130,8 +162,8 @@ class Terrain(Parameters):
     )
     raster: RasterFile | None = Field(
         default=None,
-        description="Elevation raster whose ground hides targets: SRTM .hgt, or GeoTIFF with the "
-        "extra geotiff. Beside it no ground is known.",
+        description="Elevation raster whose ground hides targets, or a list of files side by side: "
+        "SRTM .hgt, or GeoTIFF with the extra geotiff. Beside it no ground is known.",
     )
     raster_offset_m: float = Field(
         default=0.0,

@@ -53,10 +53,49 @@ class Innovation:
         )  # fmt: skip
 
 
-def innovation(
-    expected: FloatArray, jacobian: FloatArray, covariance: FloatArray, variance: FloatArray
-) -> Innovation:
-    """Return the innovation of an extended Kalman filter.
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What a filter expects of any measurement of its tracks, before that one's own errors.
+
+    Parameters
+    ----------
+    expected : (m, n)
+    total : (m, m, n)
+        Covariance of what is expected.
+    cross, jacobian
+        As in `Innovation`.
+    left_over : (m, m, n) or None
+        What the slope leaves of `total`; None where it is exact.
+    """
+
+    expected: FloatArray
+    total: FloatArray
+    cross: FloatArray
+    jacobian: FloatArray
+    left_over: FloatArray | None = None
+
+    def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
+        """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
+        expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
+        spread = self.left_over
+        if which is not None:
+            expected, total = expected[..., which], total[..., which]
+            cross, jacobian = cross[..., which], jacobian[..., which]
+            spread = None if spread is None else spread[..., which]
+        else:
+            total = total.copy()
+            spread = None if spread is None else spread.copy()
+        for i in range(len(total)):
+            total[i, i] += variance[i]
+            if spread is not None:
+                spread[i, i] += variance[i]
+        return Innovation(
+            expected, cholesky(total), cross, jacobian, variance if spread is None else spread
+        )
+
+
+def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
+    """Return the moments of an extended Kalman filter.
 
     Parameters
     ----------
@@ -65,15 +104,16 @@ def innovation(
         By the first k components of the state; the others do not enter.
     covariance : (d, d, n)
         Of the predicted state.
-    variance : (m, n)
-        Of the measurement's errors, which are independent of each other.
     """
-    known = jacobian.shape[1]
-    cross = product_transposed(covariance[:, :known], jacobian)
-    total = product(jacobian, cross[:known])
-    for i in range(len(total)):
-        total[i, i] += variance[i]
-    return Innovation(expected, cholesky(total), cross, jacobian, variance)
+    cross = product_transposed(covariance[:, : jacobian.shape[1]], jacobian)
+    return Moments(expected, product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
+
+
+def innovation(
+    expected: FloatArray, jacobian: FloatArray, covariance: FloatArray, variance: FloatArray
+) -> Innovation:
+    """Return the innovation of an extended Kalman filter for variances (m, n)."""
+    return linear_moments(expected, jacobian, covariance).innovation(variance)
 
 
 def updated(
@@ -116,9 +156,9 @@ def joseph(covariance: FloatArray, gain: FloatArray, found: Innovation) -> Float
     spread = _applied(left, shrunk.swapaxes(0, 1))
     if found.spread.ndim == 2:
         weighted = gain * np.sqrt(found.spread)
+        spread += product_transposed(weighted, weighted)
     else:
-        weighted = product(gain, cholesky(found.spread))
-    spread += product_transposed(weighted, weighted)
+        spread += product_transposed(product(gain, found.spread), gain)
     return symmetric(spread)
 
 

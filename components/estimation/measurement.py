@@ -16,6 +16,8 @@ from dsa_des.arrays.types import FloatArray
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the
 # range, derivatives are those of the edge.
 _ZENITH = 1e-6
+# A target at the sensor itself has no direction: derivatives are those of one this far away.
+_NEAREST_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def expected(kind: Kind, state: FloatArray, place: Place) -> FloatArray:
     if kind.has_range:
         found.append(distance)
     if kind.has_range_rate:
-        found.append(_along(away, _closing(state, place)) / distance)
+        found.append(_along(away, _closing(state, place)) / np.maximum(distance, _NEAREST_M))
     return np.stack(found)
 
 
@@ -70,8 +72,8 @@ def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray,
     away = state[:3] - place.position_m
     turned = place.to_body
     x, y, z = times(turned, away)
-    square = squared_length(away)
-    distance = np.sqrt(square)
+    distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
+    square = distance * distance
     level = np.hypot(x, y)
     safe = np.maximum(level, _ZENITH * distance)
     found = [np.arctan2(y, x), np.arctan2(-z, level)]

@@ -18,8 +18,8 @@ from dsa_des.arrays.types import FloatArray
 
 # Terms of the exponential's series, exact to a double for |rate · time| of at most 1/8.
 _TERMS = 12
-# No mode is less likely than this before a look: its chance to come back is not lost to underflow.
-_LEAST = 1e-250
+#: No mode is less likely than this before a look: its chance to come back is not lost to underflow.
+LEAST = 1e-250
 
 
 def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -85,7 +85,7 @@ def mixed(
     predicted = np.stack(
         [_sum([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
     )
-    predicted = np.maximum(predicted, _LEAST)
+    predicted = np.maximum(predicted, LEAST)
     new_states, new_covariances = [], []
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]

@@ -10,14 +10,13 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
-    product,
     product_transposed,
     solve_lower,
     solve_upper,
     symmetric,
 )
 from components.estimation.frame import Place
-from components.estimation.kalman import Innovation
+from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, residual
 from components.estimation.motion import Motion
 from dsa_des.arrays.types import FloatArray
@@ -76,15 +75,10 @@ def predict_unscented(
     return mean, symmetric(spread + model.noise(dt_s))
 
 
-def unscented_innovation(
-    kind: Kind,
-    state: FloatArray,
-    covariance: FloatArray,
-    place: Place,
-    variance: FloatArray,
-    sigma: SigmaPoints,
-) -> Innovation:
-    """Return the innovation with the moments of sigma points.
+def unscented_moments(
+    kind: Kind, state: FloatArray, covariance: FloatArray, place: Place, sigma: SigmaPoints
+) -> Moments:
+    """Return the moments of what sigma points would be measured as.
 
     The slope that it bears is that of statistical linearisation, Cᵀ P⁻¹, and its spread what the
     slope leaves over: with both, the Joseph form gives P - K S Kᵀ and stays positive.
@@ -111,11 +105,13 @@ def unscented_innovation(
     cross = product_transposed(points - state[:, np.newaxis], weighted)
     root = cholesky(covariance)
     slope = solve_upper(root, solve_lower(root, cross)).swapaxes(0, 1)
-    left_over = symmetric(total - product(slope, cross))
-    for i in range(kind.size):
-        total[i, i] += variance[i]
-        left_over[i, i] += variance[i]
-    return Innovation(mean, cholesky(symmetric(total)), cross, slope, left_over)
+    # As a sum of squares it keeps its sign, which the difference of the two would lose.
+    moved = points - state[:, np.newaxis]
+    rest = apart.copy()
+    for k in range(size):
+        rest -= slope[:, k, np.newaxis] * moved[k]
+    left_over = symmetric(product_transposed(rest * of_covariance[:, np.newaxis], rest))
+    return Moments(mean, symmetric(total), cross, slope, left_over)
 
 
 def _weighted(points: FloatArray, weights: FloatArray) -> FloatArray:

@@ -71,6 +71,8 @@ class Fusion(Component):
             if offers[name].measures_range_rate
         ]
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
+        #: How long before a detection another one may have come to be put together with it.
+        self.keep_ticks = self.gate_ticks
         self._recent: dict[str, Arrivals] = {}
         self._navigation_errs = navigation_errs(self.context)
         self._with_pose = self._navigation_errs or any(
@@ -80,6 +82,10 @@ class Fusion(Component):
     def records(self) -> list[type[Message]]:
         """Return what is recorded: where navigation errs, with the believed pose."""
         return [FusedWithPose if navigation_errs(self.context) else FusedDetections]
+
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return {producer.block: producer.offer for producer in self.context.producers}
 
     def serves_replicas(self) -> bool:
         """Say no to a gate that would reach from one replica into the one before."""
@@ -100,7 +106,7 @@ class Fusion(Component):
         latest = max(int(new.tick[-1]) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
-            keep = slice(int(np.searchsorted(seen.tick, latest - self.gate_ticks)), len(seen.tick))
+            keep = slice(int(np.searchsorted(seen.tick, latest - self.keep_ticks)), len(seen.tick))
             self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
         return dict(sorted(together.items()))
 
@@ -128,7 +134,7 @@ class Fusion(Component):
         angle_source = np.full(count, -1, dtype=np.int64)
         range_source = np.full(count, -1, dtype=np.int64)
         names = (*_VALUES, *_RATES) if self.by_range_rate else _VALUES
-        values = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
+        values: dict[str, Any] = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
         measured_tick = np.zeros(count, dtype=np.int64)
         pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}

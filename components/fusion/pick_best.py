@@ -41,6 +41,13 @@ class PickBest(Fusion):
     lockstep = True
     ladders = (FUSION,)
 
+    def left_out(self) -> list[str]:
+        """Say what decides here which detections belong together."""
+        return [
+            "association by truth: detections of the same target are put together, whatever was "
+            "measured, and a false alarm with none (fusion.gated goes by measured values alone)"
+        ]
+
     def window_s(self) -> Any:
         """Return ``coincidence_s``."""
         return self.p.coincidence_s

@@ -24,9 +24,9 @@ def enu_to_geodetic(
     north_m: npt.ArrayLike,
     up_m: npt.ArrayLike,
     *,
-    reference_lat_deg: float,
-    reference_lon_deg: float,
-    reference_alt_m: float,
+    reference_lat_deg: npt.ArrayLike,
+    reference_lon_deg: npt.ArrayLike,
+    reference_alt_m: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Find the geodetic position of points given in the tangent frame of a reference point.
 
@@ -36,8 +36,8 @@ def enu_to_geodetic(
         Metres along the reference point's local axes; they broadcast. Up is along the ellipsoid
         normal *at the reference point*, so a point 10 km away with up 0 has an altitude 7.8 m
         above the reference.
-    reference_lat_deg, reference_lon_deg, reference_alt_m : float
-        The reference point on WGS-84.
+    reference_lat_deg, reference_lon_deg, reference_alt_m : float or (n,)
+        The reference point on WGS-84; or one for each of n points.
 
     Returns
     -------
@@ -65,12 +65,14 @@ def enu_to_geodetic(
             )
     shape = np.broadcast_shapes(*(a.shape for a in arrays))
     east, north, up = (np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1) for a in arrays)
-    lat, lon, alt = _first_guess(
-        east, north, up, reference_lat_deg, reference_lon_deg, reference_alt_m
+    lat0, lon0, alt0 = (
+        np.atleast_1d(np.asarray(part, dtype=np.float64))
+        for part in (reference_lat_deg, reference_lon_deg, reference_alt_m)
     )
-    reference_axes = local_axes(np.array([reference_lat_deg]), np.array([reference_lon_deg]))
+    lat, lon, alt = _first_guess(east, north, up, lat0, lon0, alt0)
+    reference_axes = local_axes(lat0, lon0)
     got_north, got_east, got_down = line_of_sight_ned(
-        reference_lat_deg, reference_lon_deg, reference_alt_m, lat, lon, alt, validate=False
+        lat0, lon0, alt0, lat, lon, alt, validate=False
     )
     error = (east - got_east, north - got_north, up + got_down)
     vector = [sum(e * a[i] for e, a in zip(error, reference_axes, strict=True)) for i in (0, 1, 2)]
@@ -88,7 +90,12 @@ def enu_to_geodetic(
 
 
 def _first_guess(
-    east: FloatArray, north: FloatArray, up: FloatArray, lat0: float, lon0: float, alt0: float
+    east: FloatArray,
+    north: FloatArray,
+    up: FloatArray,
+    lat0: FloatArray,
+    lon0: FloatArray,
+    alt0: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bowring's one-step latitude, in the reference meridian's plane."""
     sin0, cos0 = np.sin(np.radians(lat0)), np.cos(np.radians(lat0))

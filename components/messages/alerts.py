@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from components.aircraft.aircraft import Roster
+from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
@@ -39,6 +40,7 @@ class AlertLevels(Message):
     roster : Roster
     """
 
+    described = DESCRIBED
     entry_table = "alerts"
 
     offsets: IntArray

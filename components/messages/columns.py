@@ -5,9 +5,19 @@ Beside the messages' ``recorded``, which has the types; a test sees that none is
 
 from collections.abc import Mapping
 
+#: Column of every element of the covariance's upper triangle, row by row.
+COVARIANCE = {
+    (i, j): f"covariance_{i}{j}_m2{('', '_s', '_s2')[(i > 2) + (j > 2)]}"
+    for i in range(6)
+    for j in range(i, 6)
+}
+
 _BODY = "ownship's body axes: azimuth clockwise from the nose, elevation upward"
 _NED = "north-east-down at the ownship"
 _WGS84 = "WGS 84"
+_FRAME = "north-east-down at the frame's origin"
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_OWN_NED = "north-east-down at the aircraft itself"
 _TURNED = "north-east-down to body: yaw, pitch, roll"
 
 #: Unit, frame, meaning.
@@ -104,6 +114,67 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "measured_s": ("s", "", "when it was measured"),
         **_ERRING_POSE,
     },
+    "state_tracks": {
+        "track": ("", "", "the tracker's own number of the track, from 1"),
+        "track_status": ("", "", "tentative, confirmed, coasted, or deleted (told once)"),
+        "existence": ("", "", "probability that there is something"),
+        **{
+            f"{axis}_m{per_s}": (unit, _FRAME, f"estimated {what}; null without a range")
+            for per_s, unit, what in (("", "m", "position"), ("_s", "m/s", "velocity"))
+            for axis in ("north", "east", "down")
+        },
+        "azimuth_rad": ("rad", _FRAME, "direction from the ownship at its last look, from north"),
+        "elevation_rad": ("rad", _FRAME, "its elevation, upward"),
+        "azimuth_variance_rad2": ("rad²", _FRAME, "variance of that azimuth"),
+        "elevation_variance_rad2": ("rad²", _FRAME, "variance of that elevation"),
+        "has_range": ("", "", "whether any range was measured"),
+        "age_s": ("s", "", "time since the track was started"),
+        "state_s": ("s", "", "the instant that the state speaks of"),
+        "updated_s": ("s", "", "when the last measurement in it was made"),
+        "contributors": ("", "", "sensors that ever updated it, joined by +"),
+        "updated_by": ("", "", "sensors of its last update, joined by +"),
+        "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
+        "origin_lon_deg": ("deg", _WGS84, "its longitude"),
+        "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        **{
+            name: (
+                ("m²", "m²/s", "m²/s²")[(i > 2) + (j > 2)],
+                _FRAME,
+                f"covariance of {_STATE[i]} with {_STATE[j]}; null without a range",
+            )
+            for (i, j), name in COVARIANCE.items()
+        },
+        **{
+            f"acceleration_{axis}_m_s2": ("m/s²", _FRAME, f"estimated acceleration {axis}")
+            for axis in ("north", "east", "down")
+        },
+        "turn_rate_rad_s": ("rad/s", _FRAME, "estimated rate of turn, positive to the right"),
+        "probability_velocity": ("", "", "of the model of constant velocity"),
+        "probability_turn": ("", "", "of the model of a coordinated turn"),
+        "probability_acceleration": ("", "", "of the model of constant acceleration"),
+    },
+    "truth": {
+        "target": ("", "", "name of the target; null for the ownship"),
+        "lat_deg": ("deg", _WGS84, "latitude"),
+        "lon_deg": ("deg", _WGS84, "longitude"),
+        "alt_m": ("m", _WGS84, "height above the ellipsoid"),
+        "velocity_north_m_s": ("m/s", _OWN_NED, "velocity over ground, north"),
+        "velocity_east_m_s": ("m/s", _OWN_NED, "east"),
+        "velocity_down_m_s": ("m/s", _OWN_NED, "down"),
+        "heading_rad": ("rad", _TURNED, "where the nose points, from north"),
+        "pitch_rad": ("rad", _TURNED, "pitch, nose up"),
+        "roll_rad": ("rad", _TURNED, "roll, right wing down"),
+    },
+    "looks": {
+        "scan": ("", "", "number of the scan"),
+        "target": ("", "", "name of the target"),
+        "evaluated": ("", "", "whether its physics was evaluated: all else is null without"),
+        "detected": ("", "", "whether it was detected"),
+        **_TRUE,
+        "snr_db": ("dB", "", "signal-to-noise ratio of a radar"),
+        "detection_probability": ("", "", "probability with which the detection was drawn"),
+        "pixels": ("pixels", "", "pixels that the target covers in a camera"),
+    },
     "alerts": {
         "target": ("", "", "name of the target"),
         "level": ("", "", "alert level, 0 without an alert"),
@@ -134,4 +205,9 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "queue_length": ("messages", "", "messages that waited behind it at its outcome"),
         "outcome": ("", "", "whether it was done, dropped or skipped"),
     },
+}
+
+#: The same with what every table begins with: metadata of the recorded tables.
+DESCRIBED: Mapping[str, Mapping[str, Column]] = {
+    table: {**LEADING, **columns} for table, columns in COLUMNS.items()
 }

@@ -11,9 +11,13 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.messages.columns import DESCRIBED
 from components.messages.constant_columns import not_measured
+from components.messages.every_look import look_columns
+from components.messages.looks import Looks
+from components.messages.reach import Reach
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry, per_entry_tick, per_row, static
+from dsa_des.block.message import Columns, Message, Text, per_entry, per_entry_tick, per_row, static
 
 _BITS_OF_INT64 = 63
 _COUNTED_BITS = 12
@@ -79,6 +83,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    reach : Reach or None
+        Where it looks, in the ownship's body axes; None where it does not say.
     """
 
     measures_range: bool
@@ -88,6 +94,7 @@ class SensorOffer:
     elevation_variance_rad2: float | None = None
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
+    reach: Reach | None = None
 
 
 def _target_names(message: Any) -> Text:
@@ -157,10 +164,13 @@ class Detections(Message):
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
+    looks : dict of (rows, targets), or None
+        Every look at every target (`components.messages.every_look`), where they are recorded.
     roster : Roster
     """
 
     row_table = "scans"
+    described = DESCRIBED
     entry_table = "detections"
 
     scan: IntArray = per_row(column="int64", in_entries=True)
@@ -194,6 +204,12 @@ class Detections(Message):
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
+    looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
+
+    def tables(self) -> dict[str, Columns]:
+        """Return what is recorded: with the looks, where they are asked for."""
+        tables = super().tables()
+        return tables if self.looks is None else {**tables, "looks": look_columns(self)}
 
     def __post_init__(self) -> None:
         _fill_measured(self)
@@ -246,11 +262,14 @@ class FusedDetections(Message):
     range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
     range_rate_variance_m2_s2 : (entries,)
         As the sensors that gave the values stated them; NaN where they did not.
+    looks : Looks or None
+        Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
     sensors : tuple of str
         Those with range first, each group by name.
     """
 
+    described = DESCRIBED
     entry_table = "fused"
 
     offsets: IntArray
@@ -277,6 +296,7 @@ class FusedDetections(Message):
     elevation_variance_rad2: FloatArray = _measured()
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
+    looks: Looks | None = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         _fill_measured(self)
@@ -319,6 +339,7 @@ class Tracks(Message):
         Whether it came at this row's instant; others were held. By default what has no age.
     """
 
+    described = DESCRIBED
     entry_table = "tracks"
 
     offsets: IntArray

@@ -121,8 +121,12 @@ class _Seen:
 
 
 def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
-    """Return the single row of what is seen of targets."""
-    return {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
+    """Return the single row of what is seen of targets; what is in tables, with their names."""
+    found = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
+    for table, columns in seen.items():
+        if isinstance(columns, Mapping):
+            found |= {f"{table}_{name}": values[0] for name, values in columns.items()}
+    return found
 
 
 def _joined(parts: Sequence[Any], order: IntArray) -> Any:

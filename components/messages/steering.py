@@ -6,6 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import Message, per_row
 
@@ -47,6 +48,7 @@ class Manoeuvres(Message):
         Vertical speed, above 0 where there is a climb or descent.
     """
 
+    described = DESCRIBED
     row_table = "manoeuvres"
 
     turn_rad: FloatArray = per_row(column="float64")

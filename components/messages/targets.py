@@ -14,8 +14,10 @@ import numpy as np
 from components.aircraft.aircraft import Roster
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
+from components.messages.true_states import truth_columns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message, per_row, per_row_tick, static
+from dsa_des.block.recorded_columns import Columns
 
 
 @dataclass(eq=False)
@@ -39,6 +41,10 @@ class TrafficStates(Message):
     flights : KnownFlights or None
         The flights as each row knows them, for a beam that sweeps: it must know them at other
         instants. None where no block does.
+    true_flights : KnownFlights or None
+        The same for all targets, near or far, where the truth is recorded.
+    run_time_s : (rows,) or None
+        The instants since the start of the run, beside them.
     """
 
     own_lat_deg: FloatArray
@@ -58,8 +64,14 @@ class TrafficStates(Message):
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
     flights: KnownFlights | None = per_row(default=None, kw_only=True)
+    true_flights: KnownFlights | None = per_row(default=None, kw_only=True)
+    run_time_s: FloatArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
+
+    def tables(self) -> dict[str, Columns]:
+        """Return the table of the truth where it is recorded."""
+        return {} if self.true_flights is None else {"truth": truth_columns(self)}
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

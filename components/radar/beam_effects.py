@@ -135,6 +135,8 @@ class Sweep:
         believed = detections.pose_columns()
         if not (believed and targets.revisit and len(targets.roster) and len(row)):
             return None
+        if len(row) == 0:  # flights need not answer for no instant at all
+            return believed
         # Where the ownship is does not depend on the target that is asked for with it.
         flights, anyone = targets.revisit.take_rows(row), np.zeros(1, dtype=np.int64)
         start_s = self._start_s(targets)[row]

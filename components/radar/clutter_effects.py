@@ -1,11 +1,11 @@
 """Ground clutter as an effect on a radar's detections."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from components.radar.field_of_view import cell_size
 from components.radar.ground_clutter import ground_clutter_rcs_m2, height_above_terrain_m
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
@@ -39,8 +39,8 @@ class GroundClutter(Effect):
         terrain = terrain_of(block)
         if terrain is None:
             return lambda cells: np.zeros(len(cells))
-        for name in _CELL:
-            if getattr(block.p, name) == 0:
+        for width, name in zip(cell_size(block.p), _CELL, strict=True):
+            if width == 0:
                 raise ValueError(
                     f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
                 )
@@ -83,7 +83,7 @@ class BoundaryClutter(GroundClutter):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] height_m``, and for a cell."""
         found = super().verdict(block)
-        zero = [name for name in _CELL if getattr(block.p, name) == 0]
+        zero = [name for width, name in zip(cell_size(block.p), _CELL, strict=True) if not width]
         if found.simulated and zero:
             return Verdict(False, f"{zero[0]} is 0: no cell, no ground in it")
         return found
@@ -97,12 +97,8 @@ class BoundaryClutter(GroundClutter):
 
 def beamwidths_rad(block: Any) -> tuple[float, float]:
     """Return a radar's beamwidths in azimuth and elevation, rad; by default its resolution."""
-    azimuth_deg = getattr(block.p, "azimuth_beamwidth_deg", None)
-    elevation_deg = getattr(block.p, "elevation_beamwidth_deg", None)
-    return (
-        block.azimuth_step_rad if azimuth_deg is None else math.radians(azimuth_deg),
-        block.elevation_step_rad if elevation_deg is None else math.radians(elevation_deg),
-    )
+    azimuth_rad, elevation_rad, _ = cell_size(block.p)
+    return azimuth_rad, elevation_rad
 
 
 def terrain_of(block: Any) -> Any:

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from components.geometry.attitude import aspect_angles, unit_vector
 from components.radar.rcs_effects import RcsFluctuation
+from components.radar.scatterers import CHANGING, FIXED, Scatterers
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
@@ -43,15 +45,17 @@ def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
 
 
 class LastingFluctuation(Effect):
-    """Echoes whose complex amplitude forgets with ``fluctuation_correlation_s``.
+    """Echoes whose complex amplitude lasts: in time, and in the aspect that the radar has.
 
-    The amplitude of each target is a Gauss-Markov process: its correlation falls as exp(-|dt|/τ),
-    that of the power as exp(-2 |dt|/τ), whenever the radar looks. A look is detected with a steady
-    target's Pd at the power it meets; over many looks far apart that is the Swerling model's own
-    Pd. Where pulses are summed, Swerling II and IV change from pulse to pulse and do not last.
+    With ``fluctuation_correlation_s`` the amplitude of each target is a Gauss-Markov process: its
+    correlation falls as exp(-|dt|/τ), that of the power as exp(-2 |dt|/τ), whenever the radar
+    looks. With ``scintillation_extent_m`` it is that of scatterers on the target's body
+    (`components.radar.scatterers`), which changes as the target turns or passes; with both, the
+    correlations multiply. A look is detected with a steady target's Pd at the power it meets; over
+    many looks far apart that is the Swerling model's own Pd. Where pulses are summed, Swerling II
+    and IV change from pulse to pulse and do not last.
 
-    An aspect table's mean is multiplied by it: aspect alone changes the mean as fast as the target
-    turns, the scatterers' interference, which a table averages over, with τ.
+    An aspect table's mean is multiplied by it.
     """
 
     name = "lasting fluctuation"
@@ -60,33 +64,78 @@ class LastingFluctuation(Effect):
     outside_the_proof = "without it every scan draws a fade of its own"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``fluctuation_correlation_s``, and whether anything fluctuates."""
-        lasts_s = block.p.fluctuation_correlation_s
-        if lasts_s is None:
-            return Verdict(False, "fluctuation_correlation_s is not given")
+        """Ask for the two keys, and whether anything fluctuates."""
+        lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
+        if lasts_s is None and extent_m is None:
+            return Verdict(
+                False, "fluctuation_correlation_s and scintillation_extent_m are not given"
+            )
         fluctuates = RcsFluctuation().verdict(block)
         if not fluctuates.simulated:
             return Verdict(False, fluctuates.because)
-        period_s = float(1 / block.p.scan_rate_hz)
-        again = f"{np.exp(-2.0 * period_s / lasts_s):.3g}"
-        return Verdict(
-            True,
-            f"fluctuation_correlation_s is {lasts_s:g}: the power of two scans in a row is "
-            f"correlated with {again}",
-        )
+        said = []
+        if lasts_s is not None:
+            period_s = float(1 / block.p.scan_rate_hz)
+            again = f"{np.exp(-2.0 * period_s / lasts_s):.3g}"
+            said.append(
+                f"fluctuation_correlation_s is {lasts_s:g}: the power of two scans in a row is "
+                f"correlated with {again}"
+            )
+        if extent_m is not None:
+            apart_deg = np.degrees(0.5 * block.budget.wavelength / extent_m)
+            said.append(
+                f"scintillation_extent_m is {extent_m:g}: aspects {apart_deg:.2g} deg apart fade "
+                "each by itself"
+            )
+        return Verdict(True, "; ".join(said))
 
     def build(self, block: Any) -> Fading:
         """Return each echo's power over its mean, at the instant of its look."""
-        process = GaussMarkov(block.stream("fading"), block.p.fluctuation_correlation_s or 1.0)
+        lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
+        process = None if lasts_s is None else GaussMarkov(block.stream("fading"), lasts_s)
+        scatterers = None
+        if extent_m is not None:
+            scatterers = Scatterers(
+                block.stream("scatterers"),
+                extent_m,
+                block.budget.wavelength,
+                FIXED if process is None else CHANGING,
+            )
         ticks_per_s = block.context.ticks_per_s
 
         def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
             keys = cells.roster.keys_of(cells.target)[chosen]
             instant_ns = _instants_ns(cells, ticks_per_s)[chosen]
-            parts = 4 if model in (3, 4) else 2
-            return fading_power([process(keys, instant_ns, part) for part in range(parts)])
+
+            def pair(number: int) -> tuple[FloatArray, FloatArray]:
+                assert process is not None
+                real, imaginary = (process(keys, instant_ns, 2 * number + part) for part in (0, 1))
+                return real, imaginary
+
+            amplitudes: list[FloatArray] = []
+            for which in range(2 if model in (3, 4) else 1):
+                if scatterers is None:
+                    amplitudes += pair(which)
+                    continue
+                aspect = _aspect(cells, chosen)
+                strengths = None if process is None else pair
+                amplitudes += scatterers.echo(keys, aspect, which, strengths)
+            return fading_power(amplitudes)
 
         return fading
+
+
+def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the unit vector from each target to the radar in the target's body axes."""
+    azimuth, elevation = aspect_angles(
+        np.zeros(len(cells)),
+        cells.elevation_rad,
+        cells.relative_heading_rad,
+        cells.target_pitch_rad,
+        cells.target_roll_rad,
+    )
+    x, y, z = unit_vector(azimuth[chosen], elevation[chosen])
+    return x, y, z
 
 
 def _instants_ns(cells: Cells, ticks_per_s: int) -> Any:

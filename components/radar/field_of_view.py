@@ -1,5 +1,6 @@
 """The width of a radar's field of view, and the resolution cells that fill it."""
 
+import math
 from typing import Any
 
 from components.geometry.field_of_view import sector_width_rad
@@ -11,6 +12,30 @@ from components.radar.resolution_cells import ResolutionCells, resolution_cells
 def azimuth_width_rad(reach: Reach) -> float:
     """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
     return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
+
+
+#: Keys of a cell's size, and of the beamwidth that comes before the grid step.
+_SIZES = (
+    ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
+    ("elevation_beamwidth_deg", "elevation_resolution_deg"),
+    ("", "range_resolution_m"),
+)
+
+
+def cell_size(parameters: Any) -> tuple[float, float, float]:
+    """Return the size of a radar's resolution cell: its beam, or the step of its grid.
+
+    Parameters
+    ----------
+    parameters : RadarParameters
+
+    Returns
+    -------
+    azimuth_rad, elevation_rad, range_m : float
+        0 where neither is given.
+    """
+    widths = [getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in _SIZES]
+    return math.radians(widths[0]), math.radians(widths[1]), float(widths[2])
 
 
 def cells_of_radar(block: Any) -> ResolutionCells:
@@ -29,11 +54,13 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     Raises
     ------
     ValueError
-        If a resolution is 0, ``range_km`` is not given, or there is no range between the two.
+        If a resolution is 0 and no beamwidth given, ``range_km`` is not given, or there is no
+        range between the two.
     """
     p = block.p
-    for name in ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m"):
-        if getattr(p, name) == 0:
+    azimuth_rad, elevation_rad, range_m = cell_size(p)
+    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), _SIZES, strict=True):
+        if width == 0:
             raise ValueError(
                 f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"
             )
@@ -53,7 +80,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
         highest_elevation_rad=block.reach.elevation_rad[1],
         nearest_m=block.budget.nearest_m,
         farthest_m=block.reach.range_max_m,
-        azimuth_cell_rad=block.azimuth_step_rad,
-        elevation_cell_rad=block.elevation_step_rad,
-        range_cell_m=block.range_step_m,
+        azimuth_cell_rad=azimuth_rad,
+        elevation_cell_rad=elevation_rad,
+        range_cell_m=range_m,
     )

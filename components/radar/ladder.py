@@ -44,8 +44,8 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
     radar: Any = block
     if not hasattr(radar, "models_in_use"):
         raise Unavailable("a boundary or threshold decides: it states no probability")
-    if radar.built("clutter") or radar.built("threshold from reference cells"):
-        raise Unavailable("ground clutter or CFAR: no evaluation at more digits")
+    if any(map(radar.built, ("clutter", "Doppler", "threshold from reference cells"))):
+        raise Unavailable("clutter, filter or CFAR: no evaluation at more digits")
     at: dict[str, FloatArray] = {}
 
     def values(cells: Cells) -> dict[str, FloatArray]:

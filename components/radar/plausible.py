@@ -77,10 +77,13 @@ def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
     """
     if terrain is None or parameters.clutter_threshold != "noise":
         return []
-    return [
+    said = (
         "clutter_threshold is 'noise': the echo of the ground counts as signal, so that clutter "
         "raises detections; 'adaptive' keeps the probability of false alarm"
-    ]
+    )
+    if getattr(parameters, "false_alarms", False):
+        said += ". Of false alarms only those of noise are reported, not the ground's"
+    return [said]
 
 
 def many_false_alarms(parameters: Any, cells: int) -> list[str]:
@@ -104,6 +107,23 @@ def many_false_alarms(parameters: Any, cells: int) -> list[str]:
         f"false_alarms is true and {key} is {pfa:g}{whose}: with {cells:,} resolution cells that "
         f"makes {cells * pfa:,.3g} false alarms per scan, {pfa:.3g} in every cell; radars have "
         "1e-6 per cell or less"
+    ]
+
+
+def noise_at_targets(parameters: Any) -> list[str]:
+    """Say that looks which noise decides are reported at the target's own place, where they are.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    """
+    steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
+    exact = [step for step in steps if getattr(parameters, step) == 0]
+    if parameters.errors != "grid" or not exact:
+        return []
+    return [
+        f"noise that is taken for a target: {exact[0]} is 0, so it is reported exactly where the "
+        "target is (thesis); a grid has the cell's place, errors = 'signal' any place in the cell"
     ]
 
 

@@ -1,22 +1,25 @@
 """The base class of radar blocks: it measures range, and effects act on its echoes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
-from components.radar.range_rate import LASTS_S
+from components.radar.moving_target_filter import folded_range_rate
+from components.radar.range_rate import LASTS_S, RangeRate
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
 from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect
 
+_RANGE_RATE = RangeRate()
 CellFactor = Callable[[Cells], FloatArray]
 #: Of noise that looks like an aircraft: the range rate of two fast ones that meet.
 FASTEST_M_S = 500.0
@@ -27,22 +30,34 @@ class Radar(Sensor):
 
     mark = RADAR
     measures_range = True
+    #: Of the carrier, m; None where it is not known.
+    wavelength_m: float | None = None
     hooks = {
         "SNR": "(cells) -> factor of each cell's SNR",
+        "Doppler": "(cells) -> factors on the power of each cell's target and of its ground",
         "range rate": "(cells, found) -> rate of some cells' slant range, m/s",
         "one report by cell": "(cells, power) -> power of the echo that stands for its "
         "resolution cell, 0 of the others",
     }
 
+    effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE,)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if _RANGE_RATE not in cls.effects:  # its key is one of every radar
+            cls.effects = (_RANGE_RATE, *cls.effects)
+
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.snr_factors: list[CellFactor] = []
         self._merging: Merging | None = None
+        self.doppler: Any = None
         self.range_rate_step_m_s = float(getattr(parameters, "range_rate_resolution_m_s", 0.0))
 
     def setup(self) -> None:
         """Take what the scene's effects do to the SNR."""
         self.snr_factors = self.built("SNR")
+        (self.doppler,) = self.built("Doppler") or [None]
         (self._merging,) = self.built("one report by cell") or [None]
 
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
@@ -56,10 +71,14 @@ class Radar(Sensor):
     def request(self, port: str) -> Any:
         """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
         reach = super().request(port)
-        lasts_s = LASTS_S if self._rates else 0.0
+        lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)
         return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+
+    def exact_because(self) -> str:
+        """A rate divides the change of an error over hundredths of a second by these."""
+        return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
     def _rates(self) -> list[Any]:
@@ -75,6 +94,18 @@ class Radar(Sensor):
     def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return self._rates[0](cells, found) if self._rates else None
+
+    def _in_body(
+        self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return what is measured, range rates as one PRF takes them where they fold."""
+        azimuth, elevation, range_m, beside = super()._in_body(values, variances)
+        if self.p.range_rate_folds and "range_rate_m_s" in beside:
+            assert self.wavelength_m is not None
+            limit_m_s = 0.25 * self.wavelength_m * self.p.prf_hz
+            folded = folded_range_rate(beside["range_rate_m_s"], limit_m_s)
+            beside = {**beside, "range_rate_m_s": folded}
+        return azimuth, elevation, range_m, beside
 
     def noise_range_rate(self, uniform: FloatArray) -> FloatArray:
         """Return range rates that noise alone gives: any that is unambiguous, m/s.

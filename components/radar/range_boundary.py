@@ -1,21 +1,24 @@
 """The crudest radar: all inside its range is detected (``radar.range_boundary``, §2.2.2)."""
 
 from collections.abc import Callable
+from typing import Any, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
 from components.radar.clutter_effects import BoundaryClutter, terrain_of
+from components.radar.doppler_effects import DopplerFilter
 from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
 from components.radar.plausible import clutter_as_signal
 from components.radar.radar_block import Radar
+from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
 from components.radar.range_effects import BlindRange
-from components.radar.range_rate import RangeRate
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
+from components.radar.time_budget import unambiguous_range_m
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 
@@ -46,6 +49,33 @@ class RangeBoundaryParameters(RadarParameters):
         description="Probability of false alarm that goes with it; used as boundary_pd is.",
     )
 
+    frequency_hz: float | None = Field(
+        default=None,
+        gt=0,
+        description="Carrier, Hz; for a moving_target_filter and range_rate_folds.",
+    )
+    prf_hz: float | None = Field(
+        default=None,
+        gt=0,
+        description="Pulse repetition frequency, Hz; as frequency_hz.",
+    )
+
+    @model_validator(mode="after")
+    def _carrier(self) -> Self:
+        for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
+            if getattr(self, key) != off and self.frequency_hz is None:
+                raise ValueError(
+                    f"{key} is {getattr(self, key)!r} and frequency_hz is not given: blind speeds "
+                    "and the unambiguous velocity follow from it"
+                )
+        if self.prf_hz is not None and self.range_km * 1000.0 > unambiguous_range_m(self.prf_hz):
+            raise ValueError(
+                f"prf_hz is {self.prf_hz:g}: echoes are unambiguous up to "
+                f"{unambiguous_range_m(self.prf_hz) / 1000:.4g} km and range_km is "
+                f"{self.range_km:g}; lower one of them"
+            )
+        return self
+
     @property
     def pulses_summed(self) -> int:
         """One look."""
@@ -60,7 +90,8 @@ class RangeBoundary(Radar):
 
     Ground clutter brings the boundary nearer: for the target that it is stated for, the noise at
     the boundary has that target's echo over the SNR that `boundary_pd` needs; the ground's echo
-    comes on top of it, and a threshold from reference cells needs the CFAR loss more.
+    comes on top of it, and a threshold from reference cells needs the CFAR loss more. A
+    moving-target filter changes both echoes.
     """
 
     Parameters = RangeBoundaryParameters
@@ -70,9 +101,9 @@ class RangeBoundary(Radar):
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
     effects = (
-        RangeRate(),
         BlindRange(),
         BoundaryClutter(),
+        DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
         BeamSweep(),
@@ -80,6 +111,11 @@ class RangeBoundary(Radar):
     ladders = (DETECTION,)
     _clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
     _cfar: Averaging | None = None
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        frequency_hz = parameters.frequency_hz
+        self.wavelength_m = None if frequency_hz is None else SPEED_OF_LIGHT_M_S / frequency_hz
 
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""
@@ -97,7 +133,7 @@ class RangeBoundary(Radar):
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
         margin_db = 40.0 * np.log10(ratio)
         detected = np.ones(len(cells), dtype=bool)
-        if self._clutter_rcs_m2 is not None or self._cfar is not None:
+        if not (self._clutter_rcs_m2 is self._cfar is self.doppler is None):
             margin_db = self._margin_db(cells, margin_db)
             detected = margin_db >= 0.0
         for factor in self.snr_factors:
@@ -110,14 +146,20 @@ class RangeBoundary(Radar):
         """Return the margin over what is in the cell, in dB, from that over noise."""
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
-        signal, noise = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        signal, alone = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        noise = alone
+        residue = np.ones(len(cells))
+        if self.doppler is not None:
+            signal, residue = self.doppler(cells)
         if self._clutter_rcs_m2 is not None:
-            clutter = self._clutter_rcs_m2(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
+            clutter = residue * self._clutter_rcs_m2(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
             if p.clutter_threshold == "noise":
                 signal = signal + clutter
             else:
                 noise = noise + needed * clutter
-        margin_db: FloatArray = 10.0 * np.log10(signal / noise)
+        # Where nothing is added, no bit is: that margin is the one over noise.
+        same = (signal == 1.0) & (noise == alone)
+        margin_db: FloatArray = np.where(same, over_noise_db, 10.0 * np.log10(signal / noise))
         if self._cfar is not None:
             margin_db = margin_db - self._cfar.loss_db(p.boundary_pd, "swerling1")
         return margin_db

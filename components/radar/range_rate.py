@@ -1,9 +1,11 @@
 """The true rate of the slant range as an effect: what a radar's Doppler shift comes from."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from components.geometry.ellipsoid import north_east_up
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -62,18 +64,60 @@ def range_rates(cells: Cells, found: IntArray) -> FloatArray:
     the Earth, whatever the two fly. Where one of them changes its velocity at once within that
     time, the rate is between the one before and the one after.
     """
-    rate = np.full(len(found), np.nan)
+    (rate,) = _rates_of(cells, found, lambda seen, times: (seen["range_m"],))
+    return rate
+
+
+def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
+    """Return the rate of each cell's slant range, and how the ownship moves then.
+
+    Parameters
+    ----------
+    cells : Cells
+
+    Returns
+    -------
+    range_rate_m_s : (cells,)
+        Positive when it opens.
+    velocity_m_s : (north, east, down), each (cells,)
+        Of the ownship over ground, in its own north-east-down frame.
+
+    Raises
+    ------
+    ValueError
+        As for `range_rates`.
+    """
+
+    def quantities(seen: Mapping[str, Any], times: int) -> tuple[FloatArray, ...]:
+        there = [seen[f"own_{name}"] for name in ("lat_deg", "lon_deg", "alt_m")]
+        # From where it is at the first of the times: so near that the frame is the same.
+        first = [np.tile(values[: len(values) // times], times) for values in there]
+        return (seen["range_m"], *north_east_up(*first, *there))
+
+    rate, north, east, up = _rates_of(cells, np.arange(len(cells)), quantities)
+    return rate, (north, east, -up)
+
+
+def _rates_of(
+    cells: Cells,
+    found: IntArray,
+    quantities: Callable[[Mapping[str, Any], int], tuple[FloatArray, ...]],
+) -> list[FloatArray]:
+    """Return the rates of quantities of some cells, from differences over a few steps."""
+    rates: list[FloatArray] = []
     missing = np.arange(len(found))
     for points, weights in (_CENTRAL, _AHEAD, _BEHIND):
-        if len(missing) == 0:
+        if len(missing) == 0 and rates:
             break
-        each = found[missing]
+        each, times = found[missing], len(points)
         ahead_s = np.repeat(np.array(points) * STEP_S, len(each))
-        range_m, present = cells.range_at(np.tile(each, len(points)), ahead_s)
-        ranges = range_m.reshape(len(points), -1)
-        total = np.zeros(len(each))
-        for weight, values in zip(weights, ranges, strict=True):
-            total += weight * values
-        rate[missing] = total / STEP_S
-        missing = missing[~present.reshape(len(points), -1).all(axis=0)]
-    return rate
+        seen = cells.seen_at(np.tile(each, times), ahead_s)
+        for number, values in enumerate(quantities(seen, times)):
+            if number == len(rates):
+                rates.append(np.full(len(found), np.nan))
+            total = np.zeros(len(each))
+            for weight, value in zip(weights, values.reshape(times, -1), strict=True):
+                total += weight * value
+            rates[number][missing] = total / STEP_S
+        missing = missing[~seen["present"].reshape(times, -1).all(axis=0)]
+    return rates

@@ -4,13 +4,16 @@ from typing import Any
 
 import numpy as np
 
+from components.radar.field_of_view import cell_size
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
 
 class OneReportByCell(Effect):
-    """Targets whose echoes fall into one cell of the radar's grid give one report.
+    """Targets whose echoes fall into one resolution cell give one report.
+
+    A cell is as wide as the beam, or as a step of the grid where no beamwidth is given.
 
     It is that of the strongest echo, looked at with the sum of their powers (phases are random
     against each other), and with that target's fluctuation and draws. So noise alone reports a
@@ -25,8 +28,12 @@ class OneReportByCell(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``resolution_cells``."""
-        asked = block.p.resolution_cells
-        return Verdict(asked, f"resolution_cells is {str(asked).lower()}")
+        p = block.p
+        if p.resolution_cells is None and p.tells_cells_apart:
+            return Verdict(True, "errors is 'signal', and resolution_cells not false")
+        return Verdict(
+            p.tells_cells_apart, f"resolution_cells is {str(p.tells_cells_apart).lower()}"
+        )
 
     def build(self, block: Any) -> "Merging":
         """Return what adds up the echoes of each cell."""
@@ -38,6 +45,7 @@ class Merging:
 
     def __init__(self, block: Any) -> None:
         self._block = block
+        self._widths = cell_size(block.p)
 
     def __call__(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of the echo that stands for its resolution cell, and 0 of the others.
@@ -57,7 +65,13 @@ class Merging:
             return power
         block = self._block
         seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
-        place = block.grid.round(*seen, cells.range_m)
+        place = [
+            np.rint(values / width)
+            for values, width in zip((*seen, cells.range_m), self._widths, strict=True)
+        ]
+        # Astern the last cell is the first one.
+        astern = np.rint(np.pi / self._widths[0])
+        place[0] = np.where(place[0] == -astern, astern, place[0])
         # By cell, the strongest first; of equals the first of the roster.
         order = np.lexsort((cells.target, -power, *place, cells.row))
         new = np.ones(len(order), dtype=bool)

@@ -6,8 +6,6 @@ from pydantic import Field, model_validator
 
 from components.sensor.parameters import SensorParameters
 
-_CELL = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
-
 
 class ResolutionParameters(SensorParameters):
     """Grid of range, and whether its cells are what the radar tells apart."""
@@ -15,18 +13,29 @@ class ResolutionParameters(SensorParameters):
     range_resolution_m: float = Field(
         default=0.0, ge=0, description="Grid step of measured range, m; 0 measures exactly."
     )
-    resolution_cells: bool = Field(
-        default=False,
-        description="Whether targets in one cell of the grid are one report, of the strongest "
-        "echo at the sum of their powers.",
+    resolution_cells: bool | None = Field(
+        default=None,
+        description="Whether targets in one resolution cell (beam, or grid step) are one report, "
+        "of the strongest echo at the sum of their powers; by default where errors is 'signal'.",
     )
+
+    @property
+    def tells_cells_apart(self) -> bool:
+        """Whether targets of one resolution cell are one report."""
+        if self.resolution_cells is None:
+            return getattr(self, "errors", "grid") == "signal"
+        return self.resolution_cells
 
     @model_validator(mode="after")
     def _cells_have_a_size(self) -> Self:
-        for name in _CELL:
-            if self.resolution_cells and getattr(self, name) == 0:
+        for beam, step in (
+            ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
+            ("elevation_beamwidth_deg", "elevation_resolution_deg"),
+            ("", "range_resolution_m"),
+        ):
+            if self.resolution_cells and not (getattr(self, beam, None) or getattr(self, step)):
                 raise ValueError(
-                    f"{name} is 0 and resolution_cells is true: a cell has a size, it must be "
+                    f"{step} is 0 and resolution_cells is true: a cell has a size, it must be "
                     "above 0"
                 )
         return self

@@ -13,6 +13,7 @@ from components.radar.detection import detection_probability, probability_of_cel
 from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.fading import Fading, LastingFluctuation
 from components.radar.parameters import LinkBudgetParameters
+from components.radar.plausible import noise_at_targets
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.signal_errors import heard
@@ -40,6 +41,13 @@ class SwerlingParameters(LinkBudgetParameters):
         le=LONGEST_S,
         description="How long a sampled RCS lasts, s: the correlation of its power falls as "
         "exp(-2 |dt| / it), whenever it is looked at. By default each scan draws its own.",
+    )
+    scintillation_extent_m: float | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="Extent of a target's scatterers, m: the sampled RCS changes with the aspect, "
+        "within about wavelength / (2 extent). By default aspect changes the mean only.",
     )
     model: Literal["auto"] | None = Field(
         default=None,
@@ -81,7 +89,8 @@ class SwerlingParameters(LinkBudgetParameters):
     @property
     def samples_rcs(self) -> bool:
         """Whether each look has an RCS of its own and a steady target's Pd at it."""
-        return self.fluctuation == "sampled" or self.fluctuation_correlation_s is not None
+        lasting = (self.fluctuation_correlation_s, self.scintillation_extent_m)
+        return self.fluctuation == "sampled" or any(given is not None for given in lasting)
 
 
 class SwerlingRadar(LinkBudgetRadar):
@@ -128,7 +137,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def left_out(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
-        said = super().left_out()
+        said = [*super().left_out(), *noise_at_targets(self.p)]
         return said if self.p.model is None else [*said, *picked_method(self, self._method)]
 
     def range_slack(self) -> float:
@@ -162,9 +171,22 @@ class SwerlingRadar(LinkBudgetRadar):
         for model, chosen in self.models_in_use(cells):
             pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
-        detected = echo & (cells.draws(self._draws) < pd)
+        draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
-        return Look(detected, confidence, extras, heard(snr, cnr))
+        noise = draw >= self._of_target(cells, pd, cnr) if self.p.errors == "signal" else None
+        return Look(echo & (draw < pd), confidence, extras, heard(snr, cnr), noise)
+
+    def _of_target(self, cells: Cells, pd: FloatArray, cnr: FloatArray | None) -> FloatArray:
+        """Return the probability that the target is detected where noise alone is not.
+
+        As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
+        """
+        pfa: Any = self.p.false_alarm_probability
+        if cnr is not None:
+            pfa = np.empty(len(cells))
+            for model, chosen in self.models_in_use(cells):
+                pfa[chosen] = self._pd(np.zeros(len(pfa[chosen])), model, cnr[chosen])
+        return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
@@ -219,9 +241,11 @@ class SwerlingRadar(LinkBudgetRadar):
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
 
-        None where there is ground clutter, which the same loss takes as well, and with CFAR.
+        None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
+        moving-target filter.
         """
-        if terrain_of(self) is not None or self.p.cfar_reference_cells is not None:
+        proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
+        if terrain_of(self) is not None or not proven:
             return None
         return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
 

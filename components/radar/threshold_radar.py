@@ -14,6 +14,7 @@ from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
 from components.radar.clutter_effects import GroundClutter, terrain_of
+from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
@@ -27,7 +28,6 @@ from components.radar.plausible import (
 )
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
-from components.radar.range_rate import RangeRate
 from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
@@ -62,9 +62,9 @@ class LinkBudgetRadar(Radar):
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
-        RangeRate(),
         BlindRange(),
         GroundClutter(),
+        DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
         FalseAlarms(),
@@ -77,6 +77,7 @@ class LinkBudgetRadar(Radar):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         self.budget = parameters.link_budget()
+        self.wavelength_m = self.budget.wavelength
         # Until the scene's effects are known, all that the parameters and targets call for.
         self._echo_budget = self.budget
         #: Each cell's mean RCS, m².
@@ -138,8 +139,15 @@ class LinkBudgetRadar(Radar):
         return signal_variances(self.p, signal["snr"])
 
     def received(self, cells: Cells) -> tuple[FloatArray, FloatArray | None]:
-        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground."""
-        return self.resolved(cells, self.snr(cells)), self.clutter_cnr(cells)
+        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground.
+
+        Both as the detector has them: behind a moving-target filter, where there is one.
+        """
+        snr, cnr = self.snr(cells), self.clutter_cnr(cells)
+        if self.doppler is not None:
+            passed, residue = self.doppler(cells)
+            snr, cnr = snr * passed, None if cnr is None else cnr * residue
+        return self.resolved(cells, snr), cnr
 
     def false_alarm_zero_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""

@@ -77,8 +77,9 @@ def beam_positions(
     The number of beams is the solid angle searched over that of a beam,
     ``n_B = (Θ_A Θ_E) / (θ_a θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z.
     Elsherbeni, *MATLAB Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65.
-    Here each axis is rounded up to whole beams, as a radar steps them. At an elevation ε beams one
-    step of azimuth apart overlap by 1 - cos ε more; nobody saves beams by it here.
+    Here each axis is rounded up to whole beams, as a radar steps them. A beam that sweeps goes
+    through one column of beams after the other, so that it lights an azimuth once per scan. At an
+    elevation ε beams one step of azimuth apart overlap by 1 - cos ε more; nobody saves beams by it.
     """
     counts = []
     for name, width, beam in (

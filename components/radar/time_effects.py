@@ -22,7 +22,7 @@ class TimeBudget(Effect):
         """Ask for ``budget``, and say how the beams share a scan."""
         p = block.p
         if (look := p.look_energy) is not None:
-            pulses = "" if look.pulses is None else f", {look.pulses} pulses"
+            pulses = "" if look.pulses is None else f", pulses in it: {look.pulses}"
             return Verdict(
                 True,
                 f"budget is 'dwell': {look.beams.azimuth} x {look.beams.elevation} beams of "

@@ -82,7 +82,9 @@ class SensorGrid:
 
     @cached_property
     def _range_grid(self) -> Grid:
-        return _grid(self._range_step or 0.0, limit_low=0.0)
+        # Nothing is at range 0, however near it comes: the first step is the nearest report.
+        step = self._range_step or 0.0
+        return _grid(step, limit_low=step)
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:

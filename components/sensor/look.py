@@ -1,5 +1,6 @@
 """A look: the cells that need a sensor's physics, and what the physics says of each."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -24,12 +25,15 @@ class Look:
         Recorded beside the detection: ``snr_db``, ``detection_probability``, ``pixels``.
     signal : dict of (cells,)
         What errors of measurement follow from, where it is not among the extras.
+    noise : (cells,) of bool, optional
+        Which detections noise made, where the sensor tells them from those that the target made.
     """
 
     detected: BoolArray
     confidence: FloatArray
     extras: dict[str, AnyArray] = field(default_factory=dict)
     signal: dict[str, AnyArray] = field(default_factory=dict)
+    noise: BoolArray | None = None
 
 
 class Cells:
@@ -111,8 +115,8 @@ class Cells:
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
 
-    def range_at(self, cells: IntArray, ahead_s: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Return what some cells' ranges are a little before or after they are looked at.
+    def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
+        """Return what is seen of some cells a little before or after they are looked at.
 
         Parameters
         ----------
@@ -122,9 +126,9 @@ class Cells:
 
         Returns
         -------
-        range_m : (n,)
-        present : (n,) of bool
-            Whether both aircraft are there then.
+        dict of (n,) arrays
+            Fields of `RelativeTargets` by name, and the ownship's pose as ``own_lat_deg`` and so
+            on. ``present`` says whether both aircraft are there then.
 
         Raises
         ------
@@ -135,15 +139,15 @@ class Cells:
         if targets.revisit is None:
             raise ValueError(
                 "the range rate needs to know the targets at instants of its own; the traffic, or "
-                "a block on the way, passes no flights on: set measures_range_rate to false"
+                "a block on the way, passes no flights on: set measures_range_rate to false, "
+                "and moving_target_filter to 'none'"
             )
         row, column = np.divmod(self._flat[cells], self._width)
         state = targets.tick if targets.state_tick is None else targets.state_tick
         time_s = self._own(state[row]) / self._ticks_per_s
         if hasattr(targets, "offset_s"):
             time_s = time_s + self.offset_s[cells]
-        seen = targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
-        return seen["range_m"], seen["present"]
+        return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
 
     def _own(self, ticks: IntArray) -> IntArray:
         """Return ticks within their replicas."""

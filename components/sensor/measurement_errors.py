@@ -13,7 +13,7 @@ from components.sensor.grid import VARIANCE_OF, variance_of_step
 from components.sensor.look import Cells, Look
 from components.sensor.quantity_error import QuantityError, mean_square
 from components.sensor.resolution import Grid
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
 # A range that comes out below this, a millimetre, is no range.
@@ -53,6 +53,7 @@ class Erring:
         p = block.p
         self._block, self._signal = block, p.errors == "signal"
         self._steps = _steps(p, block.steps)
+        self._places = block.stream("noise places")
         self._errors = {
             name: QuantityError(
                 _stated(p, name), drawn_bias=p.biases == "drawn", stream=block.stream, name=name
@@ -83,11 +84,49 @@ class Erring:
         of_signal = self._of_signal({name: all_[found] for name, all_ in look.signal.items()})
         keys = cells.roster.keys_of(cells.target[found])
         when = cells.scan[found], cells.instant_ns[found], cells.replica[found]
+        if look.noise is not None and self._signal:
+            true, drawn, of_signal = self._in_cells(
+                true, of_signal, look.noise[found], keys, when[0]
+            )
+        else:
+            drawn = of_signal
         values = {
-            name: true[name] + error(keys, *when, of_signal.get(name))
+            name: true[name] + error(keys, *when, drawn.get(name))
             for name, error in self._errors.items()
         }
         return self._valid(values), self._columns(len(found), of_signal)
+
+    def _in_cells(
+        self,
+        true: Mapping[str, FloatArray],
+        of_signal: Mapping[str, FloatArray],
+        noise: BoolArray,
+        keys: AnyArray,
+        scan: IntArray,
+    ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        """Put what noise made anywhere in the target's cell, which says no more of the target.
+
+        Returns
+        -------
+        places, drawn, stated : mappings of (n,)
+            Values before errors, variances of the errors to be drawn, and variances of both: a
+            target anywhere in a cell and a report anywhere in it are width²/6 apart.
+        """
+        if not noise.any():
+            return true, of_signal, of_signal
+        silent = {"snr": np.zeros(1)}
+        places, drawn, stated = dict(true), dict(of_signal), dict(of_signal)
+        for number, (name, most) in enumerate(self._of_signal(silent).items()):
+            width = math.sqrt(12.0 * float(most[0]))
+            part = self._places.uniform(keys[noise], scan[noise], number)
+            cell = np.rint(true[name][noise] / width)
+            places[name], drawn[name], stated[name] = (
+                values.copy() for values in (true[name], of_signal[name], of_signal[name])
+            )
+            places[name][noise] = (cell + part - 0.5) * width
+            drawn[name][noise] = 0.0
+            stated[name][noise] = width**2 / 6.0
+        return places, drawn, stated
 
     def of_noise(
         self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
@@ -160,7 +199,12 @@ def _mean_squares(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
 
 
 def _stated(p: Any, name: str) -> StatedError:
-    """Return what the scene states of a quantity, in radians, metres and m/s."""
+    """Return what the scene states of a quantity, in radians, metres and m/s.
+
+    Nothing of a quantity for which a user's sensor has no such parameters.
+    """
+    if name not in p.quantities:
+        return StatedError(0.0, 0.0, None)
     stated: StatedError = p.stated_error(name)
     if p.quantities[name] != "deg":
         return stated

@@ -61,6 +61,17 @@ class MountedAxes(BodyAxes):
         self.true_rad = true_rad
         self.believed_rad = believed_rad
 
+    def __eq__(self, other: object) -> bool:
+        """Tell whether two sensors are mounted alike: what they offer of it must compare."""
+        return isinstance(other, MountedAxes) and self._angles == other._angles
+
+    def __hash__(self) -> int:
+        return hash(self._angles)
+
+    @property
+    def _angles(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        return self.true_rad, self.believed_rad
+
     def reach(self, reach: Reach) -> Reach:
         """Return a reach whose field of view lies in the sensor's axes."""
         return MountedReach(

@@ -15,7 +15,8 @@ import numpy as np
 
 from components.messages.constant_columns import constant_column
 from components.messages.detections import Detections, SensorOffer
-from components.messages.reach import CULLED, EVALUATE, SKIP_REASONS, Reach, ReasonArray
+from components.messages.every_look import EveryLook, looks_of
+from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
 from components.sensor.believed_pose import believed_pose
@@ -28,7 +29,7 @@ from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
@@ -63,6 +64,7 @@ class Sensor(Component):
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
+    also_records = (EveryLook,)
     windowed = True
     rewindable = True
     #: Whether detections carry a range.
@@ -111,10 +113,12 @@ class Sensor(Component):
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
+        reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
+            reach = Mounting().build(self).reach(reach)
         return SensorOffer(
-            self.measures_range, resolution_rad, "range_rate" in self.steps, **constant
+            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach, **constant
         )
 
     @cached_property
@@ -132,6 +136,16 @@ class Sensor(Component):
         """What is sent: `Detections`, or a subclass that declares columns of its own."""
         message: type[Detections] = type(self).outputs["detections"].message  # type: ignore[assignment]
         return message
+
+    @cached_property
+    def _says_looks(self) -> bool:
+        """Whether the scene asks for every look."""
+        record = self.context.sections.get("record")
+        return bool(record is not None and record.looks)
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: every look too, where the scene asks for it."""
+        return [self._message, EveryLook] if self._says_looks else [self._message]
 
     @cached_property
     def _judgements(self) -> list[Any]:
@@ -157,7 +171,9 @@ class Sensor(Component):
         raise TypeError(f"{type(self).__name__} has no look(cells)")
 
     def run(self, wake: Wake) -> Detections | None:
-        """Look at every target in reach at every scan of the wake."""
+        """Look at every target in reach at every scan of the wake; nothing where switched off."""
+        if not self.p.enabled:
+            return None
         held = wake.held("targets")
         if held is None:
             return None
@@ -172,7 +188,9 @@ class Sensor(Component):
             self._idle = None if len(cells) else look
         found = look.detected.nonzero()[0]
         culled = None if targets.culled is None else targets.culled[rows]
-        evaluated, skipped = _counted(reason, len(targets.roster), culled)
+        evaluated, skipped = _counted(
+            reason, len(targets.roster), culled, targets.hidden is not None
+        )
         if len(wake) == 1:
             offsets = np.array([0, len(found)], dtype=np.int64)
         else:
@@ -201,6 +219,7 @@ class Sensor(Component):
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
+            looks=looks_of(cells, look, len(wake)) if self._says_looks else None,
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
@@ -365,18 +384,23 @@ def _per_row(mask: BoolArray) -> IntArray:
 
 
 def _counted(
-    reason: ReasonArray, on_roster: int, culled: IntArray | None
+    reason: ReasonArray, on_roster: int, culled: IntArray | None, hides: bool
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return how many targets were evaluated at each scan, and skipped by reason.
 
-    Which of the culled ones the arrays hold, as absent, depends on the window that they came in:
-    what is counted does not.
+    Only where something `hides` targets are hidden ones looked for. Which of the culled ones the
+    arrays hold, as absent, depends on the window that they came in: what is counted does not.
     """
     if len(reason) == 1:  # one pass instead of one for each reason
         count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
         of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
-        of = {code: _per_row(reason == code) for code in (EVALUATE, *SKIP_REASONS.values())}
+        of = {
+            code: _per_row(reason == code)
+            for code in (EVALUATE, *SKIP_REASONS.values())
+            if hides or code != HIDDEN
+        }
+        of.setdefault(HIDDEN, np.zeros(len(reason), dtype=np.int64))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = on_roster - reason.shape[1]
     if culled is None:

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
+from components.terrain.mosaic import mosaic
 from components.terrain.raster import ElevationRaster
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, status_of
@@ -32,11 +33,12 @@ class RasterOfFile:
 
     Parameters
     ----------
-    path : Path
+    paths : tuple of Path
+        Of one file, or of several that lie side by side.
     raster : ElevationRaster
     """
 
-    path: Path
+    paths: tuple[Path, ...]
     raster: ElevationRaster
 
 
@@ -114,24 +116,38 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed_ns: int, size: int) -> RasterOfFile:
+def _read(path: Path, changed_ns: int, size: int) -> ElevationRaster:
     # Runs of a study that name the same file share one raster.
-    return RasterOfFile(path, read_raster(path))
+    return read_raster(path)
+
+
+@lru_cache(maxsize=2)
+def _together(rasters: tuple[ElevationRaster, ...]) -> ElevationRaster:
+    return mosaic(rasters)
 
 
 def _validated(value: Any) -> RasterOfFile:
     if isinstance(value, RasterOfFile):
         return value
-    path = _PATH.validate_python(value)
-    name = shortened(str(path), 300)
-    try:
-        status = status_of(path, LARGEST_RASTER_BYTES)
-        return _read(path, status.st_mtime_ns, status.st_size)
-    except InputFileError as error:
-        raise ValueError(f"must be a raster that can be read: {name}: {error}") from None
+    if isinstance(value, list) and not value:
+        raise ValueError("must name at least one file")
+    paths, rasters = [], []
+    for item in value if isinstance(value, list) else [value]:
+        path = _PATH.validate_python(item)
+        name = shortened(str(path), 300)
+        try:
+            status = status_of(path, LARGEST_RASTER_BYTES)
+            rasters.append(_read(path, status.st_mtime_ns, status.st_size))
+        except InputFileError as error:
+            raise ValueError(f"must be a raster that can be read: {name}: {error}") from None
+        paths.append(path)
+    return RasterOfFile(tuple(paths), _together(tuple(rasters)))
 
 
-#: An elevation raster, .hgt or GeoTIFF.
-RasterFile = Annotated[
-    RasterOfFile, PlainValidator(_validated), PlainSerializer(lambda file: str(file.path))
-]
+def _named(file: RasterOfFile) -> str | list[str]:
+    names = [str(path) for path in file.paths]
+    return names[0] if len(names) == 1 else names
+
+
+#: An elevation raster, .hgt or GeoTIFF, or a list of such that lie side by side.
+RasterFile = Annotated[RasterOfFile, PlainValidator(_validated), PlainSerializer(_named)]

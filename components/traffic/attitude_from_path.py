@@ -78,12 +78,14 @@ def attitude_from_path(
     alt_m: FloatArray,
     *,
     velocity_enu_mps: Vector | None = None,
+    wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
     window_s: float = WINDOW_S,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Derive yaw, pitch and roll at each sample from the flight path.
 
     Yaw is the track over ground, pitch the flight-path angle, roll the bank of a coordinated
-    turn, atan(V·(track rate)/g). No wind, angle of attack or sideslip is known, so none is used.
+    turn, atan(V·(track rate)/g). No angle of attack or sideslip is known, so none is used. Where a
+    wind is given, all three are those of the velocity through the air.
 
     Parameters
     ----------
@@ -93,6 +95,8 @@ def attitude_from_path(
         Measured velocity (east, north, up). Yaw and pitch then come from it at the sample
         itself, and the track rate from a straight line fitted to it over the window. Without it
         a parabola is fitted to the positions.
+    wind_east_north_mps : tuple of two float
+        Where the air goes, the same everywhere.
     window_s : float
         Whole width of the smoothing window.
 
@@ -112,6 +116,8 @@ def attitude_from_path(
         velocity = velocity_enu_mps
         acceleration = _slope_of_velocity(time_s, lat_deg, lon_deg, velocity, window_s)
     v_east, v_north, v_up = velocity
+    if wind_east_north_mps != (0.0, 0.0):
+        v_east, v_north = v_east - wind_east_north_mps[0], v_north - wind_east_north_mps[1]
     speed = np.sqrt(v_east * v_east + v_north * v_north)
     moving = speed >= SLOWEST_TRACK_MPS
     across = v_north * acceleration[0] - v_east * acceleration[1]

@@ -17,6 +17,8 @@ from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
 from components.traffic.suspicious import suspicions
 from components.traffic.traffic_file import TrafficFile
+from components.traffic.wind import scene_wind
+from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
 
@@ -81,10 +83,11 @@ class RecordedTraffic(TrafficSource):
     """
 
     Parameters = FileParameters
+    effects = (CrabAngles(),)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.content = self.read()
+        self.content = self._in_wind(self.read())
         self.own = self.content.ownship
         self.targets = self.content.intruders
         self.fleet = SampledFleet(self.content.intruders)
@@ -94,6 +97,16 @@ class RecordedTraffic(TrafficSource):
             parameters.aircraft,
             str(parameters.file),
         )
+
+    def _in_wind(self, content: TrafficFile) -> TrafficFile:
+        """Return the flights with noses turned into the scene's wind, where there is one."""
+        wind = scene_wind(self.context.sections.get("weather"))
+        if wind is None:
+            return content
+        own, *intruders = (
+            craft.in_wind(wind.east_mps, wind.north_mps) for craft in content.aircraft
+        )
+        return TrafficFile(own, intruders, content.start_time_s, content.notes)
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""

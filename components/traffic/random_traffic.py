@@ -23,6 +23,7 @@ from components.traffic.sample_times import (
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from components.traffic.straight_flights import Starts, flights_of
+from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.randomness import target_keys
 
@@ -62,13 +63,14 @@ class RandomTraffic(TrafficSource):
     """Intruders that start evenly spread over a disc around the ownship and fly straight on."""
 
     Parameters = RandomTrafficParameters
+    effects = (CrabAngles(),)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         p = parameters
         own = p.ownship
         self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own, self.wind)
         )
         names = tuple(f"intruder_{number}" for number in range(1, p.intruders + 1))
         keys = target_keys(names)

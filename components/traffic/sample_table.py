@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -312,7 +313,7 @@ class SampleTable:
         velocity = None
         if {"ve", "vn", "vu"} <= columns.keys():
             velocity = (columns["ve"], columns["vn"], columns["vu"])
-        angles = {
+        angles: dict[str, Any] = {
             f"{key}_rad": np.radians(columns[key])
             for key in ("yaw", "pitch", "roll")
             if key in columns

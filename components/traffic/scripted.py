@@ -1,11 +1,12 @@
 """Scripted traffic: flights written in the scene (``traffic.scripted``)."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.geometry.enu import enu_to_geodetic
@@ -20,6 +21,8 @@ from components.traffic.sample_times import (
 )
 from components.traffic.source import SourceParameters, TrafficSource, Trajectory
 from components.traffic.straight_flights import Starts, flights_of
+from components.traffic.wind import Wind, ground_speed_mps
+from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
@@ -94,8 +97,16 @@ class Flight(Parameters):
     """How an aircraft starts and flies; without legs it flies straight on for ever."""
 
     alt_m: float | None = Field(default=None, description="Altitude at the start, m.")
-    heading_deg: float = Field(default=0.0, description="Heading at the start, deg from north.")
+    heading_deg: float = Field(
+        default=0.0, description="Track over the ground at the start, deg from north."
+    )
     speed_mps: float = Field(default=0.0, ge=0, description="Ground speed, m/s.")
+    airspeed_mps: float | None = Field(
+        default=None,
+        gt=0,
+        description="Level airspeed in place of speed_mps: the ground speed along heading_deg "
+        "follows from the wind; for flights without legs, m/s.",
+    )
     climb_mps: float = Field(default=0.0, description="Rate of climb, m/s.")
     yaw_deg: float | None = Field(default=None, description="Fixed yaw; else the track, deg.")
     pitch_deg: float | None = Field(default=None, description="Fixed pitch; else the path, deg.")
@@ -103,6 +114,20 @@ class Flight(Parameters):
         default=None, description="Fixed roll; else the bank of a coordinated turn, deg."
     )
     legs: list[AnyLeg] = Field(default=[], description="What it does, one after the other.")
+
+    @model_validator(mode="after")
+    def _one_speed(self) -> Self:
+        if self.airspeed_mps is not None and self.legs:
+            raise ValueError(
+                f"airspeed_mps is {self.airspeed_mps:g} and there are legs: their speeds are over "
+                "the ground, give speed_mps"
+            )
+        if self.airspeed_mps is not None and self.speed_mps:
+            raise ValueError(
+                f"airspeed_mps is {self.airspeed_mps:g} and speed_mps is {self.speed_mps:g}: only "
+                "one of them may be given"
+            )
+        return self
 
 
 class Ownship(Flight):
@@ -144,18 +169,19 @@ class ScriptedTraffic(TrafficSource):
 
     Parameters = ScriptedParameters
     lockstep = True
+    effects = (CrabAngles(),)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         own = parameters.ownship
         reference = (own.lat_deg, own.lon_deg, own.alt_m)
         self.own = ScriptedTrajectory(
-            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own)
+            "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg, **flight_arguments(own, self.wind)
         )
         used = Counter(intruder.name for intruder in parameters.intruders)
         for twice in sorted(name for name, count in used.items() if count > 1):
             raise ValueError(f"intruders: the name {twice!r} is used more than once")
-        flights = _intruders(parameters.intruders, reference)
+        flights = _intruders(parameters.intruders, reference, self.wind)
         self.targets = flights
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
@@ -170,12 +196,32 @@ class ScriptedTraffic(TrafficSource):
         return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]
 
 
-def flight_arguments(flight: Flight) -> dict[str, Any]:
+def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
+    """Return a flight's ground speed at its start, given or from its airspeed and the wind.
+
+    Raises
+    ------
+    ValueError
+        If no heading keeps its track in this wind, naming the aircraft.
+    """
+    if flight.airspeed_mps is None:
+        return flight.speed_mps
+    if wind is None:
+        return flight.airspeed_mps
+    try:
+        return ground_speed_mps(math.radians(flight.heading_deg), flight.airspeed_mps, wind)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def flight_arguments(
+    flight: Flight, wind: Wind | None = None, name: str = "ownship"
+) -> dict[str, Any]:
     """Return what a scene says of a flight as arguments of `ScriptedTrajectory`."""
     return {
         "alt_m": flight.alt_m,
         "heading_deg": flight.heading_deg,
-        "speed_mps": flight.speed_mps,
+        "speed_mps": over_the_ground_mps(flight, name, wind),
         "climb_mps": flight.climb_mps,
         "yaw_deg": flight.yaw_deg,
         "pitch_deg": flight.pitch_deg,
@@ -193,7 +239,7 @@ def _leg(leg: Any) -> Any:
 
 
 def _intruders(
-    crafts: Sequence[Intruder], reference: tuple[float, float, float]
+    crafts: Sequence[Intruder], reference: tuple[float, float, float], wind: Wind | None
 ) -> Sequence[ScriptedTrajectory]:
     """Return the flights of all intruders; starts given as offsets are converted together."""
     starts: list[tuple[float, float, float] | None] = []
@@ -214,11 +260,13 @@ def _intruders(
     converted = iter(_geodetic(offsets, reference))
     known = [next(converted) if start is None else start for start in starts]
     if crafts and not any(craft.legs for craft in crafts):
-        return flights_of(_starts(crafts, known))
-    return [_intruder(craft, at, reference) for craft, at in zip(crafts, known, strict=True)]
+        return flights_of(_starts(crafts, known, wind))
+    return [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
 
 
-def _starts(crafts: Sequence[Intruder], known: list[tuple[float, float, float]]) -> Starts:
+def _starts(
+    crafts: Sequence[Intruder], known: list[tuple[float, float, float]], wind: Wind | None
+) -> Starts:
     """Return flights without legs as columns."""
     lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).T.copy()
 
@@ -228,7 +276,8 @@ def _starts(crafts: Sequence[Intruder], known: list[tuple[float, float, float]])
 
     return Starts(
         [craft.name for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
-        column("speed_mps"), column("climb_mps"), column("start_time_s"),
+        np.array([over_the_ground_mps(craft, craft.name, wind) for craft in crafts]),
+        column("climb_mps"), column("start_time_s"),
         column("end_time_s", np.inf),
         np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
     )  # fmt: skip
@@ -250,7 +299,10 @@ def _geodetic(
 
 
 def _intruder(
-    craft: Intruder, start: tuple[float, float, float], reference: tuple[float, float, float]
+    craft: Intruder,
+    start: tuple[float, float, float],
+    reference: tuple[float, float, float],
+    wind: Wind | None,
 ) -> ScriptedTrajectory:
     lat_deg, lon_deg, alt_m = start
     return ScriptedTrajectory(
@@ -260,5 +312,5 @@ def _intruder(
         reference=reference,
         start_time_s=craft.start_time_s,
         end_time_s=craft.end_time_s,
-        **flight_arguments(craft) | {"alt_m": alt_m},
+        **flight_arguments(craft, wind, craft.name) | {"alt_m": alt_m},
     )

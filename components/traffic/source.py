@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from components.messages.known_flights import Flights, KnownFlights
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
+from components.messages.true_states import TrueStates
 from components.traffic.censored import censored_approaches, present_together_s
 from components.traffic.closest_approach import (
     Approaches,
@@ -30,6 +31,8 @@ from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
 from components.traffic.terrain_check import check_above_terrain, check_on_raster
+from components.traffic.true_flights import TrueFlights, truth_is_recorded
+from components.traffic.wind import Wind, scene_wind
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -99,12 +102,19 @@ class TrafficSource(Component):
     windowed = True
     rewindable = True
     clocked = "demand"
+    hooks = {"attitude": "turns the attitudes that follow from paths, of_own and of_targets"}
 
     own: Trajectory
     fleet: Fleet
     targets: Sequence[Trajectory]
     roster: Roster
+    also_records = (TrueStates,)
     _offered: KnownTraffic | None = None
+
+    @property
+    def wind(self) -> Wind | None:
+        """The scene's wind, or None."""
+        return scene_wind(self.context.sections.get("weather"))
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -125,7 +135,12 @@ class TrafficSource(Component):
 
     def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        return traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
+        envelope = traffic_envelope(self.own, self.targets, self.fleet, duration_s, reach_m)
+        weather = self.context.sections.get("weather")
+        if weather is not None and weather.wind_mps > 0.0:
+            # In wind a nose may point anywhere.
+            return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
+        return envelope
 
     def serves_replicas(self) -> bool:
         """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
@@ -144,6 +159,7 @@ class TrafficSource(Component):
                 float(self.context.duration_s),
             )
         self._all_columns = np.arange(len(self.roster))
+        self._crabbing: list[Any] = self.built("attitude")
         self._culling: Culling | None = None
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
@@ -153,6 +169,8 @@ class TrafficSource(Component):
         if self.context.producers:
             self.own = SteeredFlight(self.own)
         self._flights_now: Flights = partial(self.flights, self.own)
+        self._says_truth = truth_is_recorded(self.context, len(self.roster))
+        self._truth_now = self._true_flights()
         #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
         self._told: list[tuple[int, Manoeuvre]] = []
 
@@ -188,7 +206,7 @@ class TrafficSource(Component):
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
-        flights = self._steer(wake)
+        flights, truth = self._steer(wake)
         time_s = wake.time_s
         columns, fleet, near = self._all_columns, self.fleet, None
         if self._steered_culling is not None:
@@ -198,6 +216,10 @@ class TrafficSource(Component):
             if self._culling is not None:
                 columns, fleet, near = self._culling.cut(time_s)
         states = fleet.at(time_s)
+        own = self._own_in_wind(own, time_s)
+        for crabbing in self._crabbing:
+            times = np.broadcast_to(time_s[:, np.newaxis], states.lat_deg.shape)
+            states = crabbing.of_targets(columns, states, times)
         present = states.present & own.present[:, np.newaxis]
         culled = None
         if near is not None:
@@ -222,7 +244,22 @@ class TrafficSource(Component):
             columns=columns,
             culled=culled,
             flights=flights,
+            true_flights=truth,
+            run_time_s=None if truth is None else time_s,
         )
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: the truth where a scene is small, or asks for it."""
+        return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
+
+    def own_at(self, time_s: FloatArray) -> TrajectoryState:
+        """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
+        return self._own_in_wind(self.own.at(time_s), time_s)
+
+    def _own_in_wind(self, own: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
+        for crabbing in self._crabbing:
+            own = crabbing.of_own(self.own, own, time_s)
+        return own
 
     def flights(
         self,
@@ -257,16 +294,21 @@ class TrafficSource(Component):
         if self._culling is not None:
             near = self._culling.intervals.holds(columns_each, times)
             others = replace(others, present=others.present & near)
-        return own.at(time_s), others.reshaped(time_s.shape)
+        seen, others = own.at(time_s), others.reshaped(time_s.shape)
+        for crabbing in self._crabbing:
+            seen = crabbing.of_own(own, seen, time_s)
+            others = crabbing.of_targets(columns, others, time_s)
+        return seen, others
 
-    def _steer(self, wake: Wake) -> KnownFlights | None:
+    def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
         """Steer the ownship at the times at which manoeuvres have come.
 
         Returns
         -------
-        KnownFlights or None
-            The flights as they are known at each row, where a block asks for them: a row knows
-            the manoeuvres that have come by its own instant, whatever came later in this wake.
+        flights, truth : KnownFlights or None
+            The flights as they are known at each row, where a block asks for them and where the
+            truth is recorded: a row knows the manoeuvres that have come by its own instant,
+            whatever came later in this wake.
         """
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
@@ -276,17 +318,26 @@ class TrafficSource(Component):
         # must not depend on how far a window reached beyond it.
         told = [one for one in self._told if one[0] <= last]
         self._told = self._told[len(told) :]
-        known = [self._flights_now]
+        known, true = [self._flights_now], [self._truth_now]
         for tick, manoeuvre in told:
             assert isinstance(self.own, SteeredFlight)
             self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
             known.append(partial(self.flights, self.own))
-        self._flights_now = known[-1]
-        if not self._flights_asked_for:
-            return None
+            true.append(self._true_flights())
+        self._flights_now, self._truth_now = known[-1], true[-1]
+        if not self._flights_asked_for and self._truth_now is None:
+            return None, None
         # A manoeuvre has come before anything runs at its instant.
         came = np.array([tick for tick, _ in told], dtype=np.int64)
-        return KnownFlights(known, np.searchsorted(came, wake.ticks, side="right"))
+        of_row = np.searchsorted(came, wake.ticks, side="right")
+        return (
+            KnownFlights(known, of_row) if self._flights_asked_for else None,
+            None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
+        )
+
+    def _true_flights(self) -> TrueFlights | None:
+        """Return all flights as they are known now, if the truth is recorded."""
+        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""

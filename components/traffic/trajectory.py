@@ -57,6 +57,8 @@ class SampledTrajectory:
         Ground velocity east, north, up at the samples.
     yaw_rad, pitch_rad, roll_rad : array_like, optional
         Attitude where known; what is not given is derived from the path.
+    wind_east_north_mps : tuple of two float
+        Where the air goes: a derived attitude is that of the velocity through it.
 
     Raises
     ------
@@ -77,6 +79,7 @@ class SampledTrajectory:
         yaw_rad: npt.ArrayLike | None = None,
         pitch_rad: npt.ArrayLike | None = None,
         roll_rad: npt.ArrayLike | None = None,
+        wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         east, north, up = velocity_enu_mps if velocity_enu_mps is not None else (None,) * 3
         given = checked_samples(
@@ -111,7 +114,11 @@ class SampledTrajectory:
         self.derived_attitude = tuple(
             angle for angle in ("yaw", "pitch", "roll") if f"{angle}_rad" not in given
         )
-        attitude = attitude_from_path(*path, velocity_enu_mps=self.velocity_enu_mps)
+        attitude = attitude_from_path(
+            *path,
+            velocity_enu_mps=self.velocity_enu_mps,
+            wind_east_north_mps=wind_east_north_mps,
+        )
         yaw, pitch, roll = (
             given.get(key, derived)
             for key, derived in zip(("yaw_rad", "pitch_rad", "roll_rad"), attitude, strict=True)
@@ -119,6 +126,24 @@ class SampledTrajectory:
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
         self.coefficients = self._fit_segments()
         self.max_speed_mps = self._speed_bound()
+
+    def in_wind(self, east_mps: float, north_mps: float) -> SampledTrajectory:
+        """Return the same flight with what was derived of its attitude derived with a wind."""
+        known = {
+            f"{angle}_rad": getattr(self, f"{angle}_rad")
+            for angle in ("yaw", "pitch", "roll")
+            if angle not in self.derived_attitude
+        }
+        return SampledTrajectory(
+            self.name,
+            self.sample_times_s,
+            self.lat_deg,
+            self.lon_deg,
+            self.alt_m,
+            velocity_enu_mps=self.velocity_enu_mps,
+            wind_east_north_mps=(east_mps, north_mps),
+            **known,
+        )
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give the aircraft's state at some times.

@@ -139,11 +139,15 @@ class Producer:
         Our input.
     offer : object
         What its `Component.offer` returned for the output it feeds us from.
+    latest_s : Fraction
+        How late its messages come at most: latency, delay and jitter of the wire; what waits for
+        a processor may come later still.
     """
 
     block: str
     port: str
     offer: Any
+    latest_s: Fraction = Fraction(0)
 
 
 @dataclass

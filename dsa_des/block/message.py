@@ -166,6 +166,9 @@ class Message:
     #: whose columns do not writes it, and `tables`, itself.
     recorded: ClassVar[Mapping[str, Mapping[str, str]]] = _DerivedRecorded()  # type: ignore[assignment]
 
+    #: Unit, frame and meaning of recorded columns, table → column → texts: metadata of the tables.
+    described: ClassVar[Mapping[str, Mapping[str, tuple[str, str, str]]]] = {}
+
     #: Static fields that may differ between messages: `concatenate` brings them together.
     joins_static: ClassVar[frozenset[str]] = frozenset()
 

@@ -11,6 +11,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_text import to_toml
 from dsa_des.library.scenes import scene_of_any
+from dsa_des.record.notes import notes_of
 from dsa_des.record.picture import pictures_in
 from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
 from dsa_des.record.run_folder import Run, read_run
@@ -88,7 +89,8 @@ def _in_memory(
     info = info_of(simulation, recorder, outcome, summary, text, time.perf_counter() - started)
     if notes:
         info["notes"] = notes
-    arrow = tables.tables()
+    said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
+    arrow = said.on(tables.tables())
     return Run(None, info, arrow, text, lambda: _drawn(reports, simulation, arrow, summary))
 
 

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
 from dsa_des.block.recorded_columns import Columns, Schema, Text, is_empty, nothing_in
+from dsa_des.record.notes import Notes
 
 # Row groups of 64k rows: groups of 1k rows were measured to be five times slower to write.
 ROW_GROUP = 65536
@@ -106,10 +107,12 @@ class ParquetSink:
     Parameters
     ----------
     folder : Path
+    notes : Notes, optional
+        What the files say of themselves.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, notes: Notes | None = None) -> None:
+        self._folder, self._notes = folder, notes
         self._schemas: Mapping[str, Schema] = {}
         self._writers: dict[str, pq.ParquetWriter] = {}
         self._pieces: dict[str, list[Columns]] = {}
@@ -130,6 +133,9 @@ class ParquetSink:
                 write_statistics=["tick"],
                 store_schema=False,
             )
+            if self._notes is not None:
+                said = self._notes.of_file(table, arrow_schema(schema))
+                self._writers[table].add_key_value_metadata(said)
             self._pieces[table] = []
             self._counts[table] = 0
 

@@ -90,7 +90,12 @@ class Assembly:
         """
         for name in sorted(self.components, key=lambda name: (self._place[name], name)):
             self.components[name].context.producers = [
-                Producer(wire.source, wire.input, self._asked(wire.source, "offer", wire.output))
+                Producer(
+                    wire.source,
+                    wire.input,
+                    self._asked(wire.source, "offer", wire.output),
+                    wire.total_delay_s + Fraction(wire.jitter_s),
+                )
                 for wire in self._scene.wires
                 if wire.target == name
             ]

@@ -15,6 +15,7 @@ from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_text import to_toml
 from dsa_des.record.attempts import attempt
+from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import ObserverSink, Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.version import __version__
@@ -98,7 +99,10 @@ def record_run(
         # Arrow takes longer to import than most scenes to check: not before all is well.
         from dsa_des.record.arrow import ParquetSink
 
-        tables = ParquetSink(folder)
+        scene_text = to_toml(loaded.resolved())
+        messages = simulation.recorded_messages()
+        said = notes_of(messages, scene_text, loaded.seed, simulation.ticks_per_s)
+        tables = ParquetSink(folder, said)
         recorder.sinks += [tables, observers]
         started = time.perf_counter()
         try:
@@ -109,7 +113,6 @@ def record_run(
         summary = summary_of(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
-        scene_text = to_toml(loaded.resolved())
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)

@@ -249,14 +249,15 @@ class Simulation:
             )
         self._has_run = True
 
+    def recorded_messages(self) -> list[type[Message]]:
+        """Return the message types whose tables are recorded."""
+        blocks = self.components.values()
+        messages = [message for block in blocks for message in block.records()]
+        return [*messages, Processing] if self.scene.processors else messages
+
     def _open_recorder(self) -> None:
         if self.recorder is not None:
-            messages: list[type[Message]] = [
-                message for block in self.components.values() for message in block.records()
-            ]
-            if self.scene.processors:
-                messages.append(Processing)
-            self.recorder.open(messages, self.ticks_per_s, self.span_ticks)
+            self.recorder.open(self.recorded_messages(), self.ticks_per_s, self.span_ticks)
 
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:

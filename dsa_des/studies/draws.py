@@ -19,7 +19,7 @@ from dsa_des.time.randomness import key_of
 
 #: No normal draw lies farther out: the smallest probability is 2^-54.
 _MOST_SIGMA = 9.0
-KINDS = ("uniform", "normal", "choice", "latin_hypercube")
+KINDS = ("uniform", "normal", "choice", "latin_hypercube", "sequence")
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,10 @@ class Draw:
     ----------
     key : str
         Dotted key of the scene.
-    kind : {"uniform", "normal", "choice"}
+    kind : {"uniform", "normal", "choice", "sequence"}
     values : tuple
-        Lowest and highest; mean and standard deviation; or what to choose from.
+        Lowest and highest; mean and standard deviation; what to choose from; or the value of the
+        first replica and the step to the next.
     stratified : bool
         Whether replicas share the range out among themselves (Latin hypercube).
     """
@@ -58,6 +59,9 @@ class Draw:
         batch : int
             How many consecutive replicas a Latin hypercube covers together.
         """
+        if self.kind == "sequence":
+            first, step = self.values
+            return first + step * replica
         u = _uniform(seed, self.key, replica)
         if self.stratified:
             block, place = divmod(replica, batch)
@@ -112,7 +116,7 @@ def parse_draw(key: str, table: Any) -> Draw:
         With what is wrong and what is allowed.
     """
     form = "must be one of {uniform = [low, high]}, {normal = [mean, standard deviation]}, " \
-        "{choice = [...]}, {latin_hypercube = [low, high]}"  # fmt: skip
+        "{choice = [...]}, {latin_hypercube = [low, high]}, {sequence = [first, step]}"  # fmt: skip
     if not isinstance(table, dict) or len(table) != 1:
         raise ValueError(form)
     ((kind, values),) = table.items()
@@ -126,6 +130,13 @@ def parse_draw(key: str, table: Any) -> Draw:
             raise ValueError("choice is empty: give at least one value")
         if any(isinstance(value, int) and abs(value) >= 2**63 for value in values):
             raise ValueError("choice holds a whole number beyond 2^63")
+        return Draw(key, kind, tuple(values))
+    if kind == "sequence":
+        whole = [isinstance(v, int) and not isinstance(v, bool) for v in values]
+        if isinstance(values, dict) or len(values) != 2 or not all(whole):
+            raise ValueError("sequence takes two whole numbers: [first value, step]")
+        if any(abs(value) >= 2**40 for value in values):
+            raise ValueError("sequence holds a whole number beyond 2^40")
         return Draw(key, kind, tuple(values))
     low, high = _two_numbers(kind, values)
     if kind == "normal":

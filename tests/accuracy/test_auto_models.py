@@ -161,6 +161,7 @@ def test_a_named_cheap_model_stays(configs: Path) -> None:
     ("sets", "because"),
     [
         (["blocks.eo.dynamic_weight=0.1"], "eo weighs the line of sight's rate"),
+        (["blocks.radar.measures_range_rate=true"], "radar measures range rates"),
         (["accuracy.detection_probability=1e-9"], "could change a Pd by more than [accuracy]"),
     ],
 )

@@ -32,7 +32,7 @@ def enumerated(weights):
 
 @pytest.mark.parametrize("probability", [0.9, 0.997])
 def test_gates_hold_their_probability(probability):
-    for size in (2, 3, 4):
+    for size in (1, 2, 3, 4, 5):
         assert chi2.cdf(gate_threshold(probability, size), size) == pytest.approx(probability)
 
 

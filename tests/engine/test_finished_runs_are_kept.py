@@ -14,7 +14,7 @@ from components.traffic.source import TrafficSource
 from dsa_des.cli import main
 from dsa_des.record.recording import ObserverSink
 
-TABLES = {"detections", "fused", "scans", "tracks"}
+TABLES = {"detections", "fused", "scans", "tracks", "truth"}
 
 
 def run(configs, out, *options):

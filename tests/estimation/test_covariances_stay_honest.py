@@ -8,7 +8,7 @@ from components.estimation.frame import Place
 from components.estimation.kalman import distance_squared, innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.motion import ConstantVelocity, predict
-from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_innovation
+from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
 
 SIGMA = SigmaPoints()
 
@@ -24,7 +24,7 @@ def step(name, model, state, covariance, dt, kind, place, variance):
     state, covariance = predict_unscented(model, state, covariance, dt, SIGMA)
     return (
         state, covariance,
-        unscented_innovation(kind, state, covariance, place, variance, SIGMA),
+        unscented_moments(kind, state, covariance, place, SIGMA).innovation(variance),
     )  # fmt: skip
 
 

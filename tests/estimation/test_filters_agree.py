@@ -25,7 +25,7 @@ from components.estimation.motion import (
     CoordinatedTurn,
     predict,
 )
-from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_innovation
+from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
 from tests.wiring import crooked
 
 FLIP = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])  # their up is our down
@@ -51,7 +51,7 @@ def test_every_update_agrees_with_stone_soup(name):
             found = innovation(*linearised(kind, state, place), covariance, variance)
         else:
             state, covariance = predict_unscented(model, state, covariance, dt, sigma)
-            found = unscented_innovation(kind, state, covariance, place, variance, sigma)
+            found = unscented_moments(kind, state, covariance, place, sigma).innovation(variance)
         state, covariance = updated(state, covariance, found, residual(values, found.expected))
         last_s = time_s
         np.testing.assert_allclose(state[:, 0], np.array(known["state"]) * FLIP, rtol=1e-10)

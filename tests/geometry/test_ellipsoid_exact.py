@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.geometry import ellipsoid
+from components.geometry.enu import enu_to_geodetic
 
 MP = mpmath.MPContext()  # our own precision: the global context is left alone
 MP.dps = 40
@@ -183,3 +184,18 @@ def test_skipping_validation_changes_nothing_else():
     checked = ellipsoid.line_of_sight(*pairs)
     unchecked = ellipsoid.line_of_sight(*pairs, validate=False)
     assert all(np.array_equal(a, b) for a, b in zip(checked, unchecked, strict=True))
+
+
+def test_points_about_a_reference_each_are_those_of_each_alone():
+    pymap3d = pytest.importorskip("pymap3d")
+    rng = np.random.default_rng(12)
+    lat, lon = rng.uniform(-85, 85, 40), rng.uniform(-180, 180, 40)
+    alt = rng.uniform(0, 9000, 40)
+    east, north, up = rng.uniform(-30e3, 30e3, (3, 40))
+    together = enu_to_geodetic(
+        east, north, up, reference_lat_deg=lat, reference_lon_deg=lon, reference_alt_m=alt
+    )
+    theirs = pymap3d.enu2geodetic(east, north, up, lat, lon, alt)
+    assert together[0] == pytest.approx(theirs[0], abs=1e-9)
+    assert np.abs((together[1] - theirs[1] + 180.0) % 360.0 - 180.0).max() < 1e-8
+    assert together[2] == pytest.approx(theirs[2], abs=1e-4)

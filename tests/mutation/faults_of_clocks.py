@@ -112,8 +112,8 @@ FAULTS = [
         ("age-always-zero", "age_s=age_s[row, column],", "age_s=0.0 * age_s[row, column],"),
         ("age-in-ticks", ") / self.context.ticks_per_s\n        held", ") / 1.0\n        held"),
         ("age-of-the-last-update-of-any",
-         'ticks[:, np.newaxis] - pool["tick"][np.maximum(last, 0)]',
-         'ticks[:, np.newaxis] - np.max(pool["tick"][np.maximum(last, 0)], axis=1)[:, np.newaxis]'),
+         'pool["measured_tick"][np.maximum(last, 0)]',
+         'np.max(pool["measured_tick"][np.maximum(last, 0)], axis=1)[:, np.newaxis]'),
     ),
     *in_file(
         _GROUP, "components/fusion/coincidence.py",
@@ -126,8 +126,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/fusion/gate_match.py",
         ("wiring/test_gated_fusion_angles.py", "cost/test_gated_fusion.py"),
-        ("oldest-in-the-gate", "-other_ticks[candidate[inside]],",
-         "other_ticks[candidate[inside]],"),
+        ("oldest-in-the-gate", "            late,\n", "            -late,\n"),
         ("widest-apart", "            apart_rad[inside],\n", "            -apart_rad[inside],\n"),
     ),
     *in_file(

@@ -67,8 +67,8 @@ FAULTS = [
         _GROUP, "components/fusion/false_alarms.py", _NOISE,
         ("alarm-s-source-is-the-first", '("angle_source", index),', '("angle_source", 0),'),
         ("alarm-s-elevation-is-azimuth",
-         'columns[column].append(getattr(new.message, column)[false])',
-         'columns[column].append(new.message.azimuth_rad[false])'),
+         'columns[column].append(getattr(new.message, column)[false])\n            columns[f"true',
+         'columns[column].append(new.message.azimuth_rad[false])\n            columns[f"true'),
     ),
     *in_file(
         _GROUP, "components/messages/false_detections.py",

@@ -204,8 +204,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/navigation/effects.py", "wiring/test_navigation_keys.py",
-        ("bias-alone-is-no-error", "            if any(values)\n",
-         '            if any(values) and "bias" not in key\n'),
+        ("bias-alone-is-no-error", "        if any(values)\n",
+         '        if any(values) and "bias" not in key\n'),
     ),
     *in_file(
         _GROUP, "components/radar/detection_rung.py",

@@ -212,8 +212,14 @@ FAULTS = [
          "sigma_north_east_down_m=navigation.position_bias_m"),
     ),
     *in_file(
-        _GROUP, "components/sensor/believed_pose.py", "wiring/test_navigation_keys.py",
-        ("believed-altitude-is-latitude", '"lon_deg", "alt_m",', '"lon_deg", "lat_deg",'),
+        _GROUP, "components/sensor/believed_pose.py",
+        ("wiring/test_pose_beside_every_detection.py", "wiring/test_navigation_keys.py"),
+        ("believed-altitude-is-latitude", '"lon_deg", "alt_m"', '"lon_deg", "lat_deg"'),
+        ("believed-pitch-is-roll", '"pitch_rad", "roll_rad"', '"roll_rad", "pitch_rad"'),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/carried.py", ("wiring/test_no_peeking.py",),
+        ("carried-by-the-pose-then", "*after[3:])", "*before[3:])"),
     ),
     *in_file(
         _GROUP, "components/navigation/error_model.py",

@@ -72,7 +72,7 @@ def test_targets_are_those_of_the_tables(source, file, rcs, swerling, engine, tm
 
 @pytest.mark.parametrize("file", sorted(CONFIGS.glob("sensors/*.toml")), ids=lambda file: file.stem)
 def test_every_sensor_file_makes_a_block(file, tmp_path):
-    kind = {"o": "radar", "a": "eo", "m": "ir"}[file.stem[0]]
+    kind = {"o": "radar", "d": "radar", "a": "eo", "m": "ir"}[file.stem[0]]
     path = tmp_path / "scene.toml"
     first_light = CONFIGS / "first_light.toml"
     path.write_text(f'extends = "{first_light}"\n[blocks.{kind}]\nextends = "{file}"\n', "utf-8")

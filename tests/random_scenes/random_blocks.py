@@ -55,6 +55,14 @@ def common(dice: Dice, table: dict[str, Any]) -> None:
         table["declare_m"], table["declare_n"] = dice.pick((1, 1), (1, 3), (2, 3), (3, 5))
     if dice.chance(0.03, "sensor switched off"):
         table["enabled"] = False
+    if dice.chance(0.25, "stated errors"):
+        table |= {"errors": "stated", "azimuth_error_deg": dice.pick(0.3, 9, 120)}
+        dice.maybe(table, "azimuth_correlation_time_s", 0.5, 0.001, 2, 100000)
+        dice.maybe(table, "azimuth_bias_deg", 0.5, -3, 20)
+        dice.maybe(table, "elevation_error_deg", 0.5, 0.2, 70)
+        dice.maybe(table, "elevation_bias_deg", 0.5, 0.5)
+        dice.maybe(table, "biases", 0.3, "fixed")
+        dice.maybe(table, "quantised", 0.3, False)
 
 
 def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
@@ -65,8 +73,28 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
             dice.features.add("sweeping beam in a loop")
     dice.maybe(table, "range_resolution_m", 0.3, 10, 76.2)
     dice.maybe(table, "minimum_range_m", 0.15, 10, 500)
+    if dice.chance(0.2, "range rate"):
+        table["measures_range_rate"] = True
+        dice.maybe(table, "range_rate_resolution_m_s", 0.5, 2.5)
+    if table.get("errors") == "stated":
+        dice.maybe(table, "range_error_m", 0.7, 21, 400)
+        dice.maybe(table, "range_bias_m", 0.5, 125)
+        if "range_error_m" in table:
+            dice.maybe(table, "range_correlation_time_s", 0.5, 0.1, 30)
+    dice.maybe(table, "resolution_cells", 0.2, True, False)
+    dice.maybe(table, "clutter_threshold", 0.15, "noise")
+    dice.maybe(table, "cfar_reference_cells", 0.15, 6, 24)
+    if dice.chance(0.2, "moving target filter"):
+        table["moving_target_filter"] = dice.pick(
+            "single_canceller", "double_canceller", "filter_bank"
+        )
+        table["prf_hz"] = dice.pick(900, 5000)
+        dice.maybe(table, "clutter_lock", 0.3, False)
+        dice.maybe(table, "range_rate_folds", 0.3, "measures_range_rate" in table)
     if table["type"] == "radar.range_boundary":
         table["range_km"] = dice.pick(1, 5, 15)
+        if "moving_target_filter" in table:
+            table["frequency_hz"] = 9.4e9
         return
     dice.maybe(table, "range_km", 0.5, 1, 5, 15)
     table |= _OASYS
@@ -87,6 +115,14 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
             "azimuth_deg": [-60, 60], "elevation_deg": [-10, 10],
             "cell_false_alarm_probability": dice.pick(0.001, 0.01),
         }  # fmt: skip
+    if dice.chance(0.2, "errors by the signal"):
+        table |= {
+            "errors": "signal", "azimuth_beamwidth_deg": 4, "elevation_beamwidth_deg": 6,
+            "budget": "free", "range_resolution_m": table.get("range_resolution_m", 30),
+        }  # fmt: skip
+        if "measures_range_rate" in table:
+            table.setdefault("dwell_s", 0.01)
+        dice.maybe(table, "angle_measurement", 0.3, "scan")
     if table["type"] == "radar.threshold":
         dice.maybe(table, "threshold_db", 0.3, -3.0, 10.0)
         return
@@ -96,6 +132,14 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
         table["model"] = "auto"
     if dice.chance(0.4, "sampled fluctuation"):
         table["fluctuation"] = "sampled"
+    if "fluctuation" in table and dice.chance(0.4, "lasting fluctuation"):
+        table["fluctuation_correlation_s"] = 0.7
+        dice.maybe(table, "scintillation_extent_m", 0.5, 0.5, 8.0)
+        if "pulses" not in table and dice.chance(0.5, "time budget"):
+            table |= {
+                "budget": "dwell", "azimuth_beamwidth_deg": 60, "elevation_beamwidth_deg": 60,
+                "prf_hz": 4000, "pulses_per_dwell": 20, "integration_gain_db": 0,
+            }  # fmt: skip
 
 
 def camera(dice: Dice, table: dict[str, Any]) -> None:
@@ -106,6 +150,8 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
     dice.maybe(table, "range_km", 0.4, 1, 5, 15)
     table |= {"azimuth_pixels": dice.pick(640, 2048), "elevation_pixels": 512}
     table["threshold"] = dice.pick(0.1, 1, 5)
+    if dice.chance(0.2, "errors by contrast"):
+        table |= {"errors": "signal", "noise_equivalent_contrast": dice.pick(0.02, 0.5)}
     if dice.chance(0.3, "dynamic signature"):
         table["dynamic_weight"] = dice.pick(0.5, 20)
         dice.maybe(table, "rate", 0.5, "exact", "thesis")
@@ -121,6 +167,8 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
     if table["type"] == "optical.ir":
         if dice.chance(0.2, "plume"):
             table["plume"] = True
+        if dice.chance(0.3, "infrared band"):
+            table["band"] = dice.pick("mwir", "lwir")
     elif dice.chance(0.4, "background"):
         table["background"] = dice.pick("auto", "sky", "ground")
         dice.maybe(table, "sky", 0.5, "clear", "partly_cloudy", "overcast")
@@ -188,6 +236,8 @@ def sections(dice: Dice) -> dict[str, Any]:
             "rain": {"rain_rate_mm_h": dice.pick(1, 20, 100)},
             "fog": {"fog_water_g_m3": dice.pick(0.05, 1), "fog_top_m": dice.pick(500, 2000)},
             "visibility": {"visibility_km": dice.pick(1, 23)},
+            "wind": {"wind_mps": dice.pick(3, 25), "wind_from_deg": dice.pick(0, 217)},
+            "night": {"night": dice.pick(True, False)},
         }.items():
             if dice.chance(0.4, feature):
                 weather |= values
@@ -196,6 +246,11 @@ def sections(dice: Dice) -> dict[str, Any]:
         found["terrain"] = {"height_m": dice.pick(-10, 50)}
         dice.maybe(found["terrain"], "clutter_gamma_db", 0.5, -20, 0, 20)
         dice.maybe(found["terrain"], "clutter_mean", 0.5, "constant", "fluctuating")
+        dice.maybe(found["terrain"], "clutter_motion_m_s", 0.3, 0.4)
+    if dice.chance(0.2, "what the Earth hides"):
+        terrain = found.setdefault("terrain", {})
+        dice.maybe(terrain, "horizon", 0.8, True)
+        dice.maybe(terrain, "refraction", 0.5, "four_thirds")
     if dice.chance(0.25, "navigation"):
         navigation: dict[str, Any] = {}
         dice.maybe(navigation, "position_bias_m", 0.5, [5, -3, 2])

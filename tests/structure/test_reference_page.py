@@ -38,6 +38,7 @@ def test_every_recorded_column_is_described_and_none_besides():
         ("_m_s", "m/s"),
         ("_rad2", "rad²"),
         ("_m2", "m²"),
+        ("_m2_s", "m²/s"),
         ("_m2_s2", "m²/s²"),
     ],
 )
@@ -45,7 +46,7 @@ def test_units_are_those_of_the_names(column, unit):
     for columns in [LEADING, *COLUMNS.values()]:
         for name, (said, _, meaning) in columns.items():
             assert meaning
-            rate = name.endswith(("rad_s", "m_s")) and column in ("_s", "_m")
+            rate = name.endswith(("rad_s", "m_s", "m2_s")) and column in ("_s", "_m")
             if name.endswith(column) and not rate:
                 assert said == unit, name
 

@@ -28,6 +28,7 @@ COMMON_WORDS = {
     "skipped",  # what becomes of a message at a busy processor
     "confidence",  # of an interval
     "pixels",  # a unit
+    "truth",  # what a ladder compares with
 }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from components.evidence.terrain.synthetic_raster import NAME, main, synthetic_heights_m
 from components.terrain.hidden import behind_terrain, behind_the_limb, miss_bound_m
+from components.terrain.mosaic import mosaic
 from components.terrain.raster import ElevationRaster
 from components.terrain.raster_files import read_raster
 from components.terrain.rays import bent_elevation_rad, dip_rad, geodetic_of, rays_between
@@ -173,6 +174,30 @@ def test_an_hgt_file_runs_from_north_to_south(tmp_path):
     found, _ = raster.height(np.array([46.0, 45.0, 45.25]), np.array([7.0, 8.0, 7.5]))
     assert found.tolist() == [1.0, 9.0, 6.5]
     assert read_raster(hgt(tmp_path, np.zeros((2, 2)), "S05W070.hgt")).south_deg == -5.0
+
+
+def test_tiles_side_by_side_are_one_raster():
+    rng = np.random.default_rng(9)
+    whole = np.round(rng.uniform(0, 900, (5, 9)))  # rows from the south, across ±180
+    tiles = [
+        ElevationRaster(-42.0, west, 0.25, 0.25, whole[:, at : at + 5], name)
+        for west, at, name in ((-180.0, 4, "east"), (179.0, 0, "west"))
+    ]
+    for pair in (tiles, tiles[::-1]):
+        made = mosaic(pair)
+        assert (made.height_m == whole).all() and made.name.endswith("and 1 more")
+        lon = np.array([179.125, -179.875, -180.0, 180.0, -179.1])
+        found, inside = made.height(np.full(5, -41.4), lon)
+        expected = map_coordinates(whole, [np.full(5, 2.4), (lon - 179) % 360 * 4], order=1)
+        assert inside.all() and found == pytest.approx(expected, rel=1e-6)
+    assert mosaic(tiles[:1]) is tiles[0]
+    corner = ElevationRaster(-41.0, 179.0, 0.25, 0.25, whole[:, :5], "north")
+    with pytest.raises(ValueError, match="has 16 holes"):
+        mosaic([*tiles, corner])
+    with pytest.raises(ValueError, match=r"fine has nodes every 0\.1 by 0\.25"):
+        mosaic([tiles[0], ElevationRaster(-42.0, 179.0, 0.1, 0.25, whole[:, :5], "fine")])
+    with pytest.raises(ValueError, match="do not fall onto those of east"):
+        mosaic([tiles[0], ElevationRaster(-42.1, 179.0, 0.25, 0.25, whole[:, :5], "off")])
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,14 @@ from typing import Any
 
 import crooked
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pymap3d
 import pytest
 from covering import covers
 from wired import Row, chain, rows, run, sensor
+
+from components.encounters.set_file import read_set
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 50.0}
 WARM = {"front_m2": 3.0, "back_m2": 9.0, "side_m2": 8.0, "horizontal_m2": 30.0}
@@ -65,6 +70,44 @@ def daa_one(craft: dict, folder) -> dict:
     return {**daa_any({}, folder), "aircraft": {"one": craft}}
 
 
+def in_set(craft: dict, folder) -> dict:
+    """The two at rest as tracks of a set: north, east and altitude."""
+    lat, lon, alt = crooked.geodetic(
+        crooked.position({**OTHER, "heading_deg": 0.0, "speed_mps": 0.0, "climb_mps": 0.0},
+                         ownship=OWN)
+    )  # fmt: skip
+    other = pymap3d.geodetic2enu(lat, lon, 0.0, OWN["lat_deg"], OWN["lon_deg"], 0.0)
+    columns = {
+        "encounter": [0, 0], "weight": [1.0, 1.0], "aircraft": ["own", "one"],
+        "time_s": [[0.0, 1.0, 2.0]] * 2, "north_m": [[0.0] * 3, [other[1]] * 3],
+        "east_m": [[0.0] * 3, [other[0]] * 3], "altitude_m": [[OWN["alt_m"]] * 3, [alt] * 3],
+    }  # fmt: skip
+    path = folder / "set.parquet"
+    pq.write_table(pa.table(columns), path)
+    place = {"lat_deg": OWN["lat_deg"], "lon_deg": OWN["lon_deg"]}
+    return {"type": "traffic.encounters", "file": str(path), "intruder": craft, **place}
+
+
+def in_set_one(craft: dict, folder) -> dict:
+    return {**in_set({}, folder), "aircraft": {"one": craft}}
+
+
+def modelled(craft: dict, folder) -> dict:
+    return {**in_set(craft, folder), "type": "traffic.encounter_model"}
+
+
+def modelled_one(craft: dict, folder) -> dict:
+    return {**modelled({}, folder), "aircraft": {"one": craft}}
+
+
+@pytest.fixture(autouse=True)
+def a_model_that_gives_the_two(monkeypatch):
+    """What a model makes cannot be put at one place: here it gives what stands in its file."""
+    monkeypatch.setattr(
+        "components.encounters.encounter_traffic._made", lambda file, *_: read_set(file)
+    )
+
+
 CARRIERS = {
     "traffic.scripted.intruders": scripted,
     "traffic.random.aircraft": random,
@@ -72,6 +115,10 @@ CARRIERS = {
     "traffic.csv.aircraft": csv_one,
     "traffic.daa_file.intruder": daa_any,
     "traffic.daa_file.aircraft": daa_one,
+    "traffic.encounters.intruder": in_set,
+    "traffic.encounters.aircraft": in_set_one,
+    "traffic.encounter_model.intruder": modelled,
+    "traffic.encounter_model.aircraft": modelled_one,
 }
 SENSORS = {
     "radar": sensor("radar.swerling"),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from covering import RADARS, covers
 from scipy.optimize import brentq
+from scipy.stats import binom
 from wired import chain, rows, run, sensor
 
 import dsa_des
@@ -110,6 +111,19 @@ def test_pd_in_clutter_is_that_over_noise_and_clutter(cells):
         assert row["detection_probability"] == pytest.approx(expected, rel=2e-3)
         margin_db = 10.0 * math.log10(snr / needed[cells])
         assert row["confidence"] == pytest.approx(margin_db, abs=1e-6)
+
+
+def test_so_many_looks_detect_as_is_said():
+    """A still target in clutter, 20,000 looks, threshold from an average."""
+    table = scene("radar.swerling", -32.0, false_alarm_probability=1e-2, power_w=8.0,
+                  cfar_reference_cells=10, scan_rate_hz=1000)  # fmt: skip
+    target = {**LOW, "speed_mps": 0.0, "east_m": 0.3 * LOW["east_m"], "north_m": 1900.0}
+    table["blocks"]["traffic"]["intruders"], table["duration_s"] = [target], 20
+    found = rows(run(table))
+    pd = found[0]["detection_probability"]
+    assert 0.1 < pd < 0.9
+    low, high = binom.interval(0.99, 20_000, pd)
+    assert low <= len(found) <= high
 
 
 def test_a_threshold_radar_needs_the_loss_of_its_cells_more():

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 from covering import covers
 from scipy.special import gammaincc
-from scipy.stats import norm
+from scipy.stats import gamma, kstest, ncx2, norm
 from wired import HEARS_ALL, chain, rows
 
 import dsa_des
 from components.radar.detection import detection_probability
+from components.radar.fading import fading_power
+from components.radar.scatterers import Scatterers
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
+from dsa_des.time.randomness import Stream, target_keys
 
 PFA = 1e-4
 RADAR: dict[str, Any] = {
@@ -108,15 +111,18 @@ def test_a_faster_radar_sees_the_same_fades_at_the_same_instants():
 
 
 def test_windows_and_replicas_together_change_nothing():
-    keys = {"fluctuation_correlation_s": 0.7, "power_w": 3.5, "beam_sweep": True}
-    whole = looks(5, 3, **keys)
-    assert 20 < len(whole) < 140
+    keys = {
+        "fluctuation_correlation_s": 0.7, "power_w": 3.5, "beam_sweep": True,
+        "scintillation_extent_m": 5.0, "swerling": 3,
+    }  # fmt: skip
+    whole = looks(5, 2, **keys)
+    assert 20 < len(whole) < 100
     for window in (1, 7):
-        assert looks(5, 3, window=window, **keys).equals(whole)
-    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=3)
+        assert looks(5, 2, window=window, **keys).equals(whole)
+    scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=2)
     study = dsa_des.study(
         scene, metrics=["first_detection"], axes={"blocks.sensor.scan_rate_hz": [5, 10]},
-        replicas=2, workers=1,
+        replicas=1, workers=1,
     )  # fmt: skip
     for row in study.runs.to_pylist():
         again = [f"blocks.sensor.scan_rate_hz={row['sensor.scan_rate_hz']:g}"]
@@ -133,6 +139,76 @@ def test_a_beam_that_sweeps_meets_the_fade_of_its_own_instant():
     ratio = np.abs(np.log(swept[:-1] / started[:-1]))
     late = np.nanmean(ratio, axis=0)
     assert np.nanmin(late) < 0.3 < np.nanmax(late)
+
+
+def ball(x: Any) -> Any:
+    """Return the Fourier transform of an even ball of radius 1, over its volume."""
+    return 3.0 * (np.sin(x) - x * np.cos(x)) / x**3
+
+
+@covers("scintillation_extent_m", of=("radar.swerling",))
+@pytest.mark.parametrize("turned", [{"yaw_deg": 0.03}, {"roll_deg": 0.08}, {"pitch_deg": 0.06}])
+@pytest.mark.parametrize("extent_m", [4.0, 8.0])
+def test_an_echo_scintillates_as_the_target_turns(turned, extent_m):
+    """Correlation of the scatterers in a ball, over the turn of the line of sight by pymap3d."""
+    count, seen, sides = 500, [], []
+    attitude = {"yaw_deg": 31.0, "pitch_deg": 11.0, "roll_deg": 38.0}
+    for more in ({}, turned):
+        angles = {key: value + more.get(key, 0.0) for key, value in attitude.items()}
+        targets = [{**target, **angles} for target in formation(count)]
+        radar = {**RADAR, **LOUD, "scintillation_extent_m": extent_m, "scan_rate_hz": 1}
+        found = rows(dsa_des.run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
+        by_name = {row["target"]: 10.0 ** (0.1 * row["snr_db"]) for row in found}
+        power = np.array([by_name.get(target["name"], np.nan) for target in targets])
+        seen.append(power / np.nanmean(power))
+        sides.append([crooked.aspect(target) for target in targets])
+    one, other = (np.array(side) / np.linalg.norm(side, axis=1)[:, np.newaxis] for side in sides)
+    apart = np.linalg.norm(one - other, axis=1)
+    wavelength_m = 299_792_458.0 / 35e9
+    expected = float(np.mean(ball(2.0 * math.pi * extent_m / wavelength_m * apart) ** 2))
+    assert np.nanvar(seen[0]) == pytest.approx(1.0, abs=0.4)
+    found = float(np.nanmean((seen[0] - 1.0) * (seen[1] - 1.0)))
+    assert found == pytest.approx(expected, abs=0.2)
+    assert np.corrcoef(np.nan_to_num(seen))[0, 1] == pytest.approx(expected, abs=0.13)
+
+
+def test_who_is_seen_from_one_side_does_not_scintillate():
+    still = power(scintillation_extent_m=0.5, count=40, duration_s=2)
+    assert np.nanvar(still[0]) > 0.3
+    assert still == pytest.approx(np.broadcast_to(still[0], still.shape), abs=0.03, nan_ok=True)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_over_targets_the_echo_of_scatterers_is_gaussian(seed):
+    """Power of one and of two echoes against Gamma(1) and Gamma(2), 20,000 targets: 99 %."""
+    keys = target_keys(tuple(f"t{number}" for number in range(20_000)))
+    aspect = np.random.default_rng(seed).normal(size=(3, len(keys)))
+    aspect /= np.linalg.norm(aspect, axis=0)
+    scatterers = Scatterers(Stream(seed, "radar", "scatterers"), 6.0, 0.0086)
+    parts = [*scatterers.echo(keys, tuple(aspect), 0), *scatterers.echo(keys, tuple(aspect), 1)]
+    for count in (2, 4):
+        found = fading_power(parts[:count])
+        assert kstest(found, gamma(count / 2, scale=2 / count).cdf).pvalue > 0.01
+    assert np.abs(np.corrcoef(parts) - np.eye(4)).max() < 4.0 / math.sqrt(len(keys))
+
+
+def test_a_look_has_a_steady_target_s_pd_at_the_power_it_meets():
+    for keys in ({"fluctuation_correlation_s": 1.0}, {"scintillation_extent_m": 5.0}):
+        found = looks(60, 0.5, power_w=3.5, **keys).to_pydict()
+        snr = 10.0 ** (0.1 * np.array(found["snr_db"]))
+        assert np.std(snr) > 1.0
+        # Rice: a steady echo among noise, over -ln Pfa.
+        expected = ncx2.sf(-2.0 * math.log(PFA), 2, 2.0 * snr)
+        assert found["detection_probability"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_time_and_aspect_together_forget_with_the_time_where_the_aspect_stays():
+    values = power(
+        fluctuation_correlation_s=0.5, scintillation_extent_m=6.0, count=60, duration_s=4
+    )
+    product = np.nanmean((values[2:] - 1.0) * (values[:-2] - 1.0))
+    assert product == pytest.approx(math.exp(-2.0 * 0.2 / 0.5), abs=0.15)
+    assert abs(np.nanmean((values[15:] - 1.0) * (values[:-15] - 1.0))) < 0.15
 
 
 def declared_share(lasts_s: float | None, rate_hz: float) -> float:
@@ -194,11 +270,14 @@ def test_it_is_said_and_where_nothing_fluctuates_it_is_left_out():
     assert given.simulated and "correlated with 0.368" in given.because
     assert verdict(fluctuation_correlation_s=0.2, swerling=0).because == "swerling is 0"
     assert not verdict().simulated
+    # 8.57 mm over 17.1 m.
+    assert "aspects 0.029 deg apart" in verdict(scintillation_extent_m=8.566).because
 
 
-@pytest.mark.parametrize("lasts_s", [0, -1.0, 1e8, "long"])
-def test_a_time_that_cannot_be_is_one_error(lasts_s):
+@pytest.mark.parametrize("key", ["fluctuation_correlation_s", "scintillation_extent_m"])
+@pytest.mark.parametrize("value", [0, -1.0, 1e8, "long"])
+def test_a_time_or_an_extent_that_cannot_be_is_one_error(key, value):
     with pytest.raises(SceneError) as caught:
-        load_scene(chain({"sensor": {**RADAR, "fluctuation_correlation_s": lasts_s}}))
+        load_scene(chain({"sensor": {**RADAR, key: value}}))
     assert len(caught.value.problems) == 1
-    assert "blocks.sensor.fluctuation_correlation_s" in str(caught.value)
+    assert f"blocks.sensor.{key}" in str(caught.value)

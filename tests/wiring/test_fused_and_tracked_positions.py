@@ -136,13 +136,14 @@ def test_each_gate_parts_what_lies_beyond_it(gates, sensors):
     assert {row["sensors"] for row in last} == expected
 
 
-@covers("drop_after_s", of=("tracking.stub",))
-def test_a_track_is_dropped_when_it_is_old():
+@covers("drop_after_s", of=("tracking.stub", "tracking.hold_last"))
+@pytest.mark.parametrize("kind", ["tracking.stub", "tracking.hold_last"])
+def test_a_track_is_dropped_when_it_is_old(kind):
     """The target leaves after half a second; the other one keeps the tracker updated."""
     targets = [{**crooked.ROLLING, "end_time_s": 0.5}, crooked.DIVING]
     ends = {}
     for drop_after_s in (0.5, 1.0):
-        tracker = {**TRACKER, "drop_after_s": drop_after_s}
+        tracker = {**TRACKER, "type": kind, "drop_after_s": drop_after_s}
         sensors = {"radar": {**HEARS_ALL, "scan_rate_hz": 8}}
         scene = chain(
             sensors, targets=targets, duration_s=3, tracker=tracker,

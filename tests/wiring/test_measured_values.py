@@ -9,6 +9,9 @@ import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
 from wired import alone, chain, rows, run, sensor
 
+from components.radar.parameters import RadarParameters
+from components.radar.radar_block import Radar
+from components.sensor.look import Look
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
 
@@ -34,7 +37,14 @@ def test_however_large_errors_are_values_stay_what_they_can_be(kind, quantised):
     assert (azimuth > -math.pi).all() and (azimuth <= math.pi).all() and azimuth.std() > 1.0
     assert (np.abs(elevation) <= 0.5 * math.pi).all() and elevation.std() > 0.5
     if radar:
-        assert (range_m >= (90.0 if quantised else 1e-3)).all() and range_m.std() > 500.0
+        nearest = 90.0 if quantised else 1e-3
+        assert (range_m >= nearest).all() and (range_m == nearest).mean() < 0.1
+
+
+@pytest.mark.parametrize("kind", RADARS)
+def test_nothing_is_reported_at_range_0(kind):
+    ranges = columns(kind, "range_m", range_resolution_m=6000.0)
+    assert ranges[0].tolist() == [6000.0, 6000.0]
 
 
 @pytest.mark.parametrize("kind", RADARS)
@@ -43,7 +53,7 @@ def test_errors_near_astern_and_overhead_go_the_short_way(kind):
     place = {"speed_mps": 70.0, "heading_deg": 217.0, "yaw_deg": 217.0, "climb_mps": 3.0}
     targets = [
         {"name": "astern", "east_m": 1805.4, "north_m": 2395.9, "up_m": 0.0, **place},
-        {"name": "above", "east_m": 3.0, "north_m": 2.0, "up_m": 3000.0, **place},
+        {"name": "above", "east_m": 12.0, "north_m": 10.0, "up_m": 3000.0, **place},
     ]
     ownship = {**crooked.OWNSHIP, "yaw_deg": 217.0, "pitch_deg": 0.0, "roll_deg": 0.0}
     keys = {"errors": "stated", "azimuth_error_deg": 0.5, "elevation_error_deg": 0.5}
@@ -111,6 +121,35 @@ def test_range_rate_begins_and_ends_with_a_flight():
     assert [row["scan"] for row in found] == [2, 3, 4, 5, 6, 7, 8]
     rates = np.array([row["range_rate_m_s"] for row in found])
     np.testing.assert_allclose(np.diff(rates), np.diff(rates).mean(), rtol=0.1)
+
+
+class PlainRadar(Radar):
+    """A radar of somebody who has not heard of range rates."""
+
+    Parameters = RadarParameters
+
+    def look(self, cells):
+        everything = np.ones(len(cells))
+        return Look(everything > 0.0, everything)
+
+
+def test_a_radar_of_one_s_own_measures_range_rates_too(monkeypatch):
+    monkeypatch.setattr(looks, "PlainRadar", PlainRadar, raising=False)
+    block = {"type": "looks:PlainRadar", "scan_rate_hz": 1, "measures_range_rate": True}
+    block |= {"errors": "stated", "range_rate_error_m_s": 1e-9}
+    own, ours = (
+        run(chain({"sensor": keys}))["detections"]["range_rate_m_s"].to_numpy()
+        for keys in (block, sensor("radar.threshold", measures_range_rate=True))
+    )
+    np.testing.assert_allclose(own, ours, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_pulses_that_are_summed_make_errors_smaller(kind):
+    keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False}
+    names = "range_variance_m2", "azimuth_variance_rad2"
+    one, ten = (np.array(columns(kind, *names, **keys, pulses=pulses)) for pulses in (1, 10))
+    np.testing.assert_allclose(one / ten, 10.0, rtol=1e-9)
 
 
 @covers("range_rate_resolution_m_s", of=RADARS)

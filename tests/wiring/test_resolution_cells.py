@@ -111,6 +111,18 @@ VIEW = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [({}, True), (CELL, False), ({"range_resolution_m": 10.0}, True),
+     ({"errors": "stated", "azimuth_error_deg": 1.0}, False)],
+)  # fmt: skip
+def test_explain_says_where_noise_is_reported_exactly_at_the_target(keys, said):
+    radar = sensor("radar.swerling", **keys)
+    simulation = Simulation(dsa_des.load_scene(chain({"radar": radar})))
+    lines = simulation.components["radar"].left_out()
+    assert any("reported exactly where the target is" in line for line in lines) is said
+
+
 def warned(kind: str = "radar.threshold", **keys) -> list[str]:
     radar = {**sensor(kind), **VIEW, **keys}
     found = warnings_of(Simulation(dsa_des.load_scene(chain({"radar": radar}))))
@@ -135,3 +147,53 @@ def test_the_thesis_s_probability_is_said_to_be_its():
     scene = chain({"radar": {**default, **VIEW, "false_alarms": True}})
     *_, said = warnings_of(Simulation(dsa_des.load_scene(scene)))
     assert "(the thesis's, as the scene gives none): with 15,000 resolution cells" in said
+
+
+BEAM = {
+    "azimuth_beamwidth_deg": 5.0, "elevation_beamwidth_deg": 4.0, "range_resolution_m": 90.0,
+    "scan_rate_hz": 5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("keys", "merges"),
+    [({}, False), ({"resolution_cells": True}, True), ({"errors": "signal"}, True),
+     ({"errors": "signal", "resolution_cells": False}, False),
+     ({"errors": "stated", "azimuth_error_deg": 0.1}, False)],
+)  # fmt: skip
+def test_beams_are_the_cells_where_they_are_given(keys, merges):
+    """And where errors follow from the signal, targets of one cell are one report by default."""
+    found: dict[int, dict[str, dict]] = {}
+    radar = sensor("radar.threshold", **BEAM, **keys)
+    for row in rows(run(chain({"radar": radar}, targets=TARGETS, duration_s=4))):
+        found.setdefault(row["scan"], {})[row["target"]] = row
+    apart = {
+        (row["scan"], row["target"]): row
+        for row in rows(run(chain({"radar": sensor("radar.threshold", **BEAM)}, targets=TARGETS,
+                                  duration_s=4)))
+    }  # fmt: skip
+    together = 0
+    for scan, each in found.items():
+        cell = {}
+        for name in ("diving", "faint"):
+            row = apart[scan, name]
+            cell[name] = (
+                round(math.degrees(row["true_azimuth_rad"]) / 5.0),
+                round(math.degrees(row["true_elevation_rad"]) / 4.0),
+                round(row["true_range_m"] / 90.0),
+            )
+        one = cell["diving"] == cell["faint"]
+        together += one
+        assert ("faint" in each) is not (one and merges)
+        assert "diving" in each and "rolling" in each
+    assert 2 < together < len(found) - 2
+
+
+def test_noise_fills_the_beams_of_the_field_of_view():
+    """20 by 10 by 30 cells of 5 by 4 deg and 100 m, however fine the grid."""
+    view = {**VIEW, "azimuth_beamwidth_deg": 5.0, "elevation_beamwidth_deg": 4.0,
+            "azimuth_resolution_deg": 0.1}  # fmt: skip
+    found = rows(alone("radar.threshold", **view, false_alarms=True, scan_rate_hz=50,
+                       false_alarm_probability=1e-3, duration_s=4), target=None)  # fmt: skip
+    low, high = binom.interval(0.99, 20 * 10 * 30 * 200, 1e-3)
+    assert low <= len(found) <= high

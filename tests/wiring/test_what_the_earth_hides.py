@@ -56,6 +56,17 @@ def test_the_limb_hides_what_is_behind_it(terrain, seen, beam_sweep):
     assert scan["skipped_range"] + scan["skipped_absent"] + scan["skipped_field_of_view"] == 0
 
 
+@pytest.mark.parametrize("scans", [1, 3])
+def test_a_sensor_without_a_gate_does_not_see_through_the_earth(scans):
+    scene = chain({"radar": RADAR}, ownship=OWN, targets=AT_THE_LIMB,
+                  terrain={"horizon": True}, duration_s=scans)  # fmt: skip
+    scene["wires"] = ["traffic -> transform -> radar"]
+    del scene["blocks"]["gate"]
+    done = run(scene)
+    assert {row["target"] for row in rows(done)} == {"near"}
+    assert [row["skipped_hidden"] for row in rows(done, "scans")] == [2] * scans
+
+
 @covers("refraction", of=("[terrain]",))
 def test_a_bent_ray_arrives_from_above():
     target = far("high", 60e3, 2000.0)
@@ -121,6 +132,10 @@ def test_a_ridge_hides_what_is_behind_it(offset_m, tmp_path):
     assert expected == {"at 2", "at 6"}
     assert {row["target"] for row in rows(done)} == expected
     assert rows(done, "scans")[0]["skipped_hidden"] == 2
+    # Beside another tile it is the same; resolved scenes name both files.
+    both = {**terrain, "raster": [terrain["raster"], wall(tmp_path, 0, "S42E179.hgt")]}
+    scene = chain({"radar": RADAR}, ownship=own, targets=targets, terrain=both)
+    assert {row["target"] for row in rows(run(scene))} == expected
     lower = {**terrain, "raster": wall(tmp_path, crest - 20, "S42W180_low.hgt")}
     free = run(chain({"radar": RADAR}, ownship=own, targets=targets, terrain=lower))
     assert len(rows(free)) == 4

@@ -14,6 +14,7 @@ from components.evidence.scan_rate.expected import (
     mean_range_m,
     ranges_of_declaration,
 )
+from components.evidence.scan_rate.fading import fading_section
 from components.evidence.thesis.plotting import BLUE, GREY, PINK, RADAR, legend_below, panels
 from dsa_des.library.study import StudyResult, study
 from dsa_des.scene.examples import find_example
@@ -60,23 +61,18 @@ A single detection needs no second look, so its own optimum lies below 0.1 Hz, w
 comes nearer by a tenth of its range between looks (Mallett & Brennan, Proc. IEEE 51(4), 1963).
 Pulses that are summed in power (`integration = "noncoherent"`, dotted) gain less from a
 longer look, so that the best rate is higher.
-
-Not in here: echoes fade independently from look to look, however soon a scan looks again.
 """
 
 
-def page(images: Path, *, replicas: int | None = None) -> str:
+def page(images: Path) -> str:
     """Run the study, draw the figure and return the page.
 
     Parameters
     ----------
     images : Path
         Folder that receives the figure.
-    replicas : int, optional
-        Fewer of them for a quick look.
     """
-    sets = [] if replicas is None else [f"replicas={replicas}"]
-    result = study(STUDY, sets=sets)
+    result = study(STUDY)
     found = simulated(result)
     approach = approach_of(study_scene())
     rates = sorted({rate for _, rate in found})
@@ -86,7 +82,7 @@ def page(images: Path, *, replicas: int | None = None) -> str:
         closing=f"{approach.closing_m_s:g}", m=M, n=N, replicas=count, figure=FIGURE
     )
     text += "\n".join(table(found, approach, rates)) + "\n"
-    return text + _explained(approach)
+    return text + _explained(approach) + fading_section(images, approach, M, N, CERTAIN)
 
 
 def simulated(result: StudyResult) -> dict[tuple[str, float], Any]:
@@ -231,6 +227,7 @@ def draw(
             axes.set_title(title, fontsize=10)
             axes.set_xlabel("scan rate, Hz")
             axes.set_xticks(_TICKS_HZ, [f"{tick:g}" for tick in _TICKS_HZ])
+            axes.set_xticks([], minor=True)
         left.set_ylabel("range of declaration, km")
         for budget, colour in (("free", GREY), ("dwell", RADAR)):
             for rate in rates:

@@ -1,0 +1,116 @@
+"""``dsa-des encounters convert``: sets from public formats, and back."""
+
+from pathlib import Path
+
+import numpy as np
+
+from components.encounters.encounter_set import EncounterSet
+from components.encounters.generate_command import check_place
+from components.encounters.public_formats import (
+    read_paired_text,
+    read_waypoints,
+    set_of_tracks,
+    waypoints_of,
+)
+from components.encounters.set_file import EncounterSetError, read_set, set_writer, without
+from components.encounters.table_file import kept_rows, numbers, read_table
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.input_files import InputFileError, resolve_home
+from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_names import named, reason_of
+from dsa_des.terminal.terminal import say
+
+TEXT, WAYPOINTS, SET = ".txt", (".bin", ".dat"), ".parquet"
+
+
+def convert_sets(
+    files: tuple[str, ...],
+    weights: str | None,
+    at: tuple[float, float] | None,
+    skip_damaged: bool,
+    out: str,
+) -> None:
+    """Write what is in some files as one set, or as a file of waypoints.
+
+    Raises
+    ------
+    UsageError
+        With what is wrong, naming file and encounter.
+    OutputError
+        If writing fails.
+    """
+    if at is not None:
+        check_place(at)
+    path = named(out)
+    if path.suffix.lower() not in (SET, *WAYPOINTS):
+        raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
+    check_file(path)
+    try:
+        found = _read([resolve_home(text) for text in files], at or (0.0, 0.0), skip_damaged)
+        if at is not None:
+            found = EncounterSet(**{**vars(found), "reference_deg": at})
+        if weights is not None:
+            found = EncounterSet(**{**vars(found), "weights": _weights(weights, found)})
+        if path.suffix.lower() == SET:
+            with set_writer(path, {"made_by": "conversion"}) as writer:
+                writer.write(found)
+        else:
+            write_file(path, waypoints_of(found))
+    except InputFileError as error:
+        raise UsageError(str(error)) from None
+    except EncounterSetError as error:
+        raise UsageError(*str(error).split("\n")) from None
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {len(found)} encounters")
+    if found.skipped:
+        say(f"{found.skipped} damaged encounters were skipped")
+
+
+def _read(paths: list[Path], at: tuple[float, float], skip_damaged: bool) -> EncounterSet:
+    kinds = {path.suffix.lower() for path in paths}
+    if kinds == {SET} and len(paths) == 1:
+        return read_set(paths[0], skip_damaged)
+    if len(paths) == 1 and kinds <= set(WAYPOINTS):
+        return _waypoints(paths[0], at, skip_damaged)
+    if kinds != {TEXT}:
+        raise UsageError(
+            f"{', '.join(map(str, paths[:5]))}: must be one set ({SET}), one file of waypoints "
+            f"({' or '.join(WAYPOINTS)}), or paired tracks ({TEXT}), one encounter each"
+        )
+    tracks, kept, wrong = [], [], []
+    for number, path in enumerate(paths):
+        try:
+            tracks.append(read_paired_text(path))
+            kept.append(number)
+        except EncounterSetError as error:
+            wrong.append(str(error))
+    if wrong and (not skip_damaged or not tracks):
+        raise EncounterSetError("\n".join(wrong[:20]))
+    return set_of_tracks(str(paths[0].parent), kept, [1.0] * len(kept), tracks, at, len(wrong))
+
+
+def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> EncounterSet:
+    encounters, damaged = read_waypoints(path)
+    if damaged and (not skip_damaged or len(damaged) == len(encounters)):
+        lines = [f"{path}: encounter {k}: {said}" for k, said in sorted(damaged.items())]
+        raise EncounterSetError("\n".join(lines[:20]))
+    if not encounters:
+        raise EncounterSetError(f"{path}: holds no encounter")
+    every = range(len(encounters))
+    found = set_of_tracks(str(path), every, np.ones(len(encounters)).tolist(), encounters, at)
+    return without(found, sorted(damaged)) if damaged else found
+
+
+def _weights(text: str, found: EncounterSet) -> FloatArray:
+    """Return the weights that a table with the columns ``encounter`` and ``weight`` gives."""
+    table = read_table(text)
+    number, wrong = numbers(table, "encounter", "--weights", flag=False)
+    weight, also = numbers(table, "weight", "--weights", flag=False)
+    kept_rows(table, [wrong, also], skip=False)
+    known = dict(zip(number.astype(np.int64).tolist(), weight.tolist(), strict=True))
+    missing = [n for n in found.numbers.tolist() if n not in known]
+    if missing:
+        raise UsageError(f"{text}: encounter {missing[0]}: weight is missing")
+    return np.array([known[n] for n in found.numbers.tolist()])

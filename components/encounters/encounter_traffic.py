@@ -1,0 +1,137 @@
+"""Traffic of encounters: one of a set (``traffic.encounters``), or one that a model makes.
+
+Which one it is is a parameter, so that a study has one encounter per replica. An encounter is a
+function of its number: the same in every scene and condition.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from components.encounters.encounter_set import EncounterSet
+from components.encounters.model_file import read_model
+from components.encounters.pair_densities import PairingRules
+from components.encounters.pair_sets import set_of_pairs
+from components.encounters.pairing import PairSampler
+from components.encounters.set_file import read_set
+from components.traffic.files import FileParameters, RecordedTraffic
+from components.traffic.traffic_file import TrafficFile
+from dsa_des.block.component import ScenePath
+
+
+class OneEncounter(FileParameters):
+    """Parameters of traffic that is one encounter of many."""
+
+    encounter: int = Field(
+        default=0, ge=0, le=2**53, description="Number of the encounter that is flown."
+    )
+    dynamics: Literal["euler", "point_mass"] = Field(
+        default="euler",
+        description="How initial states and events are flown: steps of 1 s with straight paths "
+        "between them, or a point mass at 0.1 s with limits on turn, bank and pitch rate.",
+    )
+    lat_deg: float | None = Field(
+        default=None, ge=-89, le=89, description="Where the origin is put, instead of the set's."
+    )
+    lon_deg: float | None = Field(
+        default=None, ge=-360, le=360, description="Its longitude; given with `lat_deg`."
+    )
+
+
+class SetParameters(OneEncounter):
+    """Parameters of traffic from a set of encounters."""
+
+    file: ScenePath = Field(description="The set: a Parquet file of `dsa-des encounters`.")
+    skip_damaged: bool = Field(
+        default=False,
+        description="Use the set without its damaged encounters; otherwise any is an error.",
+    )
+
+
+class ModelParameters(OneEncounter):
+    """Parameters of traffic that an encounter model makes."""
+
+    file: ScenePath = Field(description="Text file of the encounter model of the ownship.")
+    intruder_file: ScenePath | None = Field(
+        default=None, description="That of the intruder; left out, the same."
+    )
+    model_seed: int = Field(
+        default=0,
+        ge=0,
+        description="Seed of the encounters; the scene's own seed does not change them.",
+    )
+
+
+class _EncounterTraffic(RecordedTraffic):
+    """One encounter; its first aircraft is the ownship."""
+
+    Parameters = OneEncounter
+    found: EncounterSet
+    place: int
+
+    def read(self) -> TrafficFile:
+        """Return the flights of the encounter."""
+        self.found, self.place = chosen_encounter(type(self), self.p)
+        given = self.p.lat_deg, self.p.lon_deg
+        if (given[0] is None) != (given[1] is None):
+            raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
+        if given[0] is not None:
+            self.found = replace(self.found, reference_deg=given)
+        own, *others = self.found.flights(self.place, self.p.dynamics)
+        notes = [f"encounter {self.found.numbers[self.place]} of {len(self.found)}"]
+        if self.found.skipped:
+            notes.append(f"{self.found.skipped} damaged encounters of the set were skipped")
+        return TrafficFile(own, others, 0.0, notes)
+
+    def report(self) -> dict[str, Any]:
+        """Return closest approaches, and the encounter with its weight."""
+        told = {
+            "number": int(self.found.numbers[self.place]),
+            "weight": float(self.found.weights[self.place]),
+        }
+        return {**super().report(), "encounter": told}
+
+
+class SetTraffic(_EncounterTraffic):
+    """Traffic of one encounter of a set, told by its number."""
+
+    Parameters = SetParameters
+    lockstep = True
+
+
+class ModelTraffic(_EncounterTraffic):
+    """Traffic of one encounter that a pair of encounter models makes, told by its number."""
+
+    Parameters = ModelParameters
+    lockstep = True
+
+
+def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
+    """Return the set of an encounter that a block's parameters name, and its place there.
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, model or encounter.
+    """
+    if issubclass(cls, ModelTraffic):
+        intruder = parameters.intruder_file or parameters.file
+        found = _made(parameters.file, intruder, parameters.model_seed, parameters.encounter)
+        return found, 0
+    found = read_set(parameters.file, parameters.skip_damaged)
+    return found, found.place(parameters.encounter)
+
+
+@lru_cache(maxsize=4096)
+def _made(file: Path, intruder: Path, seed: int, number: int) -> EncounterSet:
+    rules = PairingRules()
+    pairs = _sampler(file, intruder, seed).pairs(range(number, number + 1))
+    return set_of_pairs(pairs, rules.closest_s, (0.0, 0.0), str(file))
+
+
+@lru_cache(maxsize=4)
+def _sampler(file: Path, intruder: Path, seed: int) -> PairSampler:
+    return PairSampler(read_model(file), read_model(intruder), seed, PairingRules())

@@ -1,0 +1,88 @@
+"""``dsa-des encounters generate``: sets of encounters from encounter models."""
+
+import math
+
+import numpy as np
+
+from components.encounters.made_encounters import made_set, read_recipe
+from components.encounters.pair_densities import PairingRules
+from components.encounters.pair_sets import set_of_pairs
+from components.encounters.pairing import PairSampler
+from components.encounters.sample_command import open_model
+from components.encounters.set_file import set_writer
+from components.encounters.track_rules import TrackError
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import check_file
+from dsa_des.files.output_names import named, reason_of
+from dsa_des.terminal.terminal import say
+
+
+def generate_set(
+    made: str | None,
+    model: str | None,
+    intruder_model: str | None,
+    count: int | None,
+    first: int,
+    seed: int,
+    at: tuple[float, float],
+    out: str,
+) -> None:
+    """Write a set of paired encounters, or of those that a table describes.
+
+    Raises
+    ------
+    UsageError
+        If a model cannot be used, or the set not be written.
+    OutputError
+        If writing fails.
+    """
+    check_place(at)
+    if made is not None:
+        if model is not None or intruder_model is not None or count is not None:
+            raise UsageError("--made says all of its encounters: no --model and no --count with it")
+        _write_made(made, out)
+        return
+    if model is None or count is None:
+        raise UsageError("either --model FILE and --count N are needed, or --made FILE.toml")
+    own = open_model(model)
+    intruder = own if intruder_model is None else open_model(intruder_model)
+    path = named(out)
+    check_file(path)
+    rules = PairingRules()
+    about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
+    total, squares, attempts = 0.0, 0.0, 0
+    try:
+        pairing = PairSampler(own, intruder, seed, rules)
+        with set_writer(path, about) as writer:
+            for pairs in pairing.batches(range(first, first + count)):
+                writer.write(set_of_pairs(pairs, rules.closest_s, at, str(path)))
+                total += math.fsum(pairs.weight)
+                squares += math.fsum(pairs.weight**2)
+                attempts += int(np.sum(pairs.attempts + 1))
+    except TrackError as error:
+        raise UsageError(f"{model}: {error}") from None
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {count} encounters of {rules.duration_s} s")
+    say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
+
+
+def _write_made(made: str, out: str) -> None:
+    recipe = read_recipe(made)
+    path = named(out)
+    check_file(path)
+    found = made_set(recipe)
+    try:
+        with set_writer(path, {"made_by": "hand", "seed": recipe.seed}) as writer:
+            writer.write(found)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+    say(f"{path}: {len(found)} encounters of {recipe.duration_s:g} s")
+
+
+def check_place(at: tuple[float, float]) -> None:
+    """Raise UsageError unless a latitude and a longitude are usable as the origin of a set."""
+    if not (math.isfinite(at[0]) and abs(at[0]) <= 89.0 and abs(at[1]) <= 360.0):
+        raise UsageError(
+            f"--at {at[0]} {at[1]}: latitude must lie within ±89, longitude within ±360 degrees"
+        )

@@ -1,0 +1,138 @@
+"""Densities from which miss distances of encounters are drawn, and what weights undo them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+
+_NAUTICAL_MILE_FT = 6076.115485564304
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """A function that is constant between edges.
+
+    Parameters
+    ----------
+    edges : (n + 1,)
+        Rising.
+    heights : (n,)
+        Above 0.
+
+    Raises
+    ------
+    ValueError
+        Where they do not fit.
+    """
+
+    edges: FloatArray
+    heights: FloatArray
+
+    def __post_init__(self) -> None:
+        if len(self.edges) != len(self.heights) + 1 or not len(self.heights):
+            raise ValueError(
+                f"{len(self.edges)} edges need {len(self.edges) - 1} proportions; there are "
+                f"{len(self.heights)}"
+            )
+        if not np.isfinite(self.edges).all() or (np.diff(self.edges) <= 0.0).any():
+            raise ValueError("edges must be rising numbers")
+        if not np.isfinite(self.heights).all() or (self.heights <= 0.0).any():
+            raise ValueError("proportions must be numbers above 0")
+
+    @property
+    def _summed(self) -> FloatArray:
+        return np.concatenate([[0.0], np.cumsum(self.heights * np.diff(self.edges))])
+
+    @property
+    def area(self) -> float:
+        """Integral over all of it."""
+        return float(self._summed[-1])
+
+    def area_to(self, x: FloatArray) -> FloatArray:
+        """Return the integral from the first edge to x."""
+        return np.interp(x, self.edges, self._summed)
+
+    def where_area_is(self, area: FloatArray) -> FloatArray:
+        """Return the x up to which the integral is as large."""
+        return np.interp(area, self._summed, self.edges)
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return the value at x; outside the edges that of the nearest step."""
+        place = np.searchsorted(self.edges, x, side="right") - 1
+        found: FloatArray = self.heights[np.clip(place, 0, len(self.heights) - 1)]
+        return found
+
+
+def _steps(edges: list[float], heights: list[float]) -> Steps:
+    return Steps(np.array(edges), np.array(heights))
+
+
+@dataclass(frozen=True)
+class PairingRules:
+    """How two independent tracks become an encounter.
+
+    Parameters
+    ----------
+    duration_s, closest_s : int
+        Length of the tracks, and when they are closest.
+    vertical_ft : Steps
+        Probability (times any factor) with which a vertical miss distance is accepted; none is
+        outside its edges.
+    horizontal_ft : Steps
+        Density (times any factor) from which the signed horizontal miss distance is drawn.
+    start_vertical_ft, start_range_ft : float
+        Pairs that begin nearer than both are rejected.
+    largest_horizontal_error_ft, largest_vertical_error_ft : float
+        Pairs whose tracks miss what was drawn by as much are rejected.
+    """
+
+    duration_s: int = 180
+    closest_s: int = 150
+    vertical_ft: Steps = field(
+        default_factory=lambda: _steps(
+            [-1500, -500, -100, 0, 100, 500, 1500], [1 / 2, 1 / 1.5, 1, 1, 1 / 1.5, 1 / 2]
+        )
+    )
+    horizontal_ft: Steps = field(
+        default_factory=lambda: _steps(
+            [-18240, -1500, -500, 0, 500, 1500, 18240],
+            [1 / 1.5 / 16740, 1 / 1.25 / 1000, 1 / 500, 1 / 500, 1 / 1.25 / 1000, 1 / 1.5 / 16740],
+        )
+    )
+    start_vertical_ft: float = 800.0
+    start_range_ft: float = 1.5 * _NAUTICAL_MILE_FT
+    largest_horizontal_error_ft: float = 500.0
+    largest_vertical_error_ft: float = 20.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.closest_s < self.duration_s:
+            raise ValueError(
+                f"closest_s = {self.closest_s}: must lie between 0 and duration_s = "
+                f"{self.duration_s}"
+            )
+
+
+#: Half the width of the cylinder over which miss distances are uniform in the airspace: 10 nmi.
+REFERENCE_FT = 60761.0
+
+
+def speeds_over_directions(first: FloatArray, second: FloatArray, climb: FloatArray) -> FloatArray:
+    """Return the relative speed integrated over all directions of one velocity against the other.
+
+    ∫ √(v₁² + v₂² - 2 v₁ v₂ cos ψ + Δḣ²) dψ over a full turn is 4 √A E(m) with A = (v₁ + v₂)² + Δḣ²
+    and m = 4 v₁ v₂ / A, E the complete elliptic integral of the second kind of the *parameter* m.
+    Upstream passes √m, the modulus, to a function that takes m: up to 8 % too low.
+
+    Parameters
+    ----------
+    first, second : (pairs,)
+        Horizontal speeds.
+    climb : (pairs,)
+        Difference of the vertical rates.
+    """
+    from scipy.special import ellipe
+
+    largest = (first + second) ** 2 + climb**2
+    found: FloatArray = 4.0 * np.sqrt(largest) * ellipe(4.0 * first * second / largest)
+    return found

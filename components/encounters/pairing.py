@@ -1,0 +1,345 @@
+"""Uncorrelated encounters: two independent tracks paired on a cylinder, with importance weights.
+
+After the published pairing of uncorrelated encounters (em-pairing-uncor-importancesampling). A pair
+is a proposal that is accepted or drawn again under the next attempt number:
+
+1. Both tracks are drawn independently and keep the rules of `TrackRules`.
+2. The vertical miss distance at the closest approach is accepted with probability P(vmd). Of two
+   tracks the altitude in its layer is uniform and says nothing of how they fly, so it is drawn
+   here, given that, from what P leaves of its layer. That accepts the same pairs with the same
+   chance, and most that fail are found out before they have been flown.
+3. The intruder's course is uniform, accepted with |v_rel(ψ)| / |v_rel(head-on)|.
+4. The signed horizontal miss distance has the density q.
+5. The weight undoes 2 to 4: w = S [1 / (2 · 60761 ft)] / q(hmd) / P(vmd), where S is the relative
+   speed integrated over courses.
+6. Pairs that begin near each other, or are closest before the time they should be, are rejected.
+
+Courses are accepted by the speeds at the closest approach, as S has them (upstream takes those at
+time 0 for one and those at the closest approach for the other).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from components.encounters.draws import EncounterDraws
+from components.encounters.model import EncounterModel
+from components.encounters.motion import fly_euler, summed
+from components.encounters.pair_densities import (
+    REFERENCE_FT,
+    PairingRules,
+    speeds_over_directions,
+)
+from components.encounters.sampling import TrackSampler
+from components.encounters.track_rules import Commands, TrackError, TrackRules
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+#: Pairs that are made together, and attempts of them that are looked at together.
+PAIRS_AT_ONCE = 4096
+_FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 4096, 6, 256
+_COURSES, _COURSES_FROM = 40, 4
+_MOST_ATTEMPTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Encounters; arrays of both aircraft have the ownship first.
+
+    Parameters
+    ----------
+    numbers : (pairs,)
+    weight : (pairs,)
+    horizontal_ft, vertical_ft : (pairs,)
+        Miss distances at the closest approach: signed, and intruder above ownship.
+    course_rad : (pairs,)
+        The intruder's at the closest approach, when the ownship's is 0.
+    attempts : (pairs,)
+        How many proposals were rejected before.
+    north_ft, east_ft, up_ft, heading_rad, speed_ft_s, climb_ft_s : (2, seconds + 1, pairs)
+        The origin is where the ownship is at the closest approach.
+    turn_rad_s, acceleration_ft_s2 : (2, seconds + 1, pairs)
+        Commands, held from each second on.
+    """
+
+    numbers: IntArray
+    weight: FloatArray
+    horizontal_ft: FloatArray
+    vertical_ft: FloatArray
+    course_rad: FloatArray
+    attempts: IntArray
+    north_ft: FloatArray
+    east_ft: FloatArray
+    up_ft: FloatArray
+    heading_rad: FloatArray
+    speed_ft_s: FloatArray
+    climb_ft_s: FloatArray
+    turn_rad_s: FloatArray
+    acceleration_ft_s2: FloatArray
+
+    def some(self, rows: IntArray) -> "Pairs":
+        """Return some of them, in this order."""
+        return Pairs(**{name: values.take(rows, axis=-1) for name, values in vars(self).items()})
+
+
+class PairSampler:
+    """Makes encounters of two models by their numbers.
+
+    Parameters
+    ----------
+    own, intruder : EncounterModel
+    seed : int
+    rules : PairingRules
+
+    Raises
+    ------
+    TrackError
+        If tracks of a model cannot be flown.
+    """
+
+    def __init__(
+        self, own: EncounterModel, intruder: EncounterModel, seed: int, rules: PairingRules
+    ) -> None:
+        self.rules = rules
+        self._tracks = [
+            TrackSampler(model, EncounterDraws(seed, f"{role} tracks"))
+            for model, role in ((own, "ownship"), (intruder, "intruder"))
+        ]
+        self._rules = [TrackRules(own), TrackRules(intruder)]
+        self._draws = EncounterDraws(seed, "pairs")
+
+    def batches(self, numbers: range) -> Iterator[Pairs]:
+        """Give pairs in order of their numbers, in batches of a size that suits the memory."""
+        for start in range(0, len(numbers), PAIRS_AT_ONCE):
+            yield self.pairs(numbers[start : start + PAIRS_AT_ONCE])
+
+    def pairs(self, numbers: range) -> Pairs:
+        """Return the pairs with these numbers.
+
+        Raises
+        ------
+        TrackError
+            If a pair is rejected time after time.
+        """
+        wanted = np.arange(numbers.start, numbers.stop, numbers.step)
+        parts: list[Pairs] = []
+        left, attempt = np.arange(len(wanted)), np.zeros(len(wanted), dtype=np.int64)
+        passed = 1.0
+        while len(left):
+            # As many proposals of each as make it likely that a batch is worth flying.
+            each = min(_MOST_EACH, max(1, _FLIGHTS_AT_ONCE // len(left)))
+            many = min(_MOST_AT_ONCE, max(1, round(each / max(passed, 0.02))))
+            rows = np.repeat(left, many)
+            tries = np.repeat(attempt[left], many) + np.tile(np.arange(many), len(left))
+            hopeful, narrow, bound = self._starts(wanted[rows], tries)
+            passed = len(hopeful) / len(rows)
+            rows, tries = rows[hopeful], tries[hopeful]
+            attempt[left] += many
+            done, pairs = self._flights(wanted[rows], tries, narrow, bound)
+            if pairs is not None:
+                # Of several that are accepted the first attempt counts.
+                fresh, first = np.unique(rows[done], return_index=True)
+                parts.append(pairs.some(first))
+                left = np.setdiff1d(left, fresh, assume_unique=True)
+            if len(left) and attempt[left].max() > _MOST_ATTEMPTS:
+                raise TrackError(
+                    f"pair {wanted[left[0]]} was rejected {_MOST_ATTEMPTS} times: the two models "
+                    "do not meet"
+                )
+        together = _together(parts)
+        return together.some(np.argsort(together.numbers))
+
+    def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
+        """Return which proposals may be accepted by their first second alone.
+
+        Returns
+        -------
+        hopeful : (n,) of int
+        narrow : (n,) of int
+            Which aircraft's layer is the narrower one: its altitude is kept.
+        bound : (n,)
+            Chance with which they were let through.
+        """
+        both = [t.sample(numbers, 0, attempts) for t in self._tracks]
+        good: BoolArray = np.ones(len(numbers), dtype=np.bool_)
+        for rules, tracks in zip(self._rules, both, strict=True):
+            commands = rules.commands(tracks)
+            good &= rules.flies(tracks, commands.climb_ft_s, commands.speed_ft_s[np.newaxis])
+        layers = np.array([r.layers_ft(t) for r, t in zip(self._rules, both, strict=True)])
+        width = layers[:, 1] - layers[:, 0]
+        narrow = (width[1] < width[0]).astype(np.int64)
+        here = np.arange(len(numbers))
+        altitudes = np.array([r.altitude_ft(t) for r, t in zip(self._rules, both, strict=True)])
+        kept = altitudes[narrow, here]
+        most = sum(r.steepest_ft_s(t) for r, t in zip(self._rules, both, strict=True))
+        climbs = most * self.rules.closest_s
+        low, high = (layers[1 - narrow, k, here] - kept for k in (0, 1))
+        reach = np.abs(self.rules.vertical_ft.edges[[0, -1]]).max()
+        good &= (low - climbs < reach) & (high + climbs > -reach)
+        accept = self.rules.vertical_ft
+        bound = np.minimum(1.0, accept.area / accept.heights.max() / width[1 - narrow, here])
+        drawn = self._draws.few(numbers, 1, attempts)[0]
+        hopeful = np.flatnonzero(good & (drawn < bound))
+        return hopeful, narrow[hopeful], bound[hopeful]
+
+    def _flights(
+        self, numbers: IntArray, attempts: IntArray, narrow: IntArray, bound: FloatArray
+    ) -> tuple[IntArray, Pairs | None]:
+        """Return which proposals are accepted, and the pairs that they are."""
+        if not len(numbers):
+            return numbers, None
+        rules, cpa = self.rules, self.rules.closest_s
+        # Whoever breaks a rule alone is not flown with the other.
+        own = self._flight(0, numbers, attempts)
+        rows = own.flies.nonzero()[0]
+        own, narrow, bound = own.some(rows), narrow[rows], bound[rows]
+        other = self._flight(1, numbers[rows], attempts[rows])
+        both = own, other
+        drawn = self._draws.few(numbers[rows], _COURSES_FROM, attempts[rows])
+        here = np.arange(len(rows))
+        climbed = np.array([f.commands.climb_ft_s[:cpa].sum(axis=0) for f in both])
+        altitude = np.array([f.commands.altitude_ft for f in both])
+        layers = np.array([(f.low_ft, f.high_ft) for f in both])
+        wide = 1 - narrow
+        at_cpa = (altitude + climbed)[narrow, here]
+        # Where the intruder can be above the ownship at the closest approach.
+        low, high = (layers[wide, k, here] + climbed[wide, here] - at_cpa for k in (0, 1))
+        low, high = np.where(wide == 1, low, -high), np.where(wide == 1, high, -low)
+        accept = rules.vertical_ft
+        below = accept.area_to(low)
+        area = accept.area_to(high) - below
+        width = layers[wide, 1, here] - layers[wide, 0, here]
+        good = drawn[1] * width * bound * accept.heights.max() < area
+        vertical = accept.where_area_is(below + drawn[2] * area)
+        sign = np.where(wide == 1, 1.0, -1.0)
+        altitude[wide, here] = at_cpa + sign * vertical - climbed[wide, here]
+        good &= other.flies
+        done = good.nonzero()[0]
+        for k, flight in enumerate(both):
+            climb = flight.commands.climb_ft_s[:, done]
+            done = done[self._rules[k].inside(summed(altitude[k, done], climb))]
+        if not len(done):
+            return done, None
+        commands = [f.commands.some(done) for f in both]
+        for k, c in enumerate(commands):
+            c.altitude_ft[:] = altitude[k, done]
+        rows = rows[done]
+        more = self._draws.few(numbers[rows], _COURSES_FROM + 2 * _COURSES, attempts[rows])
+        pairs = self._paired(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
+        kept = self._kept(pairs).nonzero()[0]
+        return rows[kept], pairs.some(kept)
+
+    def _flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
+        """Return what tracks of one aircraft command, and which keep their own rules."""
+        rules = self._rules[which]
+        tracks = self._tracks[which].sample(numbers, self.rules.duration_s, attempts)
+        commands = rules.commands(tracks)
+        speed = summed(commands.speed_ft_s, commands.acceleration_ft_s2)
+        good = rules.flies(tracks, commands.climb_ft_s, speed)
+        return _Flight(commands, good, *rules.layers_ft(tracks))
+
+    def _paired(
+        self,
+        numbers: IntArray,
+        attempts: IntArray,
+        commands: list[Commands],
+        vertical: FloatArray,
+        drawn: FloatArray,
+    ) -> Pairs:
+        """Fly both tracks through their places at the closest approach."""
+        cpa = self.rules.closest_s
+        flown = [
+            fly_euler(c.altitude_ft, c.speed_ft_s, c.acceleration_ft_s2, c.climb_ft_s, c.turn_rad_s)
+            for c in commands
+        ]
+        first, second = (f.speed_ft_s[cpa] for f in flown)
+        climb = flown[1].climb_ft_s[cpa] - flown[0].climb_ft_s[cpa]
+        course = _course(first, second, climb, drawn[1:])
+        density = self.rules.horizontal_ft
+        horizontal = density.where_area_is(drawn[0] * density.area)
+        north = second * np.cos(course) - first
+        east = second * np.sin(course)
+        relative = np.maximum(np.hypot(north, east), 1e-9)
+        places = (
+            (np.zeros_like(first), np.zeros_like(first)),
+            (horizontal * east / relative, -horizontal * north / relative),
+        )
+        norths, easts, headings = [], [], []
+        for f, at, wanted in zip(flown, places, (0.0, course), strict=True):
+            turned = wanted - f.heading_rad[cpa]
+            n, e = f.north_ft - f.north_ft[cpa], f.east_ft - f.east_ft[cpa]
+            cos, sin = np.cos(turned), np.sin(turned)
+            norths.append(at[0] + n * cos - e * sin)
+            easts.append(at[1] + n * sin + e * cos)
+            headings.append(f.heading_rad + turned)
+        accept = self.rules.vertical_ft
+        chance = accept.at(vertical) / accept.heights.max()
+        q = density.at(horizontal) / density.area
+        weight = speeds_over_directions(first, second, climb) / (2.0 * REFERENCE_FT) / q / chance
+        return Pairs(
+            numbers, weight, horizontal, vertical, course, attempts,
+            np.array(norths), np.array(easts), np.array([f.up_ft for f in flown]),
+            np.array(headings), np.array([f.speed_ft_s for f in flown]),
+            np.array([f.climb_ft_s for f in flown]), np.array([c.turn_rad_s for c in commands]),
+            np.array([c.acceleration_ft_s2 for c in commands]),
+        )  # fmt: skip
+
+    def _kept(self, pairs: Pairs) -> BoolArray:
+        """Return which pairs begin far enough from each other, and are closest when they should."""
+        rules = self.rules
+        north, east, up = (
+            values[1] - values[0] for values in (pairs.north_ft, pairs.east_ft, pairs.up_ft)
+        )
+        squared = north * north + east * east
+        near = (np.abs(up[0]) < rules.start_vertical_ft) & (squared[0] < rules.start_range_ft**2)
+        at = np.argmin(squared, axis=0)
+        here = np.arange(squared.shape[1])
+        miss = np.abs(np.sqrt(squared[at, here]) - np.abs(pairs.horizontal_ft))
+        wrong = np.abs(up[at, here] - pairs.vertical_ft)
+        good: BoolArray = (
+            ~near
+            & (at >= rules.closest_s)
+            & (miss < rules.largest_horizontal_error_ft)
+            & (wrong < rules.largest_vertical_error_ft)
+        )
+        return good
+
+
+@dataclass(frozen=True)
+class _Flight:
+    """Tracks of one aircraft that are not paired yet."""
+
+    commands: Commands
+    flies: BoolArray
+    low_ft: FloatArray
+    high_ft: FloatArray
+
+    def some(self, rows: IntArray) -> "_Flight":
+        commands = self.commands.some(rows)
+        return _Flight(commands, self.flies[rows], self.low_ft[rows], self.high_ft[rows])
+
+
+def _together(parts: list[Pairs]) -> Pairs:
+    names = vars(parts[0])
+    return Pairs(**{n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names})
+
+
+def _course(
+    first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
+) -> FloatArray:
+    """Return courses with a density that goes with the relative speed, by rejection.
+
+    At least 64 in 100 uniform courses are accepted, so of as many as are drawn one always is.
+    """
+    most = (first + second) ** 2 + climb**2
+    found = np.zeros_like(first)
+    left: BoolArray = np.ones(len(first), dtype=np.bool_)
+    for k in range(_COURSES):
+        course = 2.0 * np.pi * drawn[2 * k]
+        squared = first**2 + second**2 - 2.0 * first * second * np.cos(course) + climb**2
+        take = left & (drawn[2 * k + 1] ** 2 * most <= squared)
+        found = np.where(take, course, found)
+        left &= ~take
+        if not left.any():
+            break
+    return found

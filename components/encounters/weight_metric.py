@@ -1,0 +1,41 @@
+"""The weight of the encounter that a run flies, as a metric beside what came of it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.encounters.encounter_traffic import chosen_encounter
+from components.metrics.separation import traffic_block
+from dsa_des.arrays.types import AnyArray
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import NUMBER, Group, Metric, Result
+
+
+class EncounterWeight(Metric):
+    """Number and weight of the encounter of each run, for risk ratios over a study."""
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        block = traffic_block(scene)
+        if not hasattr(block.parameters, "encounter"):
+            raise ValueError(
+                f"the traffic of the scene, {block.name!r}, has no encounters with weights: it "
+                "needs traffic.encounters or traffic.encounter_model"
+            )
+
+    def results(self) -> list[Result]:
+        """Return number and weight."""
+        return [
+            Result("encounter", NUMBER, "number of the encounter"),
+            Result("encounter_weight", NUMBER, "how often it happens in the airspace"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return both for every replica."""
+        numbers, weights = np.empty(len(group)), np.empty(len(group))
+        for row, scene in enumerate(group.scenes):
+            block = traffic_block(scene)
+            found, place = chosen_encounter(block.cls, block.parameters)
+            numbers[row], weights[row] = found.numbers[place], found.weights[place]
+        return {"encounter": numbers, "encounter_weight": weights}

@@ -1,0 +1,168 @@
+"""docs/clutter.md: text, table and figure."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.evidence.clutter.ranges import RADAR, detections, half_range_m
+from components.evidence.thesis.plotting import BLUE, GREY, PINK, legend_below, panels
+from components.evidence.thesis.plotting import RADAR as RADAR_COLOUR
+from components.radar.cfar import cfar_loss_db
+from components.radar.moving_target_filter import MovingTargetFilter
+from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
+
+FIGURE = "clutter.png"
+_GAMMAS_DB = (-60, -55, -50, -45, -40, -35, -30, -25, -20, -15, -10)
+_SPEEDS_M_S = (0, 1, 2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 52, 65, 75, 85, 92, 96, 100, 102,
+               105, 108, 110, 113, 116, 120, 130)  # fmt: skip
+_WAYS: tuple[tuple[str, Mapping[str, Any], str, str], ...] = (
+    ("threshold known exactly", {}, GREY, "-"),
+    ("CFAR, 16 cells", {"cfar_reference_cells": 16}, RADAR_COLOUR, "-"),
+    ("CFAR and double canceller",
+     {"cfar_reference_cells": 16, "moving_target_filter": "double_canceller"}, BLUE, "-"),
+    ("CFAR and filter bank",
+     {"cfar_reference_cells": 16, "moving_target_filter": "filter_bank"}, PINK, "-"),
+    ('clutter_threshold = "noise"', {"clutter_threshold": "noise"}, GREY, ":"),
+)  # fmt: skip
+
+_HEAD = """# Thresholds, clutter and Doppler
+
+What a radar reports rests on one threshold. This page says what it follows, what ground clutter
+does to it, and what a moving-target filter takes out; keys are in the
+[reference](reference.md), physics in `components/radar/`.
+
+## One threshold
+
+`false_alarm_probability` is that of one look at one resolution cell. It sets the threshold that
+detections cross, and with `false_alarms = true` noise crosses it in every cell of the field of
+view: a scan has (cells · Pfa) false alarms on average. The thesis's 0.05 is meant for a look at a
+target; with false alarms it fills one cell in twenty, and `check` and `run` say what that comes to:
+
+```text
+false_alarms is true and false_alarm_probability is 0.05: with 15,000 resolution cells that makes
+750 false alarms per scan, 0.05 in every cell; radars have 1e-6 per cell or less
+```
+
+`cell_false_alarm_probability` counts false alarms at a threshold of its own, and a warning says so.
+
+A target far below the noise is reported with the probability of false alarm. Such a report lies in
+the target's resolution cell and says no more: on a grid it has the grid point of the cell; with
+`errors = "signal"`, it lies anywhere in the cell (evenly, with the variance of that), also where
+the cell is wider than the grid. With a resolution of 0 there is no cell, and reports are exact, as
+in the thesis.
+
+`resolution_cells = true` makes targets in one cell of the grid (azimuth, elevation, range) one
+report: that of the strongest echo, looked at with the sum of their powers. By default each target
+has its own, as in the thesis. Filters do not tell two targets of one cell apart.
+
+## Clutter
+
+`[terrain] height_m` gives flat ground an echo (constant gamma, `clutter_gamma_db`) in the range
+cell of each target, as far as the beam meets it. The threshold rises with it (`clutter_threshold =
+"adaptive"`, the default): the false alarms stay what they are, a target needs its SNR over noise
+*and* clutter, and every radar sees less far. With `"noise"` the threshold stays where noise alone
+has it, as it did before there was a choice: then clutter is detected as if it were the target, and
+`check` says so.
+
+By default the mean power of noise and clutter is known. A real radar averages the cells around:
+`cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few
+({loss_8:.1f} dB with 8 cells, {loss_16:.1f} dB with 16, {loss_64:.1f} dB with 64, at Pfa 1e-6,
+Pd 0.5 and Swerling I). A calibrated range is that of a threshold known exactly; the loss comes on
+top. The cells are taken to hold what the cell under test holds: edges of clutter, and other targets
+among them, are left out.
+
+`radar.range_boundary` has neither noise nor a threshold. Its boundary is taken as the range of
+one target (`boundary_rcs_dbsm`, `boundary_pd`, `false_alarm_probability`); clutter and the CFAR
+loss then bring it nearer, if its grid has cells that can hold ground.
+
+## Doppler
+
+`moving_target_filter` (with `prf_hz`) adds up successive pulses so that what moves like the ground
+goes: `single_canceller`, `double_canceller`, or a `filter_bank` of `filter_pulses` pulses whose
+filters near the ground are not used (`notch_m_s`). The notch follows the range rate of the ground
+in the beam (`clutter_lock`), as the ownship flies over it: a target is lost when its *own* velocity
+over ground has no part along the line of sight, and at the blind speeds, multiples of λ·PRF/2.
+Measured range rates are the true ones, as if ambiguities were resolved by several PRF; with
+`range_rate_folds = true` they fold at the unambiguous velocity, λ·PRF/4. What is left of the
+clutter follows from its spread: the beam's width across the ownship's course (0.3 · speed ·
+beamwidth · sin), the ground's own motion (`[terrain] clutter_motion_m_s`), and
+`improvement_limit_db`. Cancellers keep the SNR of targets of all speeds on average, and gain for
+some; a bank loses {bank_loss:.1f} dB on average by its window and between its filters.
+
+## What it does to range
+
+An intruder of 3 dBsm (Swerling I) flies 100 m above the ground towards an ownship 500 m higher,
+which flies at 50 m/s. The radar (10 GHz, PRF {prf:g} Hz, beam 2 by 4 deg, cells of 50 m, Pfa 1e-6)
+has Pd 0.5 at 5 km without clutter. Every point is the farthest range with Pd 0.5 in the
+rows of one run (`components/evidence/clutter/ranges.py`).
+
+![Range of Pd 0.5 over reflectivity of the ground, and over speed](images/{figure})
+
+Left: clutter takes two thirds of the range at -20 dB; behind a filter, little of it. A threshold
+that stays at the noise would have it grow. Right, over ground of -20 dB: the notch at 0, and the
+blind speed of {blind:.0f} m/s, which an intruder that is seen at 1 km only, 30 deg below, has along
+the line of sight when it flies 15 % faster.
+
+Detections of such an encounter, {seeds} runs each:
+
+"""
+
+
+def page(images: Path, *, seeds: int = 10) -> str:
+    """Run the scenes, draw the figure and return the page.
+
+    Parameters
+    ----------
+    images : Path
+        Folder that receives the figure.
+    seeds : int
+        Runs of each line of the table.
+    """
+    draw(images / FIGURE)
+    found = MovingTargetFilter("filter_bank", RADAR["prf_hz"], wavelength_m())
+    speeds = [(i + 0.5) / 500 * found.blind_speed_m_s for i in range(500)]
+    bank_loss = -10.0 * math.log10(float(np.mean(found.gains(speeds)[0])))
+    losses = {
+        f"loss_{cells}": cfar_loss_db(0.5, reference_cells=cells, false_alarm_probability=1e-6)
+        for cells in (8, 16, 64)
+    }
+    text = _HEAD.format(
+        figure=FIGURE, prf=RADAR["prf_hz"], blind=found.blind_speed_m_s, bank_loss=bank_loss,
+        seeds=seeds, **losses,
+    )  # fmt: skip
+    return text + "\n".join(table(seeds)) + "\n"
+
+
+def wavelength_m() -> float:
+    """Return the wavelength of the page's radar."""
+    return SPEED_OF_LIGHT_M_S / float(RADAR["frequency_hz"])
+
+
+def table(seeds: int) -> list[str]:
+    """Return the lines of the table: detections without clutter, and with two kinds of ground."""
+    grounds = (None, -20.0, -10.0)
+    lines = ["| radar | no clutter | gamma -20 dB | gamma -10 dB |", "|---|---|---|---|"]
+    for name, keys, _, _ in _WAYS:
+        counts = [f"{detections(keys, gamma_db, seeds):.0f}" for gamma_db in grounds]
+        lines.append(f"| {name} | " + " | ".join(counts) + " |")
+    return lines
+
+
+def draw(path: Path) -> None:
+    """Draw the range of Pd 0.5 over the ground's reflectivity, and over the intruder's speed."""
+    with panels(path, 1, 2) as (left, right):
+        for name, keys, colour, style in _WAYS:
+            ranges = [half_range_m(keys, gamma_db) / 1000 for gamma_db in _GAMMAS_DB]
+            left.plot(_GAMMAS_DB, ranges, style, color=colour, linewidth=1.3, label=name)
+            if "moving_target_filter" in keys:
+                ranges = [half_range_m(keys, -20.0, speed) / 1000 for speed in _SPEEDS_M_S]
+                right.plot(_SPEEDS_M_S, ranges, style, color=colour, linewidth=1.3)
+        left.set_xlabel("reflectivity gamma of the ground, dB")
+        left.set_ylabel("range of Pd 0.5, km")
+        right.set_xlabel("speed of the intruder, m/s")
+        for axes in (left, right):
+            axes.set_ylim(0, 10)
+        legend_below(left, 2)

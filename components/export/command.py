@@ -1,0 +1,25 @@
+"""The command ``dsa-des export``; it imports click only, so that ``--help`` stays instant."""
+
+from typing import Any
+
+import click
+
+from dsa_des.commands.plain_errors import plain_errors
+
+FORMATS = ("csv", "kml", "czml", "daa", "mat")
+
+
+@click.command()
+@click.argument("run", metavar="RUN")
+@click.option("--to", required=True, type=click.Choice(FORMATS), help="What to write.")
+@click.option("--out", metavar="PATH", help="Where [default: beside RUN, with its name].")
+@plain_errors
+def export(**options: Any) -> None:
+    """Write a run's folder in another format.
+
+    csv is a folder with a file for each table; mat a MATLAB file with all of them; kml and czml the
+    flights and what was detected, for globes; daa the flights, as DAIDALUS reads them.
+    """
+    from components.export.exported import export_run
+
+    export_run(**options)

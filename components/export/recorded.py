@@ -1,0 +1,91 @@
+"""The tables of a run's folder, for those who write them otherwise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
+
+_STATE = (
+    "time_s", "lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
+    "velocity_down_m_s", "heading_rad",
+)  # fmt: skip
+OWNSHIP = "ownship"
+
+
+@dataclass(frozen=True)
+class RecordedTables:
+    """A run's tables by name, as Arrow holds them.
+
+    Parameters
+    ----------
+    folder : Path
+    tables : mapping
+    """
+
+    folder: Path
+    tables: Mapping[str, Any]
+
+    def flights(self) -> dict[str, dict[str, FloatArray]]:
+        """Return the true flight of each aircraft by its name, the ownship first.
+
+        Returns
+        -------
+        dict
+            ``time_s``, ``lat_deg``, ``lon_deg``, ``alt_m``, ``velocity_north_m_s``,
+            ``velocity_east_m_s``, ``velocity_down_m_s`` and ``heading_rad``, in order of time.
+
+        Raises
+        ------
+        UsageError
+            The run has no truth, or a target is called as the ownship is here.
+        """
+        if "truth" not in self.tables:
+            raise UsageError(
+                f"{self.folder}: has no truth.parquet, which holds the flights: it is recorded "
+                "where it is small; ask for it with truth = true under [record]"
+            )
+        truth = self.tables["truth"]
+        names = truth["target"].to_pylist()
+        if OWNSHIP in names:
+            raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
+        found: dict[str, dict[str, FloatArray]] = {}
+        columns = {name: truth[name].to_numpy(zero_copy_only=False) for name in _STATE}
+        who = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
+        for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
+            mine = np.flatnonzero(who == name)
+            mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
+            time_s, first = np.unique(columns["time_s"][mine], return_index=True)
+            if len(time_s):
+                found[name] = {key: values[mine][first] for key, values in columns.items()}
+        return found
+
+
+def read_tables(run: str) -> RecordedTables:
+    """Read all tables of a run's folder.
+
+    Raises
+    ------
+    UsageError
+        It is no such folder, or a table cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    folder = Path(run)
+    if not folder.is_dir():
+        raise UsageError(f"{run}: there is no such folder")
+    paths = sorted(folder.glob("*.parquet"))
+    if not (folder / "run.json").is_file() or not paths:
+        raise UsageError(f"{run}: holds no run: run.json or its tables are missing")
+    tables = {}
+    for path in paths:
+        try:
+            tables[path.stem] = pq.read_table(path)
+        except (pa.ArrowException, OSError) as error:
+            raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
+    return RecordedTables(folder, tables)

@@ -1,0 +1,76 @@
+"""Every sensor's detections as they are, for a tracker of its own (``fusion.pass_through``)."""
+
+from typing import Any
+
+import numpy as np
+
+from components.fusion.fusion_block import Fusion
+from components.messages.detections import POSE, FusedDetections
+from components.messages.looks import Looks
+from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Parameters
+from dsa_des.block.message import offsets_of
+from dsa_des.block.wake import Arrivals, Wake
+
+
+class PassThrough(Fusion):
+    """Hands on every detection alone, and says which sensor looked when, also in vain.
+
+    Nothing is put together: that is the tracker's work. Entries of an instant stand by sensor, in
+    the sensor's own order. A sweeping radar's scan is not told as a look, as it has no one instant.
+    """
+
+    Parameters = Parameters
+    lockstep = True
+
+    def window_s(self) -> Any:
+        """Return 0: nothing waits for anything."""
+        return 0
+
+    def run(self, wake: Wake) -> FusedDetections | None:
+        """Pass on what came at every instant."""
+        arrivals = {new.source: new for new in wake.arrivals("detections")}
+        if not arrivals:
+            return None
+        rows, entries, places = [], [], []
+        for new in arrivals.values():
+            row = np.repeat(np.searchsorted(wake.ticks, new.tick), np.diff(new.message.offsets))
+            rows.append(row)
+            places.append(np.arange(len(row)))
+        sizes = [len(place) for place in places]
+        order = np.argsort(np.concatenate(rows), kind="stable")
+        for k in range(len(arrivals)):
+            mine = [p if i == k else np.full(n, -1) for i, (p, n) in
+                    enumerate(zip(places, sizes, strict=True))]  # fmt: skip
+            entries.append(np.concatenate(mine)[order])
+        target = np.concatenate([new.message.target for new in arrivals.values()])[order]
+        fused = self.combine(
+            wake.ticks, np.concatenate(rows)[order], target, arrivals,
+            dict(zip(arrivals, entries, strict=True)),
+        )  # fmt: skip
+        fused.looks = self._looks(wake.ticks, arrivals)
+        return fused
+
+    def _looks(self, ticks: IntArray, arrivals: dict[str, Arrivals]) -> Looks:
+        row, sensor, age, pose = [], [], [], []
+        for name, new in arrivals.items():
+            message = new.message
+            if message.ticks_after is not None:
+                continue
+            row.append(np.searchsorted(ticks, new.tick))
+            sensor.append(np.full(len(message), self.sensors.index(name)))
+            age.append(new.tick - message.tick)
+            told = [getattr(message, column) for column in POSE]
+            if any(values is None for values in told):
+                told = [np.full(len(message), np.nan)] * len(POSE)
+            pose.append(np.stack(told))
+        if not row:
+            none = np.empty(0, dtype=np.int64)
+            return Looks(np.zeros(len(ticks) + 1, dtype=np.int64), none, none, np.empty((6, 0)))
+        order = np.argsort(np.concatenate(row), kind="stable")
+        return Looks(
+            offsets_of(np.concatenate(row)[order], len(ticks)),
+            np.concatenate(sensor)[order],
+            np.concatenate(age)[order],
+            np.concatenate(pose, axis=1)[:, order],
+        )

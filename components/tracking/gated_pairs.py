@@ -1,0 +1,169 @@
+"""Pairs of a track and a detection in its gate."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from components.association.gates import gate_threshold
+from components.estimation.frame import Place
+from components.estimation.kalman import Moments
+from components.estimation.measurement import Kind
+from components.tracking.filter_bank import PairMeasurement, log_mixture
+from components.tracking.rules import TrackerRules
+from components.tracking.scans import Scans, kind_of
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import FloatArray, IntArray
+
+# So many pairs are looked at together.
+_MOST_PAIRS = 1 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class GatedPairs:
+    """The pairs of one kind of measurement, by index among all tracks and detections of a step."""
+
+    track: IntArray
+    detection: IntArray
+    said: PairMeasurement
+
+
+def gated_pairs(
+    rules: TrackerRules,
+    part: TrackStore,
+    of: IntArray,
+    place: Place,
+    scans: Scans,
+    codes: IntArray,
+    detection: IntArray,
+    of_detection: IntArray,
+    looks: int,
+) -> list[GatedPairs]:
+    """Return the pairs of one look in whose gate they are, kind by kind.
+
+    Parameters
+    ----------
+    rules : TrackerRules
+    part : TrackStore
+        Predicted.
+    of : (tracks,)
+        The look of each, ascending.
+    place : Place
+        Of every track's look.
+    scans : Scans
+    codes : (detections,)
+    detection, of_detection : (detections,)
+        Their numbers in `scans`, and the look of each.
+    looks : int
+    """
+    found = []
+    for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
+        kind, rows = kind_of(code)
+        moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
+        mine = np.flatnonzero(codes == code)
+        track, entry = _near(
+            rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks
+        )
+        if len(track) == 0:
+            continue
+        cells = detection[entry]
+        said = rules.bank.measure(
+            moments,
+            track,
+            np.stack([scans.measured[row][cells] for row in rows]),
+            np.stack([scans.variance[row][cells] for row in rows]),
+        )
+        inside = said.distance <= gate_threshold(rules.gate_probability, kind.size)
+        found.append(
+            GatedPairs(track[inside], entry[inside], taken_pairs(said, inside.nonzero()[0]))
+        )
+    return found
+
+
+def _near(
+    rules: TrackerRules,
+    kind: Kind,
+    moments: list[Moments],
+    of: IntArray,
+    of_detection: IntArray,
+    mine: IntArray,
+    scans: Scans,
+    detection: IntArray,
+    rows: list[int],
+    looks: int,
+) -> tuple[IntArray, IntArray]:
+    """Return pairs of one look whose angles and range lie in a box about the gate."""
+    counts = np.bincount(of, minlength=looks)
+    first = np.cumsum(counts) - counts
+    many = counts[of_detection[mine]]
+    threshold = gate_threshold(rules.gate_probability, kind.size)
+    tracks, entries = [], []
+    # In clutter there are more pairs than fit into memory at once.
+    part = np.cumsum(many) // _MOST_PAIRS
+    for begin, end in _parts(part):
+        some, size = mine[begin:end], many[begin:end]
+        entry = np.repeat(some, size)
+        start = np.cumsum(size) - size
+        track = np.arange(len(entry)) - np.repeat(start - first[of_detection[some]], size)
+        near = np.zeros(len(entry), dtype=bool)
+        cells = detection[entry]
+        for found in moments:
+            inside = np.ones(len(entry), dtype=bool)
+            for i, row in enumerate(rows[:3]):
+                apart = np.abs(scans.measured[row][cells] - found.expected[i][track])
+                if i < 2:
+                    apart = np.minimum(apart, np.abs(2.0 * np.pi - apart))
+                spread = found.total[i, i][track] + scans.variance[row][cells]
+                inside &= apart * apart <= threshold * spread
+            near |= inside
+        tracks.append(track[near])
+        entries.append(entry[near])
+    return np.concatenate(tracks), np.concatenate(entries)
+
+
+def _parts(part: IntArray) -> list[tuple[int, int]]:
+    """Return where runs of equal numbers begin and end."""
+    cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(part)]
+    return list(pairwise(cuts))
+
+
+def taken_pairs(said: PairMeasurement, which: IntArray) -> PairMeasurement:
+    if len(which) == len(said.distance):
+        return said
+    return PairMeasurement(
+        [found.take(which) for found in said.innovations],
+        [apart[:, which] for apart in said.residuals],
+        said.distance[which],
+        said.log_likelihoods[:, which],
+    )
+
+
+def log_gain(
+    rules: TrackerRules, part: TrackStore, one: GatedPairs, codes: IntArray, sensors: IntArray
+) -> FloatArray:
+    """Return ln(Pd N(z) / λ) of every pair."""
+    lowest = sensors[one.detection] & -sensors[one.detection]
+    sensor = np.log2(lowest.astype(float)).astype(np.int64)
+    density = rules.log_density[codes[one.detection], sensor]
+    mixed = log_mixture(part.weights[:, one.track], one.said.log_likelihoods)
+    return np.asarray(np.log(rules.detection_probability) + mixed - density)
+
+
+def named(states: list[FloatArray], covariances: list[FloatArray]) -> dict[str, FloatArray]:
+    """Return states and covariances as columns of a store."""
+    columns = {f"state{i}": x for i, x in enumerate(states)}
+    return columns | {f"covariance{i}": p for i, p in enumerate(covariances)}
+
+
+def put(part: TrackStore, which: IntArray, new: dict[str, Any]) -> TrackStore:
+    """Return tracks with other values in some columns of some of them."""
+    changed = {}
+    for name, values in new.items():
+        if len(which) == len(part):  # which is ascending or a permutation
+            whole = np.empty_like(part.columns[name])
+        else:
+            whole = part.columns[name].copy()
+        whole[..., which] = values
+        changed[name] = whole
+    return part.with_columns(**changed)

@@ -1,0 +1,71 @@
+"""The update of one detection for one track: nearest, or globally nearest."""
+
+import numpy as np
+
+from components.association.assignment import global_nearest, nearest
+from components.association.gates import gate_threshold
+from components.estimation.batched import log_determinant
+from components.tracking.gated_pairs import GatedPairs, log_gain, named, put
+from components.tracking.rules import TrackerRules
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+
+def updated_by_one(
+    rules: TrackerRules,
+    part: TrackStore,
+    kinds: list[GatedPairs],
+    codes: IntArray,
+    sensors: IntArray,
+) -> tuple[TrackStore, BoolArray, FloatArray]:
+    """Return tracks, each updated by at most one detection; who was, and their ln(Pd N(z) / λ)."""
+    hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
+    if not kinds:
+        return part, hit, gain
+    track = np.concatenate([one.track for one in kinds])
+    entry = np.concatenate([one.detection for one in kinds])
+    distance = np.concatenate([one.said.distance for one in kinds])
+    if rules.association == "nearest":
+        taken = nearest(track, entry, distance)
+    else:
+        volume = np.concatenate([_log_volume(one) for one in kinds])
+        size = np.concatenate([np.full(len(one.track), len(one.said.residuals[0]))
+                               for one in kinds])  # fmt: skip
+        limits = np.zeros(5)
+        for many in range(2, 5):
+            limits[many] = gate_threshold(rules.gate_probability, many)
+        price = np.full(len(part), -np.inf)
+        np.maximum.at(price, track, limits[size] + volume)
+        taken = global_nearest(track, entry, distance + volume, price[track])
+    first = 0
+    for one in kinds:
+        last = first + len(one.track)
+        mine = taken[(taken >= first) & (taken < last)] - first
+        first = last
+        if len(mine) == 0:
+            continue
+        which = one.track[mine]
+        states, covariances, weights = rules.bank.update(
+            part.states(), part.covariances(), part.weights, which, one.said, mine
+        )
+        mask = sensors[one.detection[mine]]
+        gain[which] = log_gain(rules, part, one, codes, sensors)[mine]
+        hit[which] = True
+        ranged = len(one.said.residuals[0]) > 2
+        new = {
+            **named(states, covariances),
+            "weights": weights,
+            "contributors": part.contributors[which] | mask,
+            "updated_by": mask,
+            "ranged": part.ranged[which] | ranged,
+        }
+        part = put(part, which, new)
+    return part, hit, gain
+
+
+def _log_volume(one: GatedPairs) -> FloatArray:
+    """Return ln |S| of every pair; of several models the least, whose gate is the tightest."""
+    found = log_determinant(one.said.innovations[0].root)
+    for other in one.said.innovations[1:]:
+        found = np.minimum(found, log_determinant(other.root))
+    return found

@@ -1,0 +1,90 @@
+"""A tracker with interacting motion models (``tracking.imm``)."""
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.estimation.motion import (
+    ConstantAcceleration,
+    ConstantVelocity,
+    CoordinatedTurn,
+    Motion,
+)
+from components.tracking.filter_bank import FilterBank
+from components.tracking.parameters import TrackerParameters
+from components.tracking.tracker import Tracker
+
+Model = Literal["velocity", "turn", "acceleration"]
+
+
+class InteractingParameters(TrackerParameters):
+    """Parameters of the tracker with interacting models."""
+
+    models: tuple[Model, ...] = Field(
+        default=("velocity", "turn"),
+        min_length=2,
+        max_length=3,
+        description="Motion models, each once: constant velocity, coordinated turn, constant "
+        "acceleration.",
+    )
+    transition_rates_per_s: tuple[tuple[float, ...], ...] | None = Field(
+        default=None,
+        description="Rates from each model (row) to each (column), 1/s; the diagonal is not read. "
+        "By default velocity is left every 30 s and the others every 10 s, to any other alike.",
+    )
+    turn_acceleration_intensity_m2_s3: float = Field(
+        default=1.0, gt=0, description="Intensity of the white acceleration within a turn, m²/s³."
+    )
+    turn_rate_intensity_deg2_s3: float = Field(
+        default=0.5, gt=0, description="Intensity with which the rate of a turn drifts, deg²/s³."
+    )
+    jerk_intensity_m2_s5: float = Field(
+        default=1.0, gt=0, description="Intensity of white jerk of `acceleration`, m²/s⁵."
+    )
+    start_turn_deg_s: float = Field(
+        default=3.0, gt=0, description="Standard deviation of a new track's turn rate, deg/s."
+    )
+    start_acceleration_m_s2: float = Field(
+        default=3.0, gt=0, description="That of its acceleration along each axis, m/s²."
+    )
+
+    @model_validator(mode="after")
+    def _square(self) -> Any:
+        if len(set(self.models)) < len(self.models):
+            raise ValueError(f"models = {list(self.models)} names one twice; allowed: each once")
+        rates, many = self.transition_rates_per_s, len(self.models)
+        if rates is not None:
+            if len(rates) != many or any(len(row) != many for row in rates):
+                raise ValueError(
+                    f"transition_rates_per_s has other rows than models; allowed: {many} rows of "
+                    f"{many} rates"
+                )
+            if any(v < 0 for i, row in enumerate(rates) for j, v in enumerate(row) if i != j):
+                raise ValueError("transition_rates_per_s has a negative rate; allowed: 0 or more")
+        return self
+
+
+class InteractingModels(Tracker):
+    """Runs several extended Kalman filters that share what they know by the models' odds."""
+
+    Parameters = InteractingParameters
+    lockstep = True
+
+    def bank(self) -> FilterBank:
+        """Return a filter for each model."""
+        p = self.p
+        known: dict[str, Motion] = {
+            "velocity": ConstantVelocity(p.acceleration_intensity_m2_s3),
+            "turn": CoordinatedTurn(
+                p.turn_acceleration_intensity_m2_s3,
+                float(np.radians(1.0)) ** 2 * p.turn_rate_intensity_deg2_s3,
+            ),
+            "acceleration": ConstantAcceleration(p.jerk_intensity_m2_s5),
+        }
+        rates = p.transition_rates_per_s
+        if rates is None:
+            others = len(p.models) - 1
+            leave = [1.0 / 30.0 if name == "velocity" else 0.1 for name in p.models]
+            rates = tuple(tuple(rate / others for _ in p.models) for rate in leave)
+        return FilterBank(tuple(known[name] for name in p.models), np.array(rates))

@@ -1,0 +1,103 @@
+"""Parameters of every tracker that estimates states."""
+
+from fractions import Fraction
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from components.tracking.life import LONGEST_WINDOW, LifeRules
+from dsa_des.block.component import NonNegativeRational, Parameters
+
+
+class TrackerParameters(Parameters):
+    """Parameters of every tracker that estimates states."""
+
+    acceleration_intensity_m2_s3: float = Field(
+        default=4.0, gt=0,
+        description="Intensity of the white acceleration that targets are taken to have, m²/s³.",
+    )  # fmt: skip
+    association: Literal["nearest", "gnn", "jpda"] = Field(
+        default="gnn",
+        description="Which detection is whose: the nearest in turn, the least sum over all "
+        "(global nearest neighbour), or all of them weighed (joint probabilistic).",
+    )
+    gate_probability: float = Field(
+        default=0.997, gt=0, lt=1,
+        description="Probability that a target's detection lies in its gate.",
+    )  # fmt: skip
+    detection_probability: float = Field(
+        default=0.9, gt=0, lt=1, description="Probability that a look at a target detects it."
+    )
+    false_alarms_per_scan: float = Field(
+        default=0.1, gt=0,
+        description="False alarms that a sensor is taken to have in a scan of its whole field.",
+    )  # fmt: skip
+    jpda_exact_detections: int = Field(
+        default=10, ge=1, le=16,
+        description="Detections in a cluster up to which `jpda` is exact; belief propagation "
+        "beyond.",
+    )  # fmt: skip
+    initiation: Literal["m_of_n", "likelihood_ratio"] = Field(
+        default="m_of_n", description="The rule that confirms a track."
+    )
+    confirm_m: int = Field(default=3, ge=1, description="Hits that confirm a track (`m_of_n`).")
+    confirm_n: int = Field(
+        default=5, ge=1, le=LONGEST_WINDOW, description="Expected looks in which they must fall."
+    )
+    false_confirmation: float = Field(
+        default=1e-4, gt=0, lt=0.5,
+        description="Share of false tracks that `likelihood_ratio` confirms.",
+    )  # fmt: skip
+    missed_confirmation: float = Field(
+        default=0.01, gt=0, lt=0.5, description="Share of true tracks that it drops."
+    )
+    start_existence: float = Field(
+        default=0.2, gt=0, lt=1,
+        description="Probability that a detection that belongs to no track is of a target.",
+    )  # fmt: skip
+    start_speed_m_s: float = Field(
+        default=70.0, gt=0,
+        description="Standard deviation of a new track's velocity along each axis, m/s.",
+    )  # fmt: skip
+    assumed_range_m: float | None = Field(
+        default=None, gt=0,
+        description="Range that is assumed, to 45 %, of what is seen without one, m; by default "
+        "half of the farthest reach of the sensors.",
+    )  # fmt: skip
+    delete_misses: int = Field(
+        default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
+    )
+    delete_after_s: float = Field(
+        default=6.0, gt=0, description="Time without a detection after which any track ends, s."
+    )
+    delete_above_m: float = Field(
+        default=3000.0, gt=0,
+        description="Standard deviation of a position that ends a track with a range, m.",
+    )  # fmt: skip
+
+    late: Literal["drop", "rerun"] = Field(
+        default="drop",
+        description="What becomes of a look that comes after a later one: it is left out, or all "
+        "looks since it are worked on again in order.",
+    )
+    lag_s: NonNegativeRational = Field(
+        default=Fraction(1),
+        description="How much older than the newest a look may be to be worked on again "
+        "(`rerun`), s; older ones are left out and counted.",
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Any:
+        if self.confirm_m > self.confirm_n:
+            raise ValueError(
+                f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "
+                "looks; allowed: at most as many"
+            )
+        return self
+
+    def life(self) -> LifeRules:
+        """Return the rules of a track's life."""
+        return LifeRules(
+            self.initiation, self.confirm_m, self.confirm_n, self.false_confirmation,
+            self.missed_confirmation, self.delete_misses,
+        )  # fmt: skip

@@ -1,0 +1,173 @@
+"""What a tracker tells: the columns of its message, made once for all looks of a wake."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.estimation import modes
+from components.estimation.batched import product, product_transposed
+from components.estimation.frame import Place
+from components.estimation.measurement import Kind, linearised
+from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import StateTracks
+from components.tracking.life import existence
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.message import offsets_of
+from dsa_des.block.wake import Wake
+
+_COMPONENTS = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_ACCELERATIONS = (
+    "acceleration_north_m_s2", "acceleration_east_m_s2", "acceleration_down_m_s2",
+)  # fmt: skip
+#: Column of a model's probability, by the size of its state.
+_PROBABILITIES = {
+    6: "probability_velocity", 7: "probability_turn", 9: "probability_acceleration",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Reported:
+    """Tracks as they are told after a look.
+
+    Parameters
+    ----------
+    store : TrackStore
+    look : (tracks,)
+        The last that was worked on.
+    row : (tracks,)
+        Row of the wake at which it is told.
+    """
+
+    store: TrackStore
+    look: IntArray
+    row: IntArray
+
+    @classmethod
+    def of(
+        cls, store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
+    ) -> "Reported":
+        """Return the tracks of some replicas (ascending) after their looks."""
+        place = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+        mine = replica[place] == store.replica
+        return cls(store.take(mine), looks[place[mine]], rows[place[mine]])
+
+
+def state_tracks(
+    reported: Sequence[Reported],
+    places: Place,
+    origin: FloatArray,
+    rows: IntArray,
+    wake: Wake,
+    sensors: tuple[str, ...],
+) -> StateTracks:
+    """Return the message of what is told.
+
+    Parameters
+    ----------
+    reported : sequence of Reported
+    places : Place
+        Of every look.
+    origin : (3, looks)
+        Latitude, longitude (deg), height (m) of the frame.
+    rows : (n,)
+        Rows of the wake at which a message is sent.
+    wake : Wake
+    sensors : tuple of str
+    """
+    ticks = wake.ticks[rows]
+    if not reported:
+        empty = StateTracks.initial({})
+        empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
+        empty.sensors = sensors
+        return empty
+    look = np.concatenate([part.look for part in reported])
+    row = np.concatenate([part.row for part in reported])
+    order = np.argsort(row, kind="stable")
+    look, row = look[order], row[order]
+    store = _Columns(reported, order)
+    models = len(reported[0].store.weights)
+    state, covariance = store.state(models)
+    axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(look), axis=2)
+    seen, by_state = linearised(Kind(False), state, Place(places.position_m[:, look], axes))
+    spread = product_transposed(product(by_state, covariance[:3, :3]), by_state)
+    unknown = ~store.plain("ranged")
+    hidden = bool(unknown.any())
+
+    def known(values: FloatArray) -> FloatArray:
+        return np.where(unknown, np.nan, values) if hidden else values
+
+    tick, score = store.plain("tick"), store.plain("score")
+    begin = (wake.replica * wake.span_ticks)[row]
+    per_s = wake.ticks_per_s
+    return StateTracks(
+        tick=ticks,
+        offsets=offsets_of(np.searchsorted(rows, row), len(ticks)),
+        track=store.plain("number"),
+        track_status=store.plain("status"),
+        existence=existence(score),
+        azimuth_rad=seen[0] % (2.0 * np.pi),
+        elevation_rad=seen[1],
+        azimuth_variance_rad2=spread[0, 0],
+        elevation_variance_rad2=spread[1, 1],
+        has_range=~unknown,
+        age_s=(tick - store.plain("born_tick")) / per_s,
+        state_s=(tick - begin) / per_s,
+        updated_s=(store.plain("updated_tick") - begin) / per_s,
+        contributors=store.plain("contributors"),
+        updated_by=store.plain("updated_by"),
+        origin_lat_deg=origin[0, look],
+        origin_lon_deg=origin[1, look],
+        origin_alt_m=origin[2, look],
+        covariance={name: known(covariance[i, j]) for (i, j), name in COVARIANCE.items()},
+        extras={} if models == 1 else store.extras(models, known),
+        sensors=sensors,
+        **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
+    )  # fmt: skip
+
+
+class _Columns:
+    """What was told look by look, as columns in the order of the message."""
+
+    def __init__(self, reported: Sequence[Reported], order: IntArray) -> None:
+        self._parts = [part.store.columns for part in reported]
+        self._order = order
+
+    def plain(self, name: str) -> Any:
+        """Return a column."""
+        return np.concatenate([part[name] for part in self._parts])[self._order]
+
+    def element(self, name: str, *place: int) -> FloatArray:
+        """Return one component of a vector, or one element of a matrix."""
+        return np.concatenate([part[name][place] for part in self._parts])[self._order]
+
+    def state(self, models: int) -> tuple[FloatArray, FloatArray]:
+        """Return position and velocity with their covariance, over all models."""
+        states, covariances = [], []
+        for m in range(models):
+            states.append(np.stack([self.element(f"state{m}", i) for i in range(6)]))
+            whole = np.empty((6, 6, len(self._order)))
+            for i, j in COVARIANCE:
+                whole[i, j] = whole[j, i] = self.element(f"covariance{m}", i, j)
+            covariances.append(whole)
+        if models == 1:
+            return states[0], covariances[0]
+        weights = np.stack([self.element("weights", m) for m in range(models)])
+        return modes.combined(states, covariances, weights)
+
+    def extras(
+        self, models: int, known: Callable[[FloatArray], FloatArray]
+    ) -> dict[str, FloatArray]:
+        """Return what models have besides position and velocity."""
+        found = {}
+        for m in range(models):
+            size = len(self._parts[0][f"state{m}"])
+            found[_PROBABILITIES[size]] = self.element("weights", m)
+            if size == 7:
+                found["turn_rate_rad_s"] = known(self.element(f"state{m}", 6))
+            elif size == 9:
+                for i, name in enumerate(_ACCELERATIONS):
+                    found[name] = known(self.element(f"state{m}", 6 + i))
+        return found

@@ -1,0 +1,203 @@
+"""What a tracker works on: looks in the order in which they came, and what each detected."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from components.estimation.measurement import Kind
+from components.messages.detections import POSE, FusedDetections
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.wake import Wake
+
+_MEASURED = ("azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s")
+_VARIANCES = (
+    "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
+    "range_rate_variance_m2_s2",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Scans:
+    """Looks in the order of their arrival, and their detections.
+
+    Parameters
+    ----------
+    row : (looks,)
+        At which row of the wake each arrived, ascending.
+    tick : (looks,)
+        When it was made.
+    sensors : (looks,)
+        Mask of the sensors that looked.
+    tells_misses : (looks,) of bool
+        Whether what is not among its detections was missed.
+    pose : (6, looks)
+        Of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll (rad).
+    offsets : (looks + 1,)
+        Detections ``offsets[i]:offsets[i + 1]`` belong to look i.
+    measured, variance : (4, detections)
+        Azimuth, elevation, range, range rate; NaN where not measured.
+    contributors : (detections,)
+    """
+
+    row: IntArray
+    tick: IntArray
+    sensors: IntArray
+    tells_misses: BoolArray
+    pose: FloatArray
+    offsets: IntArray
+    measured: FloatArray
+    variance: FloatArray
+    contributors: IntArray
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def kinds(self, use_range_rate: bool) -> IntArray:
+        """Return the kind of each detection: 1 with a range, 2 more with a range rate."""
+        code = (~np.isnan(self.measured[2])).astype(np.int64)
+        if use_range_rate:
+            code += 2 * ~np.isnan(self.measured[3])
+        return code
+
+    def take(self, looks: IntArray) -> Self:
+        """Return some looks with their detections."""
+        counts = np.diff(self.offsets)[looks]
+        offsets = np.concatenate(([0], np.cumsum(counts)))
+        which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
+        return type(self)(
+            self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
+            self.pose[:, looks], offsets, self.measured[:, which], self.variance[:, which],
+            self.contributors[which],
+        )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the looks of all parts, one after the other."""
+        counts = np.concatenate([np.diff(part.offsets) for part in parts])
+        names = ("row", "tick", "sensors", "tells_misses", "pose", "measured", "variance",
+                 "contributors")  # fmt: skip
+        columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
+        return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
+
+
+def kind_of(code: int) -> tuple[Kind, list[int]]:
+    """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
+    kind = Kind(bool(code & 1), bool(code & 2))
+    return kind, [0, 1, *([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
+
+
+def scans_of(fused: FusedDetections) -> Scans:
+    """Return the looks behind a message, and their detections, by arrival and then by instant.
+
+    A fusion that passes reports on tells every look, also those in vain. Of other fusions a look is
+    what was measured at one instant among the entries of a row, and a row without entries is none.
+
+    Raises
+    ------
+    ValueError
+        If an entry lacks a pose or a variance that is positive.
+    """
+    row = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
+    mask = np.asarray(fused.contributors, dtype=np.int64)
+    tick = fused.measured_tick
+    pose = fused.pose_columns()
+    own = (
+        np.stack([pose[name] for name in POSE]) if pose else np.full((len(POSE), len(row)), np.nan)
+    )
+    looks = fused.looks
+    told = 0
+    key = [row, tick, np.zeros_like(row)]
+    sensors, place = mask, own
+    if looks is not None:
+        look_row = np.repeat(np.arange(len(fused)), np.diff(looks.offsets))
+        told = len(look_row)
+        key = [
+            np.concatenate([look_row, row]),
+            np.concatenate([fused.tick[look_row] - looks.age_ticks, tick]),
+            np.concatenate([looks.sensor, fused.angle_source]),
+        ]
+        sensors = np.concatenate([np.int64(1) << looks.sensor, mask])
+        place = np.concatenate([looks.pose, own], axis=1)
+    order = np.lexsort(key[::-1])
+    fresh = np.ones(len(order), dtype=bool)
+    same = [values[order][1:] == values[order][:-1] for values in key]
+    fresh[1:] = ~np.logical_and.reduce(same)
+    number = np.cumsum(fresh) - 1
+    count = int(fresh.sum())
+    begins = order[fresh]
+    whole = np.zeros(count, dtype=bool)
+    whole[number[order < told]] = True
+    if looks is None:
+        whole[:] = True
+    of_entry = np.empty(len(order), dtype=np.int64)
+    of_entry[order] = number
+    of_entry = of_entry[told:]
+    union = np.zeros(count, dtype=np.int64)
+    np.bitwise_or.at(union, number, sensors[order])
+    # Stable: the sorted order keeps a look's detections in the order of the message.
+    entries = np.argsort(of_entry, kind="stable")
+    measured = np.stack([getattr(fused, name) for name in _MEASURED])
+    variance = np.stack([getattr(fused, name) for name in _VARIANCES])
+    _refuse(fused, measured, variance, place[:, begins])
+    return Scans(
+        row=key[0][begins],
+        tick=key[1][begins],
+        sensors=union,
+        tells_misses=whole,
+        pose=place[:, begins],
+        offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
+        measured=measured[:, entries],
+        variance=variance[:, entries],
+        contributors=mask[entries],
+    )
+
+
+def when_made(scans: Scans, ahead: Scans | None, wake: Wake) -> tuple[Scans, Scans | None]:
+    """Return the looks that have been made by the rows of a wake, and those that wait.
+
+    A sweeping radar reports a scan as it begins, with instants at which its beam meets the targets
+    later: such a look waits for the first row at or after its own instant.
+
+    Parameters
+    ----------
+    scans : Scans
+        By arrival.
+    ahead : Scans or None
+        Those that have waited.
+    wake : Wake
+    """
+    if ahead is None and not bool((scans.tick > wake.ticks[scans.row]).any()):
+        return scans, None
+    if ahead is not None:
+        scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
+    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick))
+    span = wake.span_ticks or np.iinfo(np.int64).max
+    of_look = scans.tick // span
+    there = np.minimum(row, len(wake) - 1)
+    ready = (row < len(wake)) & (wake.replica[there] == of_look)
+    waiting = ~ready & (of_look == wake.replica[-1])
+    order = np.lexsort((scans.sensors, scans.tick, row))
+    done = replace(scans, row=row).take(order[ready[order]])
+    return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None
+
+
+def _refuse(
+    fused: FusedDetections, measured: FloatArray, variance: FloatArray, pose: FloatArray
+) -> None:
+    if np.isnan(pose).any():
+        raise ValueError(
+            "a report does not say where the ownship believed to be (own_lat_deg, own_lon_deg, "
+            "own_alt_m, own_heading_rad, own_pitch_rad, own_roll_rad): a tracker needs its pose"
+        )
+    bad = ~np.isnan(measured) & ~(variance > 0.0)
+    if bad.any():
+        what, entry = (int(values[0]) for values in bad.nonzero())
+        sensors = "+".join(
+            name for i, name in enumerate(fused.sensors) if int(fused.contributors[entry]) >> i & 1
+        )
+        raise ValueError(
+            f"{sensors} states the variance {variance[what, entry]:g} of its {_MEASURED[what]}: "
+            "a tracker needs one above 0 (a grid's step, or stated errors)"
+        )

@@ -1,0 +1,173 @@
+"""One look of every replica: predict, gate, associate, update, start and end tracks."""
+
+import numpy as np
+
+from components.estimation.frame import Place
+from components.estimation.measurement import Kind, expected
+from components.messages.reach import EVALUATE
+from components.messages.state_tracks import DELETED
+from components.tracking.gated_pairs import gated_pairs, named
+from components.tracking.hard_update import updated_by_one
+from components.tracking.life import LARGEST_SCORE, after_hits_and_misses, seeing
+from components.tracking.rules import TrackerRules
+from components.tracking.scans import Scans
+from components.tracking.soft_update import updated_by_all
+from components.tracking.start import started
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+
+def step(
+    rules: TrackerRules,
+    store: TrackStore,
+    scans: Scans,
+    places: Place,
+    codes: IntArray,
+    looks: IntArray,
+    replica: IntArray,
+    next_number: IntArray,
+) -> tuple[TrackStore, IntArray]:
+    """Return the tracks after one look in each of some replicas, and their next numbers.
+
+    Parameters
+    ----------
+    rules : TrackerRules
+    store : TrackStore
+        Of all replicas; those that do not look stay as they are.
+    scans : Scans
+    places : Place
+        Of every look.
+    codes : (detections,)
+        `Scans.kinds`.
+    looks : (n,)
+        The look of each replica.
+    replica : (n,)
+        Ascending.
+    next_number : (n,)
+        Number that the next track of each replica bears.
+    """
+    of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+    here = replica[of] == store.replica
+    rest = store.take(~here)
+    alive = here & (store.status != DELETED)
+    part, of = store.take(alive), of[alive]
+    tick = scans.tick[looks]
+    detection, of_detection = _detections(scans, looks)
+    part = _predicted(rules, part, tick[of])
+    if len(part):
+        part, gated = _updated(rules, part, of, scans, places, codes, looks, detection,
+                               of_detection)  # fmt: skip
+    else:
+        gated = np.zeros(len(detection), dtype=bool)
+    born, next_number = started(
+        rules, scans, places, codes, looks, replica, next_number,
+        detection[~gated], of_detection[~gated],
+    )  # fmt: skip
+    return TrackStore.joined([rest, part, born]), next_number
+
+
+def _detections(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the detections of looks, and to which of them each belongs."""
+    first = scans.offsets[looks]
+    counts = scans.offsets[looks + 1] - first
+    of = np.repeat(np.arange(len(looks)), counts)
+    starts = np.cumsum(counts) - counts
+    return np.arange(len(of)) + (first - starts)[of], of
+
+
+def _predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
+    if len(part) == 0:
+        return part
+    dt_s = (tick - part.tick) / rules.ticks_per_s
+    states, covariances, weights = rules.bank.predict(
+        part.states(), part.covariances(), part.weights, dt_s
+    )
+    return part.with_columns(tick=tick, weights=weights, **named(states, covariances))
+
+
+def _updated(
+    rules: TrackerRules,
+    part: TrackStore,
+    of: IntArray,
+    scans: Scans,
+    places: Place,
+    codes: IntArray,
+    looks: IntArray,
+    detection: IntArray,
+    of_detection: IntArray,
+) -> tuple[TrackStore, BoolArray]:
+    """Return tracks after association, and which detections lie in the gate of any."""
+    place = places.take(looks[of])
+    codes_here = codes[detection]
+    kinds = gated_pairs(
+        rules, part, of, place, scans, codes_here, detection, of_detection, len(looks)
+    )
+    gated = np.zeros(len(detection), dtype=bool)
+    for one in kinds:
+        gated[one.detection] = True
+    looked = _expected_looks(rules, part, of, scans, looks, place)
+    sensors = scans.contributors[detection]
+    update = updated_by_all if rules.association == "jpda" else updated_by_one
+    changed, hit, gain = update(rules, part, kinds, codes_here, sensors)
+    missed = looked.any(axis=0) & ~hit
+    by = np.where(hit, changed.updated_by, 0) >> np.arange(len(rules.fields))[:, np.newaxis] & 1
+    vain = np.where(by == 1, 0, part.vain + (looked & (by == 0)))
+    gain = np.where(
+        hit,
+        gain,
+        np.where(missed, np.log1p(-rules.detection_probability * rules.gate_probability), 0.0),
+    )
+    history, count, misses = after_hits_and_misses(
+        part.history, part.looks, part.misses, hit, missed
+    )
+    score = np.clip(part.score + gain, -LARGEST_SCORE, LARGEST_SCORE)
+    status = rules.life.judge(part.status, history, count, misses, score, rules.start_score)
+    changed = changed.with_columns(
+        history=history, looks=count, misses=misses, score=score, vain=vain,
+        updated_tick=np.where(hit, changed.tick, changed.updated_tick),
+    )  # fmt: skip
+    spread = _position_variance(changed)
+    if not bool(np.isfinite(spread).all() & (spread >= 0.0).all()):
+        number = int(changed.number[~(np.isfinite(spread) & (spread >= 0.0))][0])
+        raise ValueError(
+            f"the covariance of track {number} has become singular: the stated variances are "
+            "smaller than what the filter's arithmetic resolves at this range; state larger ones"
+        )
+    ended = changed.ranged & (spread > rules.delete_above_m**2)
+    ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
+    return changed.with_columns(status=np.where(ended, DELETED, status)), gated
+
+
+def _position_variance(part: TrackStore) -> FloatArray:
+    total = np.zeros(len(part))
+    for weight, spread in zip(part.weights, part.covariances(), strict=True):
+        total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
+    return total
+
+
+def _expected_looks(
+    rules: TrackerRules,
+    part: TrackStore,
+    of: IntArray,
+    scans: Scans,
+    looks: IntArray,
+    place: Place,
+) -> BoolArray:
+    """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
+    sensors = np.where(scans.tells_misses[looks], scans.sensors[looks], 0)
+    used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
+    found = np.zeros((len(rules.fields), len(part)), dtype=bool)
+    if used == 0:
+        return found
+    azimuth, elevation, distance = expected(Kind(True), part.state0, place)
+    distance = np.where(part.ranged, distance, 0.0)
+    there = np.ones(len(part), dtype=bool)
+    mine = sensors[of]
+    sees = seeing(part.vain)
+    for i, field in enumerate(rules.fields):
+        if not used >> i & 1:
+            continue
+        found[i] = (mine >> i & 1).astype(bool) & sees[i]
+        if field is not None:
+            found[i] &= field.decide(azimuth, elevation, distance, there) == EVALUATE
+    return found

@@ -1,0 +1,98 @@
+"""Tracks of all replicas as columns: made anew at every change, never changed in place."""
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, BoolArray, IntArray
+
+
+class TrackStore:
+    """Columns over tracks, the tracks on their last axis.
+
+    A column is asked for as an attribute. States are ``state0``, ``state1``, … (d, n), one for each
+    motion model, covariances ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely
+    each model is. ``vain`` (sensors, n) counts each sensor's looks in vain since its last hit, from
+    `components.tracking.life.NEVER` where it had none.
+
+    Parameters
+    ----------
+    columns : dict of arrays
+    """
+
+    #: Columns beside states, with their types.
+    PLAIN = {
+        "replica": np.int64,
+        "number": np.int64,
+        "tick": np.int64,  # that the state speaks of
+        "born_tick": np.int64,
+        "updated_tick": np.int64,
+        "history": np.int64,  # a bit for each expected look, 1 for a hit; the last look lowest
+        "looks": np.int64,
+        "misses": np.int64,  # expected looks in vain since the last hit
+        "status": np.int64,
+        "score": np.float64,  # logarithm of the odds that there is something
+        "contributors": np.int64,
+        "updated_by": np.int64,
+        "ranged": np.bool_,
+    }
+
+    def __init__(self, columns: dict[str, Any]) -> None:
+        self.columns = columns
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["columns"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def __len__(self) -> int:
+        return len(self.columns["replica"])
+
+    @classmethod
+    def empty(cls, sizes: Sequence[int], sensors: int) -> Self:
+        """Return a store without tracks for models with states of these sizes."""
+        columns: dict[str, AnyArray] = {n: np.empty(0, dtype=t) for n, t in cls.PLAIN.items()}
+        columns["weights"] = np.empty((len(sizes), 0))
+        columns["vain"] = np.empty((sensors, 0), dtype=np.int64)
+        for i, size in enumerate(sizes):
+            columns[f"state{i}"] = np.empty((size, 0))
+            columns[f"covariance{i}"] = np.empty((size, size, 0))
+        return cls(columns)
+
+    def take(self, which: IntArray | BoolArray) -> Self:
+        """Return some tracks."""
+        if which.dtype == bool:
+            if which.all():
+                return self
+            which = which.nonzero()[0]
+        return type(self)({name: v.take(which, axis=-1) for name, v in self.columns.items()})
+
+    def with_columns(self, **columns: Any) -> Self:
+        """Return the same tracks with other values."""
+        return type(self)({**self.columns, **columns})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the tracks of all parts, by replica and in their order in it."""
+        filled = [part for part in parts if len(part)] or [parts[0]]
+        if len(filled) == 1:
+            return filled[0]
+        whole = cls(
+            {
+                name: np.concatenate([part.columns[name] for part in filled], axis=-1)
+                for name in filled[0].columns
+            }
+        )
+        if bool((whole.replica[1:] >= whole.replica[:-1]).all()):
+            return whole
+        return whole.take(np.argsort(whole.replica, kind="stable"))
+
+    def states(self) -> list[AnyArray]:
+        """Return the states of every model."""
+        return [self.columns[f"state{i}"] for i in range(len(self.weights))]
+
+    def covariances(self) -> list[AnyArray]:
+        """Return the covariances of every model."""
+        return [self.columns[f"covariance{i}"] for i in range(len(self.weights))]

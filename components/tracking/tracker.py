@@ -1,0 +1,217 @@
+"""The base class of trackers that estimate states: parameters, memory, and the order of looks."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from components.estimation.frame import place_in_frame
+from components.estimation.motion import ConstantVelocity
+from components.messages.detections import FusedDetections, SensorOffer
+from components.messages.reach import Reach
+from components.messages.state_tracks import StateTracks
+from components.sensor.marks import TRACKER
+from components.tracking.filter_bank import FilterBank
+from components.tracking.late_looks import (
+    Before,
+    Memory,
+    Plan,
+    gone_back,
+    rerun_plan,
+    straight_plan,
+)
+from components.tracking.parameters import TrackerParameters
+from components.tracking.replica_memory import Heads, Past
+from components.tracking.report import Reported, state_tracks
+from components.tracking.rules import TrackerRules
+from components.tracking.scans import Scans, scans_of, when_made
+from components.tracking.step import step
+from components.tracking.track_store import TrackStore
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+# What a sensor that tells no reach is taken to see: all around, as far as this.
+_FARTHEST_M = 20_000.0
+_WHOLE_RATE_M_S = 600.0
+
+
+class Tracker(Component):
+    """Estimates where targets are and how they move, from measured values alone.
+
+    Tracks bear numbers of their own. Every look of every sensor is processed at its own instant;
+    tracks are told at every instant at which something came. States are in a fixed frame: north,
+    east, down where the ownship believed to be at the first look (`StateTracks`).
+    """
+
+    mark = TRACKER
+    inputs = {"fused": Input(FusedDetections, "trigger", "What was measured.")}
+    outputs = {"tracks": Output(StateTracks, "Estimated tracks.")}
+    Parameters = TrackerParameters
+    windowed = True
+    rewindable = True
+
+    def bank(self) -> FilterBank:
+        """Return the filters; a subclass may say otherwise."""
+        return FilterBank((ConstantVelocity(self.p.acceleration_intensity_m2_s3),))
+
+    def setup(self) -> None:
+        """Start with no tracks."""
+        self.rules: TrackerRules | None = None
+        self._sensors: tuple[str, ...] = ()
+        self._store = TrackStore.empty(self.bank().sizes, 0)
+        self._heads = Heads.none()
+        self._past: Past | None = None
+        self._ahead: Scans | None = None
+        self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
+        self._late = 0
+
+    def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
+        offers: dict[str, Any] = {}
+        for producer in self.context.producers:
+            if isinstance(producer.offer, dict):
+                offers |= producer.offer
+        told = [offers.get(name) for name in sensors]
+        fields = tuple(o.reach if isinstance(o, SensorOffer) else None for o in told)
+        farthest = max(
+            (f.range_max_m for f in fields if f is not None and f.range_max_m < math.inf),
+            default=_FARTHEST_M,
+        )
+        assumed = self.p.assumed_range_m or 0.5 * farthest
+        existence = self.p.start_existence
+        return TrackerRules(
+            bank=self.bank(),
+            association=self.p.association,
+            gate_probability=self.p.gate_probability,
+            detection_probability=self.p.detection_probability,
+            exact_up_to=self.p.jpda_exact_detections,
+            life=self.p.life(),
+            start_score=math.log(existence / (1.0 - existence)),
+            start_speed_m_s=self.p.start_speed_m_s,
+            start_acceleration_m_s2=getattr(self.p, "start_acceleration_m_s2", 3.0),
+            start_turn_rad_s=math.radians(getattr(self.p, "start_turn_deg_s", 3.0)),
+            start_range_m=(assumed, 0.45 * assumed),
+            delete_above_m=self.p.delete_above_m,
+            delete_after_ticks=int(self.p.delete_after_s * self.context.ticks_per_s),
+            log_density=log_densities(fields, self.p.false_alarms_per_scan),
+            fields=fields,
+            use_range_rate=False,
+            ticks_per_s=self.context.ticks_per_s,
+        )
+
+    def run(self, wake: Wake) -> StateTracks | None:
+        """Take in what came, look by look, and tell all tracks."""
+        fused = wake["fused"]
+        if fused is None:
+            return None
+        if self.rules is None or fused.sensors != self._sensors:
+            self.rules, self._sensors = self._rules(fused.sensors), fused.sensors
+            self._store = TrackStore.empty(self.rules.bank.sizes, len(fused.sensors))
+        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake)
+        if len(scans) == 0:
+            return None
+        replica = wake.replica[scans.row]
+        heads = self._heads.followed_by(replica, scans.pose[:3])
+        store = self._store.take(np.isin(self._store.replica, heads.replica))
+        past = self._past
+        begin = 0
+        before: dict[int, Before] = {}
+        memory: dict[int, Memory] = {}
+        if past is not None and past.replica == heads.replica[0]:
+            begin, before, memory = len(past.scans), dict(past.before), {0: past.memory()}
+            scans = Scans.joined([past.scans, scans])
+            replica = np.concatenate([np.full(begin, past.replica), replica])
+        of = np.searchsorted(heads.replica, replica)
+        if self.p.late == "rerun":
+            plan, left_out = rerun_plan(scans, of, begin, memory, self._lag_ticks)
+        else:
+            plan, left_out = straight_plan(scans, of, heads.tick)
+        self._late += left_out
+        places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose))
+        codes = scans.kinds(self.rules.use_range_rate)
+        reported: list[Reported] = []
+        for works in _turns(plan.of):
+            looks, mine = plan.look[works], plan.of[works]
+            if self.p.late == "rerun":
+                store = self._remember(store, heads, plan, works, before)
+            store, heads.next_number[mine] = step(
+                self.rules, store, scans, places, codes, looks, heads.replica[mine],
+                heads.next_number[mine],
+            )  # fmt: skip
+            heads.tick[mine] = scans.tick[looks]
+            tell = plan.tells[works]
+            if len(store) and tell.any():
+                reported.append(
+                    Reported.of(
+                        store, heads.replica[mine[tell]], looks[tell], plan.row[works[tell]]
+                    )
+                )
+        self._heads = heads.take(heads.replica == heads.replica[-1])
+        self._store = store.take(store.replica == heads.replica[-1])
+        self._past = Past.of(scans, memory.get(len(heads.replica) - 1), before, heads.replica[-1])
+        if len(plan.look) == 0:
+            return None
+        rows = np.unique(plan.row)
+        return state_tracks(reported, places, heads.origin[:, of], rows, wake, self._sensors)
+
+    def _remember(
+        self,
+        store: TrackStore,
+        heads: "Heads",
+        plan: Plan,
+        works: IntArray,
+        before: dict[int, Before],
+    ) -> TrackStore:
+        """Go back where late looks ask for it, and note how things are before each look."""
+        back = plan.back_to[works]
+        late = np.flatnonzero(back >= 0)
+        if len(late):
+            replicas = heads.replica[plan.of[works[late]]].tolist()
+            states = {
+                number: before[look]
+                for number, look in zip(replicas, back[late].tolist(), strict=True)
+            }
+            store = gone_back(store, states, replicas)
+            heads.next_number[plan.of[works[late]]] = [states[n].next_number for n in replicas]
+        for work in works.tolist():
+            place = int(plan.of[work])
+            before[int(plan.look[work])] = Before(store, int(heads.next_number[place]))
+            for look in plan.forgotten[work]:
+                before.pop(look, None)
+        return store
+
+    def report(self) -> dict[str, Any]:
+        """Return how many looks came too late."""
+        return {"late_looks": {self.name: self._late}}
+
+
+def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
+    """Return the logarithm of false alarms per unit of measured volume, (4 kinds, sensors)."""
+    found = np.empty((4, len(fields)))
+    for i, field in enumerate(fields):
+        width, height, far = 2.0 * math.pi, math.pi, _FARTHEST_M
+        if field is not None:
+            low, high = field.azimuth_rad
+            width = (high - low) % (2.0 * math.pi) or 2.0 * math.pi
+            height = field.elevation_rad[1] - field.elevation_rad[0] or math.pi
+            far = min(field.range_max_m, _FARTHEST_M)
+        for code in range(4):
+            volume = width * height * (far if code & 1 else 1.0)
+            volume *= _WHOLE_RATE_M_S if code & 2 else 1.0
+            found[code, i] = math.log(per_scan / volume)
+    return found
+
+
+def _turns(of: IntArray) -> list[IntArray]:
+    """Return the first work of every replica, then the second ones, and so on."""
+    if len(of) == 0:
+        return []
+    counts = np.bincount(of)
+    place = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+    order = np.argsort(place, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(place))[:-1])
+
+
+def _pose(pose: FloatArray) -> tuple[Any, Any]:
+    return tuple(pose[:3]), tuple(pose[3:])

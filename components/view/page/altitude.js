@@ -1,0 +1,55 @@
+"use strict";
+// Altitudes over the horizontal distance from the ownship.
+const Altitude = (() => {
+  const canvas = document.getElementById("altitude");
+
+  function draw(t, options) {
+    const c = Symbols.ready(canvas);
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    const own = Data.ownship(t);
+    const marks = [];
+    const add = (east, north, alt, how) => {
+      if (Number.isFinite(alt)) {
+        marks.push({ far: Math.hypot(east - own.east, north - own.north), alt, ...how });
+      }
+    };
+    if (options.truth) {
+      for (const one of Data.truths(t)) add(one.east, one.north, one.alt, { truth: true });
+    }
+    const d = Data.tables.detections;
+    const [from, to] = Data.recent("detections", t, options.fade);
+    for (let i = from; i < to; i++) {
+      if (options.sensors.has(d.sensor[i])) {
+        add(d.east_m[i], d.north_m[i], d.alt_m[i], { sensor: Data.sensors[d.sensor[i]] });
+      }
+    }
+    const far = Math.max(1000, ...marks.map((m) => m.far)) * 1.1;
+    const apart = Math.max(100, ...marks.map((m) => Math.abs(m.alt - own.alt))) * 1.2;
+    const left = 58, bottom = 18;
+    const x = (m) => left + (m / far) * (width - left - 6);
+    const y = (alt) => (height - bottom) / 2 - ((alt - own.alt) / apart) * ((height - bottom) / 2 - 4);
+    c.strokeStyle = Symbols.colours.line;
+    c.lineWidth = 1;
+    c.beginPath();
+    c.moveTo(left, y(own.alt)); c.lineTo(width, y(own.alt));
+    c.moveTo(left, 0); c.lineTo(left, height - bottom);
+    c.stroke();
+    const step = Symbols.niceStep(far / 4);
+    for (let m = step; m < far; m += step) {
+      Symbols.text(c, `${+(m / 1000).toFixed(2)} km`, x(m), height - 4, Symbols.colours.faint, "center");
+    }
+    for (const up of [-apart / 1.2, 0, apart / 1.2]) {
+      Symbols.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
+        Symbols.colours.faint, "right");
+    }
+    for (const m of marks) {
+      if (m.truth) {
+        Symbols.mark(c, "o", x(m.far), y(m.alt), 2, Symbols.colours.truth, true);
+      } else {
+        Symbols.mark(c, m.sensor.marker, x(m.far), y(m.alt), 4, m.sensor.colour, false);
+      }
+    }
+    Symbols.aircraft(c, left, y(own.alt), Math.PI / 2, 7, Symbols.colours.own);
+  }
+  return { draw };
+})();

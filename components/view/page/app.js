@@ -1,0 +1,204 @@
+"use strict";
+// The clock of the replay, the controls, and one picture for each frame.
+const App = (() => {
+  const get = (id) => document.getElementById(id);
+  const root = document.documentElement;
+  const state = { t: 0, playing: false, speed: 1, steps: -1, dirty: true, shownAt: 0 };
+  const options = {
+    sensors: new Set(Data.sensors.map((_, number) => number)),
+    truth: Boolean(Data.tables.truth), tracks: true, fields: true,
+    follow: true, headingUp: false, fade: 4,
+  };
+  let drawn = {};
+  let frames = { count: 0, spent_ms: 0 };
+
+  function seek(t) {
+    state.t = Math.min(Math.max(t, 0), Data.duration_s);
+    state.dirty = true;
+  }
+  function play(on) {
+    if (on && state.t >= Data.duration_s) seek(0);
+    state.playing = on;
+    get("play").textContent = on ? "Pause" : "Play";
+    state.dirty = true;
+  }
+  function step(direction) {
+    play(false);
+    const numbers = state.steps < 0 ? [...options.sensors] : [state.steps];
+    let found = direction > 0 ? Infinity : -Infinity;
+    for (const number of numbers) {
+      const times = Data.scanTimes[number];
+      const next = Data.after(times, state.t + 1e-9);
+      if (direction > 0) {
+        if (next < times.length) found = Math.min(found, times[next]);
+      } else {
+        let before = next - 1;
+        while (before >= 0 && times[before] > state.t - 1e-9) before--;
+        if (before >= 0) found = Math.max(found, times[before]);
+      }
+    }
+    if (Number.isFinite(found)) seek(found);
+    else seek(direction > 0 ? Data.duration_s : 0);
+  }
+
+  function render() {
+    const began = performance.now();
+    drawn = { t: state.t, detections: [], tracks: [], alerts: [], truth: [] };
+    Plan.draw(state.t, options, drawn);
+    Altitude.draw(state.t, options);
+    Timeline.draw(state.t);
+    Seen.update(state.t, drawn);
+    const words = (state.t + Data.start_s).toFixed(3);
+    if (document.activeElement !== get("time")) get("time").value = words;
+    frames.count += 1;
+    frames.spent_ms += performance.now() - began;
+    state.dirty = false;
+  }
+  let last = null;
+  function frame(now) {
+    if (state.playing && last !== null) {
+      seek(state.t + (state.speed * Math.min(now - last, 250)) / 1000);
+      if (state.t >= Data.duration_s) play(false);
+    }
+    last = now;
+    if (state.dirty) render();
+    requestAnimationFrame(frame);
+  }
+
+  function toggle(name, button) {
+    options[name] = !options[name];
+    if (button) button.setAttribute("aria-pressed", String(options[name]));
+    state.dirty = true;
+  }
+  function turnUp() {
+    options.headingUp = !options.headingUp;
+    get("up").textContent = options.headingUp ? "Heading up" : "North up";
+    state.dirty = true;
+  }
+  function theme(name) {
+    root.dataset.theme = name;
+    Symbols.readTheme();
+    Timeline.forget();
+    state.dirty = true;
+  }
+  function link() {
+    const hash = `#t=${+(state.t + Data.start_s).toFixed(6)}${options.headingUp ? "&up=heading" : ""}`;
+    history.replaceState(null, "", hash);
+    get("note").textContent = `address ends in ${hash}`;
+    if (navigator.clipboard) navigator.clipboard.writeText(location.href).catch(() => {});
+  }
+  function readLink() {
+    const parts = new URLSearchParams(location.hash.slice(1));
+    const t = Number(parts.get("t"));
+    if (parts.has("t") && Number.isFinite(t)) {
+      play(false);
+      seek(t - Data.start_s);
+    }
+    if (parts.get("up") === "heading" && !options.headingUp) turnUp();
+  }
+
+  function layer(text, on, change, colour) {
+    const label = document.createElement("label");
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = on;
+    box.addEventListener("change", () => { change(box.checked); state.dirty = true; });
+    label.appendChild(box);
+    if (colour) {
+      const swatch = document.createElement("span");
+      swatch.className = "swatch";
+      swatch.style.background = colour;
+      label.appendChild(swatch);
+    }
+    label.appendChild(document.createTextNode(text));
+    get("layers").appendChild(label);
+  }
+  Data.sensors.forEach((sensor, number) => layer(sensor.name, true,
+    (on) => options.sensors[on ? "add" : "delete"](number), sensor.colour));
+  if (Data.tables.tracks) layer("tracks", true, (on) => { options.tracks = on; });
+  if (Data.tables.truth) layer("truth", true, (on) => { options.truth = on; });
+  layer("fields of view", true, (on) => { options.fields = on; });
+
+  for (const speed of [0.1, 0.25, 0.5, 1, 2, 5, 10, 30, 100]) {
+    get("speed").add(new Option(`${speed} ×`, String(speed), speed === 1, speed === 1));
+  }
+  get("steps").add(new Option("all shown", "-1", true, true));
+  Data.sensors.forEach((s, n) => get("steps").add(new Option(s.name, String(n))));
+  get("facts").textContent = Object.entries(Data.facts)
+    .map(([k, v]) => (k === "description" ? v : `${k} ${v}`)).join(" · ");
+
+  const press = {
+    play: () => play(!state.playing), back: () => step(-1), forth: () => step(1),
+    up: turnUp, follow: () => toggle("follow", get("follow")), link,
+    in: () => { Plan.zoom(1 / 1.4); state.dirty = true; },
+    out: () => { Plan.zoom(1.4); state.dirty = true; },
+    fit: () => { Plan.fit(); state.dirty = true; },
+    theme: () => theme(root.dataset.theme === "dark" ? "light" : "dark"),
+  };
+  for (const [id, act] of Object.entries(press)) get(id).addEventListener("click", act);
+  get("speed").addEventListener("change", (e) => { state.speed = Number(e.target.value); });
+  get("steps").addEventListener("change", (e) => { state.steps = Number(e.target.value); });
+  get("time").addEventListener("change", (e) => {
+    const t = Number(e.target.value);
+    if (Number.isFinite(t)) { play(false); seek(t - Data.start_s); }
+  });
+
+  const keys = {
+    " ": press.play, ArrowRight: (e) => (e.shiftKey ? seek(state.t + 1) : step(1)),
+    ArrowLeft: (e) => (e.shiftKey ? seek(state.t - 1) : step(-1)),
+    Home: () => seek(0), End: () => seek(Data.duration_s), "+": press.in, "=": press.in,
+    "-": press.out, 0: press.fit, n: press.up, f: press.follow, l: press.link, d: press.theme,
+  };
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const where = event.target.tagName;
+    if (where === "INPUT" && event.target.type === "number") return;
+    if (where === "SELECT" || (where === "BUTTON" && event.key === " ")) return;
+    const act = keys[event.key] || keys[event.key.toLowerCase()];
+    if (!act) return;
+    event.preventDefault();
+    act(event);
+  });
+
+  let dragged = null;
+  Plan.canvas.addEventListener("pointerdown", (e) => {
+    dragged = [e.clientX, e.clientY];
+    Plan.canvas.setPointerCapture(e.pointerId);
+  });
+  Plan.canvas.addEventListener("pointermove", (e) => {
+    if (!dragged) return;
+    if (options.follow) toggle("follow", get("follow"));
+    Plan.pan(e.clientX - dragged[0], e.clientY - dragged[1]);
+    dragged = [e.clientX, e.clientY];
+    state.dirty = true;
+  });
+  Plan.canvas.addEventListener("pointerup", () => { dragged = null; });
+  Plan.canvas.addEventListener("wheel", (e) => {
+    e.preventDefault();
+    Plan.zoom(e.deltaY > 0 ? 1.15 : 1 / 1.15);
+    state.dirty = true;
+  }, { passive: false });
+  const slide = (e) => { play(false); seek(Timeline.timeAt(e.offsetX)); };
+  Timeline.canvas.addEventListener("pointerdown", (e) => {
+    Timeline.canvas.setPointerCapture(e.pointerId);
+    slide(e);
+  });
+  Timeline.canvas.addEventListener("pointermove", (e) => { if (e.buttons) slide(e); });
+
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  dark.addEventListener("change", () => theme(dark.matches ? "dark" : "light"));
+  window.addEventListener("resize", () => { Timeline.forget(); state.dirty = true; });
+  window.addEventListener("hashchange", readLink);
+  theme(dark.matches ? "dark" : "light");
+  Plan.fit();
+  readLink();
+  requestAnimationFrame(frame);
+
+  // What is on screen, for those who look at it by program.
+  return {
+    state: () => { if (state.dirty) render(); return { ...drawn, playing: state.playing }; },
+    seek, play, step, options,
+    timing: () => ({ ...frames, mean_ms: frames.spent_ms / Math.max(1, frames.count) }),
+  };
+})();
+window.App = App;

@@ -1,0 +1,114 @@
+"use strict";
+// The run's columns, and what they say of an instant. Times are seconds since the start.
+const Data = (() => {
+  const raw = JSON.parse(document.getElementById("data").textContent);
+
+  function column(packed) {
+    const text = atob(packed.data);
+    const bytes = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+    const kinds = { i4: Int32Array, f4: Float32Array, f8: Float64Array };
+    return new kinds[packed.kind](bytes.buffer);
+  }
+
+  const tables = {};
+  for (const [name, packed] of Object.entries(raw.tables)) {
+    tables[name] = {};
+    for (const [key, values] of Object.entries(packed)) tables[name][key] = column(values);
+    tables[name].count = Object.values(tables[name])[0].length;
+  }
+
+  // Number of elements in [from, to) that are not above a value, as the place of the next one.
+  function after(values, value, from = 0, to = values.length) {
+    while (from < to) {
+      const middle = (from + to) >> 1;
+      if (values[middle] <= value) from = middle + 1;
+      else to = middle;
+    }
+    return from;
+  }
+
+  function between(times, columns, t, from, to) {
+    const next = after(times, t, from, to);
+    if (next === from) return null;
+    const last = next - 1;
+    if (next === to) return t - times[last] > 1e-6 ? null : columns.map((c) => c[last]);
+    const part = (t - times[last]) / (times[next] - times[last]);
+    return columns.map((c) => c[last] + part * (c[next] - c[last]));
+  }
+
+  const own = tables.own;
+  const ownColumns = own ? [own.east_m, own.north_m, own.alt_m, own.heading_rad] : [];
+  function ownship(t) {
+    if (!own || own.count === 0) return { east: 0, north: 0, alt: 0, heading: 0, known: false };
+    const inside = Math.min(Math.max(t, own.time_s[0]), own.time_s[own.count - 1]);
+    const at = between(own.time_s, ownColumns, inside, 0, own.count);
+    return { east: at[0], north: at[1], alt: at[2], heading: at[3], known: true };
+  }
+
+  const spans = [];
+  if (tables.truth) {
+    const target = tables.truth.target;
+    for (let i = 0; i < target.length; ) {
+      let end = i + 1;
+      while (end < target.length && target[end] === target[i]) end++;
+      spans.push({ target: target[i], from: i, to: end });
+      i = end;
+    }
+  }
+  function truths(t) {
+    const found = [];
+    const c = tables.truth;
+    for (const span of spans) {
+      const at = between(c.time_s, [c.east_m, c.north_m, c.alt_m], t, span.from, span.to);
+      if (at) {
+        const later = between(c.time_s, [c.east_m, c.north_m], t + 1, span.from, span.to);
+        found.push({
+          target: span.target, east: at[0], north: at[1], alt: at[2],
+          rate: later ? [later[0] - at[0], later[1] - at[1]] : null,
+        });
+      }
+    }
+    return found;
+  }
+
+  // Rows of a table in (t - lasts, t], by their place.
+  function recent(name, t, lasts) {
+    const table = tables[name];
+    if (!table) return [0, 0];
+    return [after(table.time_s, t - lasts), after(table.time_s, t)];
+  }
+
+  // Rows of the last instant not after t at which a table has any.
+  function latest(name, t) {
+    const table = tables[name];
+    if (!table) return [0, 0];
+    const end = after(table.time_s, t);
+    if (end === 0) return [0, 0];
+    let start = end - 1;
+    while (start > 0 && table.time_s[start - 1] === table.time_s[end - 1]) start--;
+    return [start, end];
+  }
+
+  // Times of detections by sensor and target, with the range at the first.
+  const looks = raw.sensors.map(() => new Map());
+  if (tables.detections) {
+    const d = tables.detections;
+    for (let i = 0; i < d.count; i++) {
+      const mine = looks[d.sensor[i]];
+      if (!mine.has(d.target[i])) mine.set(d.target[i], { times: [], range: d.range_m[i] });
+      mine.get(d.target[i]).times.push(d.time_s[i]);
+    }
+  }
+  const scans = raw.sensors.map(() => []);
+  if (tables.scans) {
+    const s = tables.scans;
+    for (let i = 0; i < s.count; i++) scans[s.sensor[i]].push(i);
+  }
+  const scanTimes = scans.map((rows) => Float64Array.from(rows, (i) => tables.scans.time_s[i]));
+
+  return {
+    ...raw, tables, after, ownship, truths, recent, latest, looks, scanTimes,
+    scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
+  };
+})();

@@ -1,0 +1,239 @@
+"use strict";
+// The plan: east and north of the start, north or heading up.
+const Plan = (() => {
+  const canvas = document.getElementById("plan");
+  const LINES_FADE = 1;  // lines cover much of the plan, and fade soon
+  const view = { east: 0, north: 0, perPixel: 40, turn: 0, width: 1, height: 1 };
+
+  function place(east, north) {
+    const x = (east - view.east) / view.perPixel;
+    const y = (north - view.north) / view.perPixel;
+    const cos = Math.cos(view.turn), sin = Math.sin(view.turn);
+    return [view.width / 2 + x * cos - y * sin, view.height / 2 - (x * sin + y * cos)];
+  }
+  function inside(x, y) {
+    return x > -20 && y > -20 && x < view.width + 20 && y < view.height + 20;
+  }
+
+  function rings(c, own) {
+    const step = Symbols.niceStep(70 * view.perPixel);
+    const [x, y] = place(own.east, own.north);
+    const far = view.perPixel * Math.hypot(view.width, view.height);
+    c.lineWidth = 1;
+    for (let i = 1; i * step < far; i++) {
+      c.strokeStyle = Symbols.colours.line;
+      c.beginPath();
+      c.arc(x, y, (i * step) / view.perPixel, 0, 2 * Math.PI);
+      c.stroke();
+      const km = (i * step) / 1000;
+      Symbols.text(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
+        y - (i * step) / view.perPixel - 3, Symbols.colours.faint);
+    }
+  }
+
+  function fields(c, own, shown) {
+    const [x, y] = place(own.east, own.north);
+    Data.sensors.forEach((sensor, number) => {
+      if (!shown.has(number) || !sensor.azimuth_deg) return;
+      const [low, high] = sensor.azimuth_deg.map((deg) => (deg * Math.PI) / 180);
+      const around = high - low >= 2 * Math.PI - 1e-6;
+      const far = view.perPixel * Math.hypot(view.width, view.height);
+      const radius = Math.min(sensor.range_m || far, far) / view.perPixel;
+      const nose = own.heading - view.turn - Math.PI / 2;
+      c.save();
+      c.beginPath();
+      if (!around) c.moveTo(x, y);
+      c.arc(x, y, radius, nose + low, nose + high);
+      if (!around) c.closePath();
+      c.strokeStyle = sensor.colour;
+      c.lineWidth = 1;
+      c.setLineDash(sensor.range_m ? [] : [5, 5]);
+      if (sensor.range_m) {
+        c.globalAlpha = 0.06;
+        c.fillStyle = sensor.colour;
+        c.fill();
+      }
+      c.globalAlpha = 0.6;
+      c.stroke();
+      c.restore();
+    });
+  }
+
+  function truth(c, t, options, drawn) {
+    const many = Data.targets.length > 100;
+    for (const one of Data.truths(t)) {
+      const [x, y] = place(one.east, one.north);
+      if (!inside(x, y)) continue;
+      drawn.truth.push({ target: one.target, east: one.east, north: one.north });
+      c.strokeStyle = Symbols.colours.truth;
+      c.lineWidth = 1;
+      c.beginPath();
+      c.moveTo(x - 4, y); c.lineTo(x + 4, y);
+      c.moveTo(x, y - 4); c.lineTo(x, y + 4);
+      if (one.rate) {  // where it will be in ten seconds
+        const [u, v] = place(one.east + 10 * one.rate[0], one.north + 10 * one.rate[1]);
+        c.moveTo(x, y); c.lineTo(u, v);
+      }
+      c.stroke();
+      if (!many || view.perPixel < 30) {
+        Symbols.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
+      }
+    }
+  }
+
+  function detections(c, t, options, drawn) {
+    const d = Data.tables.detections;
+    const [from, to] = Data.recent("detections", t, options.fade);
+    const far = view.perPixel * Math.hypot(view.width, view.height);
+    for (let i = from; i < to; i++) {
+      const number = d.sensor[i];
+      if (!options.sensors.has(number)) continue;
+      const sensor = Data.sensors[number];
+      c.globalAlpha = Math.max(0.12, 1 - (t - d.time_s[i]) / options.fade);
+      const ranged = Number.isFinite(d.east_m[i]);
+      drawn.detections.push({
+        sensor: sensor.name, target: Data.targets[d.target[i]] ?? null, time_s: d.time_s[i],
+        ranged, east_m: d.east_m[i], north_m: d.north_m[i], bearing_rad: d.bearing_rad[i],
+      });
+      if (ranged) {
+        const [x, y] = place(d.east_m[i], d.north_m[i]);
+        if (inside(x, y)) Symbols.mark(c, sensor.marker, x, y, 5, sensor.colour, d.target[i] >= 0);
+      } else if (Number.isFinite(d.bearing_rad[i]) && t - d.time_s[i] < LINES_FADE) {
+        c.globalAlpha = Math.max(0.15, 1 - (t - d.time_s[i]) / LINES_FADE);
+        const [x, y] = place(d.from_east_m[i], d.from_north_m[i]);
+        const [u, v] = place(d.from_east_m[i] + far * Math.sin(d.bearing_rad[i]),
+          d.from_north_m[i] + far * Math.cos(d.bearing_rad[i]));
+        c.strokeStyle = sensor.colour;
+        c.lineWidth = 1;
+        c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+      }
+    }
+    c.globalAlpha = 1;
+  }
+
+  function ellipse(c, x, y, track) {
+    // 95 % of a normal distribution in two dimensions lie within 2.448 standard deviations.
+    const { xx, xy, yy } = track;
+    const mean = (xx + yy) / 2, part = Math.hypot((xx - yy) / 2, xy);
+    const long = 2.448 * Math.sqrt(Math.max(mean + part, 0)) / view.perPixel;
+    const short = 2.448 * Math.sqrt(Math.max(mean - part, 0)) / view.perPixel;
+    const angle = 0.5 * Math.atan2(2 * xy, xx - yy);
+    c.beginPath();
+    c.ellipse(x, y, long, short, -angle - view.turn, 0, 2 * Math.PI);
+    c.stroke();
+  }
+
+  // A track without a range: a dashed line with its name a third of the way to the edge.
+  function directionOnly(c, k, i, label) {
+    if (!Number.isFinite(k.bearing_rad[i])) return;
+    const far = view.perPixel * Math.hypot(view.width, view.height);
+    const at = (away) => place(k.from_east_m[i] + away * Math.sin(k.bearing_rad[i]),
+      k.from_north_m[i] + away * Math.cos(k.bearing_rad[i]));
+    const [x, y] = at(0), [u, v] = at(far), [p, q] = at(0.16 * far);
+    c.setLineDash([8, 4]);
+    c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+    c.setLineDash([]);
+    Symbols.text(c, label, p + 6, q, Symbols.colours.track);
+  }
+
+  function tracks(c, t, drawn) {
+    const k = Data.tables.tracks;
+    const [from, to] = Data.latest("tracks", t);
+    c.strokeStyle = Symbols.colours.track;
+    for (let i = from; i < to; i++) {
+      const label = k.number ? `#${k.number[i]}` : Data.targets[k.target[i]];
+      drawn.tracks.push({ label, time_s: k.time_s[i], east_m: k.east_m[i], north_m: k.north_m[i] });
+      if (!Number.isFinite(k.east_m[i])) {
+        directionOnly(c, k, i, label);
+        continue;
+      }
+      const [x, y] = place(k.east_m[i], k.north_m[i]);
+      if (!inside(x, y)) continue;
+      if (k.tentative && k.tentative[i]) c.setLineDash([3, 3]);
+      Symbols.mark(c, "D", x, y, 8, Symbols.colours.track, false);
+      if (k.variance_east_m2) {
+        ellipse(c, x, y, { xx: k.variance_east_m2[i], yy: k.variance_north_m2[i],
+          xy: k.covariance_m2[i] });
+      }
+      if (k.east_mps && Number.isFinite(k.east_mps[i])) {
+        const [u, v] = place(k.east_m[i] + 10 * k.east_mps[i], k.north_m[i] + 10 * k.north_mps[i]);
+        c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+      }
+      c.setLineDash([]);
+      Symbols.text(c, label, x + 10, y - 6, Symbols.colours.track);
+    }
+  }
+
+  function alerts(c, t, drawn) {
+    const a = Data.tables.alerts;
+    if (!a) return;
+    const [from, to] = Data.latest("alerts", t);
+    const where = new Map(Data.truths(t).map((one) => [one.target, one]));
+    for (let i = from; i < to; i++) {
+      if (a.level[i] <= 0) continue;
+      drawn.alerts.push({ target: Data.targets[a.target[i]], level: a.level[i] });
+      const one = where.get(a.target[i]) || lastSeen(a.target[i], t);
+      if (!one) continue;
+      const [x, y] = place(one.east, one.north);
+      c.strokeStyle = Symbols.level(a.level[i]);
+      c.lineWidth = 1 + a.level[i];
+      c.beginPath(); c.arc(x, y, 14, 0, 2 * Math.PI); c.stroke();
+      Symbols.text(c, `alert ${a.level[i]}`, x + 17, y + 4, Symbols.level(a.level[i]));
+    }
+  }
+  function lastSeen(target, t) {
+    const d = Data.tables.detections;
+    for (let i = Data.after(d.time_s, t) - 1; i >= 0 && d.time_s[i] > t - 20; i--) {
+      if (d.target[i] === target && Number.isFinite(d.east_m[i])) {
+        return { east: d.east_m[i], north: d.north_m[i] };
+      }
+    }
+    return null;
+  }
+
+  function draw(t, options, drawn) {
+    const c = Symbols.ready(canvas);
+    view.width = canvas.clientWidth;
+    view.height = canvas.clientHeight;
+    const own = Data.ownship(t);
+    view.turn = options.headingUp ? own.heading : 0;
+    if (options.follow) [view.east, view.north] = [own.east, own.north];
+    rings(c, own);
+    if (options.fields) fields(c, own, options.sensors);
+    if (options.truth) truth(c, t, options, drawn);
+    detections(c, t, options, drawn);
+    if (options.tracks) tracks(c, t, drawn);
+    alerts(c, t, drawn);
+    const [x, y] = place(own.east, own.north);
+    Symbols.aircraft(c, x, y, own.heading - view.turn, 11, Symbols.colours.own);
+    drawn.own = own;
+  }
+
+  function zoom(factor) {
+    view.perPixel = Math.min(Math.max(view.perPixel * factor, 0.05), 5000);
+  }
+  function pan(dx, dy) {
+    const cos = Math.cos(view.turn), sin = Math.sin(view.turn);
+    view.east -= view.perPixel * (dx * cos - dy * sin);
+    view.north += view.perPixel * (dx * sin + dy * cos);
+  }
+
+  function fit() {
+    let far = 1000;
+    const own = Data.ownship(0);
+    const look = (east, north) => {
+      for (let i = 0; i < east.length; i++) {
+        const away = Math.hypot(east[i] - own.east, north[i] - own.north);
+        if (Number.isFinite(away)) far = Math.max(far, away);
+      }
+    };
+    for (const name of ["own", "truth", "detections"]) {
+      const table = Data.tables[name];
+      if (table) look(table.east_m, table.north_m);
+    }
+    view.perPixel = (2.2 * far) / Math.max(200, Math.min(canvas.clientWidth, canvas.clientHeight));
+    [view.east, view.north] = [own.east, own.north];
+  }
+
+  return { canvas, view, draw, zoom, pan, fit, place };
+})();

@@ -1,0 +1,99 @@
+"use strict";
+// Colours of the theme, markers of the sensors, and text on a canvas.
+const Symbols = (() => {
+  const names = ["ground", "ink", "faint", "line", "truth", "track", "own",
+    "level1", "level2", "level3"];
+  let colours = {};
+  function readTheme() {
+    const style = getComputedStyle(document.documentElement);
+    colours = Object.fromEntries(
+      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  }
+
+  function level(number) {
+    return colours[`level${Math.min(Math.max(number, 1), 3)}`];
+  }
+
+  const paths = {
+    o: (c, r) => c.arc(0, 0, r, 0, 2 * Math.PI),
+    s: (c, r) => c.rect(-0.85 * r, -0.85 * r, 1.7 * r, 1.7 * r),
+    D: (c, r) => polygon(c, r, 4, 0),
+    d: (c, r) => polygon(c, 0.8 * r, 4, 0),
+    "^": (c, r) => polygon(c, r, 3, 0),
+    v: (c, r) => polygon(c, r, 3, Math.PI),
+    "<": (c, r) => polygon(c, r, 3, -Math.PI / 2),
+    ">": (c, r) => polygon(c, r, 3, Math.PI / 2),
+    p: (c, r) => polygon(c, r, 5, 0),
+    h: (c, r) => polygon(c, r, 6, 0),
+    8: (c, r) => polygon(c, r, 8, Math.PI / 8),
+  };
+  function polygon(c, r, corners, turn) {
+    for (let i = 0; i < corners; i++) {
+      const angle = turn + (2 * Math.PI * i) / corners;
+      c[i ? "lineTo" : "moveTo"](r * Math.sin(angle), -r * Math.cos(angle));
+    }
+    c.closePath();
+  }
+  function mark(c, marker, x, y, r, colour, filled) {
+    c.save();
+    c.translate(x, y);
+    c.beginPath();
+    (paths[marker] || paths.o)(c, r);
+    if (filled) {
+      c.fillStyle = colour;
+      c.fill();
+    } else {
+      c.strokeStyle = colour;
+      c.lineWidth = 1.5;
+      c.stroke();
+    }
+    c.restore();
+  }
+
+  function aircraft(c, x, y, heading, size, colour) {
+    c.save();
+    c.translate(x, y);
+    c.rotate(heading);
+    c.strokeStyle = colour;
+    c.lineWidth = 2;
+    c.beginPath();
+    c.moveTo(0, -size);
+    c.lineTo(0, 0.8 * size);
+    c.moveTo(-0.8 * size, 0);
+    c.lineTo(0.8 * size, 0);
+    c.moveTo(-0.35 * size, 0.7 * size);
+    c.lineTo(0.35 * size, 0.7 * size);
+    c.stroke();
+    c.restore();
+  }
+
+  function text(c, words, x, y, colour, align = "left") {
+    c.font = "12px system-ui, sans-serif";
+    c.textAlign = align;
+    c.fillStyle = colour;
+    c.fillText(words, x, y);
+  }
+
+  // A canvas of the size that it has on screen, in its pixels; returns its context, cleared.
+  function ready(canvas) {
+    const ratio = window.devicePixelRatio || 1;
+    const width = Math.round(canvas.clientWidth * ratio);
+    const height = Math.round(canvas.clientHeight * ratio);
+    if (canvas.width !== width || canvas.height !== height) {
+      canvas.width = width;
+      canvas.height = height;
+    }
+    const c = canvas.getContext("2d");
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    return c;
+  }
+
+  function niceStep(least) {
+    const power = 10 ** Math.floor(Math.log10(least));
+    return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
+  }
+
+  return { get colours() { return colours; }, readTheme, level, mark, aircraft, text, ready,
+    niceStep };
+})();

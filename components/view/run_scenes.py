@@ -1,0 +1,336 @@
+"""What a run's folder holds, brought into one plane for the page."""
+
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from components.geometry.attitude import body_to_ned
+from components.geometry.enu import enu_to_geodetic
+from components.sensor.marks import EO, IR, RADAR
+from components.view.picture import Picture, Plane
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.mark import NEUTRAL
+from dsa_des.errors import UsageError
+
+_NO_TARGET = -1
+_OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
+        "own_roll_rad")  # fmt: skip
+_LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
+
+Table = Mapping[str, Any]
+
+
+def run_picture(folder: Path) -> Picture:
+    """Return the page's picture of a run.
+
+    Raises
+    ------
+    UsageError
+        The folder holds no run, or one without detections.
+    """
+    info = _json(folder / "run.json")
+    scene = _toml(folder / "scene.toml")
+    tables = {name: _table(folder / f"{name}.parquet") for name in ("detections", "scans")}
+    if tables["scans"] is None or tables["detections"] is None:
+        raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
+    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres"):
+        tables[name] = _table(folder / f"{name}.parquet")
+    found: dict[str, Table] = {name: table for name, table in tables.items() if table is not None}
+    detections = found["detections"]
+    names = _names(found)
+    own = _own(found)
+    plane = _plane(own)
+    picture = Picture(
+        title=str(scene.get("title") or folder.name),
+        facts=_facts(info, scene),
+        duration_s=float(info.get("duration_s", 0.0)),
+        targets=names,
+    )
+    sensors = sorted(set(_text(found["scans"]["block"])) | set(_text(detections["block"])))
+    picture.sensors = [_sensor(name, scene) for name in sensors]
+    targets = {name: place for place, name in enumerate(names)}
+    picture.tables["own"] = _own_columns(own, plane)
+    if "truth" in found:
+        picture.tables["truth"] = _truth(found["truth"], plane, targets)
+    picture.tables["scans"] = {
+        "time_s": found["scans"]["time_s"],
+        "sensor": _codes(found["scans"]["block"], sensors),
+        "detected": found["scans"]["detected"],
+    }
+    seen = _seen(detections, {name: detections[name] for name in _OWN}, plane)
+    picture.tables["detections"] = {
+        "time_s": detections["time_s"],
+        "sensor": _codes(detections["block"], sensors),
+        "target": _codes(detections["target"], targets),
+        "scan": detections["scan"],
+        **seen,
+    }
+    for name in ("fused", "tracks"):
+        if name in found and "azimuth_rad" in found[name]:
+            table = found[name]
+            picture.tables[name] = {
+                "time_s": table["time_s"],
+                "target": _codes(table["target"], targets),
+                **_seen(table, _pose_at(own, table["time_s"]), plane),
+                **({"age_s": table["age_s"]} if "age_s" in table else {}),
+            }
+    if "state_tracks" in found:
+        picture.tables["tracks"] = _estimates(found["state_tracks"], own, plane)
+    if "alerts" in found:
+        table = found["alerts"]
+        picture.tables["alerts"] = {
+            "time_s": table["time_s"],
+            "target": _codes(table["target"], targets),
+            "level": table["level"],
+            **{name: table[name] for name in _LEVELS if name in table},
+        }
+    if "manoeuvres" in found:
+        table = found["manoeuvres"]
+        columns = ("time_s", "turn_rad", "climb_m")
+        picture.tables["manoeuvres"] = {name: table[name] for name in columns if name in table}
+    return picture
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path.parent}: holds no run: run.json: {error.strerror}") from error
+    except ValueError as error:
+        raise UsageError(f"{path}: is not JSON ({error})") from error
+    return found
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        return {}
+    except ValueError as error:
+        raise UsageError(f"{path}: is not TOML ({error})") from error
+
+
+def _table(path: Path) -> Table | None:
+    """Return a table's columns, text as Python's; None where there is no such file."""
+    if not path.is_file():
+        return None
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
+    found: dict[str, Any] = {}
+    for name in table.column_names:
+        column = table[name]
+        if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
+            found[name] = column.to_pylist()
+        else:
+            found[name] = column.to_numpy(zero_copy_only=False)
+    return found
+
+
+def _text(column: list[str | None]) -> list[str]:
+    return [text for text in column if text is not None]
+
+
+def _names(tables: Mapping[str, Table]) -> list[str]:
+    """Return the targets of all tables, sorted."""
+    found: set[str] = set()
+    for name in ("truth", "detections", "alerts"):
+        if name in tables and "target" in tables[name]:
+            found.update(_text(tables[name]["target"]))
+    return sorted(found)
+
+
+def _codes(column: list[str | None], names: Any) -> AnyArray:
+    """Return the place of each text among names, -1 for none."""
+    place = names if isinstance(names, dict) else {name: i for i, name in enumerate(names)}
+    codes = (_NO_TARGET if text is None else place.get(text, _NO_TARGET) for text in column)
+    return np.fromiter(codes, dtype=np.int64, count=len(column))
+
+
+def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
+    facts = {"seed": info.get("seed"), "scene": str(info.get("scene_sha256", ""))[:12]}
+    versions = info.get("versions")
+    if isinstance(versions, dict):
+        facts["version"] = versions.get("dsa-des") or versions.get("dsa_des")
+    if scene.get("description"):
+        facts["description"] = str(scene["description"])
+    return {name: value for name, value in facts.items() if value not in (None, "")}
+
+
+def _sensor(name: str, scene: dict[str, Any]) -> dict[str, Any]:
+    """Return how a sensor is shown, and its field of view as far as the scene says it."""
+    block = scene.get("blocks", {}).get(name, {})
+    kind = str(block.get("type", ""))
+    mark = NEUTRAL[0]
+    for start, own in (("radar", RADAR), ("optical.ir", IR), ("optical", EO)):
+        if kind.startswith(start):
+            mark = own
+            break
+    found: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
+    limits = block.get("azimuth_deg")
+    if isinstance(limits, list) and len(limits) == 2:
+        turned = float(block.get("mount_azimuth_deg", 0.0))
+        found["azimuth_deg"] = [float(edge) + turned for edge in limits]
+    if isinstance(block.get("range_km"), int | float):
+        found["range_m"] = 1000.0 * block["range_km"]
+    return found
+
+
+def _own(tables: Mapping[str, Table]) -> dict[str, FloatArray]:
+    """Return where the ownship was and how it lay, in order of time: the truth, or its belief."""
+    found: dict[str, FloatArray]
+    truth = tables.get("truth")
+    if truth is not None:
+        mine = np.array([name is None for name in truth["target"]], dtype=bool)
+        if mine.any():
+            names = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
+            if all(name in truth for name in names):
+                found = {f"own_{name}": truth[name][mine] for name in names}
+                return _in_order({"time_s": truth["time_s"][mine], **found})
+    detections = tables["detections"]
+    found = {name: np.asarray(detections[name], dtype=float) for name in ("time_s", *_OWN)}
+    return _in_order(found)
+
+
+def _in_order(own: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    time_s, first = np.unique(own["time_s"], return_index=True)
+    return {**{name: values[first] for name, values in own.items()}, "time_s": time_s}
+
+
+def _plane(own: Mapping[str, FloatArray]) -> Plane:
+    if len(own["time_s"]) == 0:
+        return Plane(0.0, 0.0)
+    return Plane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
+
+
+def _own_columns(own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyArray]:
+    east, north = plane.east_north_m(own["own_lat_deg"], own["own_lon_deg"], own["own_alt_m"])
+    return {
+        "time_s": own["time_s"],
+        "east_m": east,
+        "north_m": north,
+        "alt_m": own["own_alt_m"],
+        "heading_rad": np.unwrap(own["own_heading_rad"]) if len(east) else east,
+    }
+
+
+def _truth(truth: Table, plane: Plane, targets: Mapping[str, int]) -> dict[str, AnyArray]:
+    """Return the targets' true positions, by target and then by time."""
+    code = _codes(truth["target"], targets)
+    keep = np.flatnonzero((code >= 0) & np.isfinite(truth["lat_deg"]))
+    keep = keep[np.lexsort((truth["time_s"][keep], code[keep]))]
+    place = [truth[name][keep] for name in ("lat_deg", "lon_deg", "alt_m")]
+    east, north = plane.east_north_m(*place)
+    return {
+        "time_s": truth["time_s"][keep],
+        "target": code[keep],
+        "east_m": east,
+        "north_m": north,
+        "alt_m": place[2],
+    }
+
+
+def _estimates(table: Table, own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyArray]:
+    """Return estimated states of tracks that live; their frames are turned like the plane."""
+    keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
+
+    def column(name: str) -> FloatArray:
+        return np.asarray(table[name], dtype=float)[keep]
+
+    time_s = column("time_s")
+    ends = np.full((3, len(keep)), np.nan)
+    known = np.isfinite(column("north_m"))
+    if known.any():
+        ends[:, known] = enu_to_geodetic(
+            column("east_m")[known],
+            column("north_m")[known],
+            -column("down_m")[known],
+            reference_lat_deg=column("origin_lat_deg")[known],
+            reference_lon_deg=column("origin_lon_deg")[known],
+            reference_alt_m=column("origin_alt_m")[known],
+        )
+    east, north = plane.east_north_m(*ends)
+    pose = _pose_at(own, time_s)
+    from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))
+    statuses = [table["track_status"][place] for place in keep.tolist()]
+    return {
+        "time_s": time_s,
+        "number": np.asarray(table["track"])[keep],
+        "tentative": np.array([status == "tentative" for status in statuses], dtype=bool),
+        "from_east_m": from_east,
+        "from_north_m": from_north,
+        "bearing_rad": column("azimuth_rad"),
+        "east_m": east,
+        "north_m": north,
+        "alt_m": ends[2],
+        "east_mps": column("east_m_s"),
+        "north_mps": column("north_m_s"),
+        "variance_north_m2": column("covariance_00_m2"),
+        "covariance_m2": column("covariance_01_m2"),
+        "variance_east_m2": column("covariance_11_m2"),
+    }
+
+
+def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, FloatArray]:
+    """Return the ownship's latest pose at some times, NaN before the first."""
+    place = np.searchsorted(own["time_s"], time_s, side="right") - 1
+    found = {}
+    for name in _OWN:
+        values = np.append(own[name], np.nan)
+        found[name] = values[place]
+    return found
+
+
+def _seen(table: Table, pose: Mapping[str, Any], plane: Plane) -> dict[str, AnyArray]:
+    """Return where measured lines of sight point, and where they end if they have a range.
+
+    Returns
+    -------
+    dict
+        ``from_east_m`` and ``from_north_m``, ``bearing_rad`` from north, ``range_m``, and of the
+        end ``east_m``, ``north_m`` and ``alt_m``; what is not known is NaN.
+    """
+    lat, lon, alt, heading, pitch, roll = (np.asarray(pose[name], dtype=float) for name in _OWN)
+    azimuth = np.asarray(table["azimuth_rad"], dtype=float)
+    elevation = np.asarray(table["elevation_rad"], dtype=float)
+    range_m = np.asarray(table["range_m"], dtype=float)
+    from_east, from_north = plane.east_north_m(lat, lon, alt)
+    level = np.cos(elevation)
+    known = np.isfinite(lat) & np.isfinite(azimuth)
+    bearing = np.full(len(azimuth), np.nan)
+    end = np.full((3, len(azimuth)), np.nan)
+    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
+    if known.any():
+        north, east, down = (np.full(len(azimuth), np.nan) for _ in range(3))
+        forward, right, below = (part[known] for part in body)
+        parts = body_to_ned(forward, right, below, heading[known], pitch[known], roll[known])
+        north[known], east[known], down[known] = parts
+        bearing = np.arctan2(east, north)
+        ranged = known & np.isfinite(range_m)
+        if ranged.any():
+            offsets = (r[ranged] * range_m[ranged] for r in (east, north, -down))
+            end[:, ranged] = enu_to_geodetic(
+                *offsets,
+                reference_lat_deg=lat[ranged],
+                reference_lon_deg=lon[ranged],
+                reference_alt_m=alt[ranged],
+            )
+    east_m, north_m = plane.east_north_m(*end)
+    return {
+        "from_east_m": from_east,
+        "from_north_m": from_north,
+        "bearing_rad": bearing,
+        "elevation_rad": elevation,
+        "range_m": range_m,
+        "east_m": east_m,
+        "north_m": north_m,
+        "alt_m": end[2],
+    }

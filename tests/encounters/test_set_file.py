@@ -1,0 +1,161 @@
+"""Sets of encounters: what is written is read, and what is damaged is named or left out."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner, Result
+
+from components.encounters.command import encounters
+from components.encounters.encounter_set import NoSuchEncounter
+from components.encounters.model_file import read_model
+from components.encounters.pair_densities import PairingRules
+from components.encounters.pair_sets import geometry_class
+from components.encounters.pairing import PairSampler
+from components.encounters.set_file import EncounterSetError, read_set
+from tests.encounters.test_pairing import TURNS
+
+FOOT = 0.3048
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    path = tmp_path / "model.txt"
+    path.write_text(TURNS, encoding="utf-8")
+    return path
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(encounters, [str(w) for w in words], catch_exceptions=False)
+
+
+def columns() -> dict[str, list]:
+    tracks = [[0.0, 1.0, 2.0], [5.0, 5.0, 5.0]]
+    return {
+        "encounter": [3, 3, 7, 7, 7],
+        "weight": [1.5, 1.5, 0.0, 0.0, 0.0],
+        "aircraft": ["own", "a", "own", "b", "c"],
+        "time_s": [[0.0, 1.0, 2.5]] * 5,
+        "north_m": [tracks[0]] * 5,
+        "east_m": [tracks[1]] * 5,
+        "altitude_m": [[100.0, 110.0, 120.0]] * 5,
+    }
+
+
+def written(folder: Path, **changes) -> Path:
+    path = folder / "set.parquet"
+    pq.write_table(pa.table({**columns(), **changes}), path)
+    return path
+
+
+def test_generated_sets_fly_as_the_pairs_did(model: Path, tmp_path: Path) -> None:
+    out = tmp_path / "set.parquet"
+    done = call("generate", "--model", model, "--count", 12, "--first", 30, "--seed", 4,
+                "--at", -41.0, 20.0, "--out", out)  # fmt: skip
+    assert done.exit_code == 0 and "12 encounters of 180 s" in done.stdout
+    found = read_set(out)
+    read = read_model(model)
+    pairs = PairSampler(read, read, 4, PairingRules()).pairs(range(30, 42))
+    assert found.numbers.tolist() == list(range(30, 42))
+    assert found.weights == pytest.approx(pairs.weight, rel=1e-15)
+    assert found.reference_deg == (-41.0, 20.0)
+    for k in range(12):
+        for aircraft in (0, 1):
+            time_s, north, east, altitude = found.path(2 * k + aircraft)
+            assert time_s.tolist() == list(range(181))
+            assert north / FOOT == pytest.approx(pairs.north_ft[aircraft, :, k], abs=1e-6)
+            assert east / FOOT == pytest.approx(pairs.east_ft[aircraft, :, k], abs=1e-6)
+            assert altitude / FOOT == pytest.approx(pairs.up_ft[aircraft, :, k], abs=1e-6)
+    assert found.extra["horizontal_miss_m"] == pytest.approx(pairs.horizontal_ft * FOOT)
+    own, other = found.flights(0)
+    at = own.at(150.0)
+    assert (float(at.lat_deg), float(at.lon_deg)) == pytest.approx((-41.0, 20.0), abs=1e-9)
+    assert other.name == "intruder"
+
+
+def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
+    found = read_set(written(tmp_path))
+    assert (found.kind, len(found), found.weights.tolist()) == ("tracks", 2, [1.5, 0.0])
+    assert [flight.name for flight in found.flights(1)] == ["own", "b", "c"]
+    assert found.path(0)[0].tolist() == [0.0, 1.0, 2.5]
+    with pytest.raises(NoSuchEncounter, match="there is no encounter 4; it holds 2, numbered from"):
+        found.place(4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"weight": [None, None, 1.0, 1.0, 1.0]}, "encounter 3: weight is missing"),
+        ({"weight": [1.0, 1.0, -1.0, -1.0, -1.0]}, "encounter 7: weight must be a number of 0"),
+        ({"weight": [1.0, 2.0, 1.0, 1.0, 1.0]}, "encounter 3: its aircraft have different weights"),
+        ({"time_s": [[0.0, 1.0, 2.0]] * 4 + [[-1.0, 0.0, 1.0]]}, "7: c: time_s is negative"),
+        ({"time_s": [[0.0, 1.0, 1.0]] + [[0.0, 1.0, 2.0]] * 4}, "3: own: times must rise"),
+        ({"encounter": [3, 4, 7, 7, 7]}, "encounter 3: has one aircraft: an ownship and an"),
+        ({"aircraft": ["own", None, "own", "b", "c"]}, "encounter 3: has no name"),
+        ({"altitude_m": [[1.0, float("nan"), 1.0]] + [[1.0] * 3] * 4}, "own: altitude_m holds no"),
+        ({"north_m": [[1.0] * 3] * 4 + [[1.0, 6e6, 1.0]]}, "c: north_m must be a number within"),
+    ],
+)
+def test_a_damaged_encounter_is_named_or_skipped_and_counted(
+    tmp_path: Path, changes: dict, said: str
+) -> None:
+    path = written(tmp_path, **changes)
+    with pytest.raises(EncounterSetError) as error:
+        read_set(path)
+    assert said in str(error.value) and str(error.value).startswith(f"{path}: encounter ")
+    left = read_set(path, skip_damaged=True)
+    assert left.skipped >= 1 and len(left) >= 1
+    for place in range(len(left)):
+        assert left.flights(place)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"altitude": [1.0] * 5}, "unknown variable 'altitude'; did you mean 'altitude_m'?"),
+        ({"encounter": [7, 7, 3, 3, 3]}, "rows must be in order of their encounters' numbers"),
+        ({"encounter": [3, 3, 7, 7, None]}, "must be whole numbers of 0 or more, none missing"),
+        ({"weight": ["x"] * 5}, "column 'weight': holds string; numbers are needed"),
+        ({"north_m": [1.0] * 5}, "column 'north_m': holds double; lists are needed"),
+        ({"east_m": [[1.0] * 3] * 4 + [[1.0]]}, "encounter 7: east_m has 1 values, time_s has 3"),
+    ],
+)
+def test_a_set_that_is_wrong_as_a_whole(tmp_path: Path, changes: dict, said: str) -> None:
+    with pytest.raises(EncounterSetError) as error:
+        read_set(written(tmp_path, **changes), skip_damaged=True)
+    assert said in str(error.value)
+
+
+def test_files_that_are_no_sets(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(EncounterSetError, match="is no whole Parquet file: it may be cut short"):
+        read_set(path)
+    with pytest.raises(EncounterSetError, match="there is no such file"):
+        read_set(tmp_path / "none.parquet")
+    missing = {name: values for name, values in columns().items() if name != "weight"}
+    pq.write_table(pa.table(missing), path)
+    with pytest.raises(EncounterSetError, match="the column 'weight' is missing"):
+        read_set(path)
+    with pytest.raises(EncounterSetError, match="encounter 3: weight is missing"):
+        read_set(written(tmp_path, weight=[None] * 5), skip_damaged=True)
+
+
+def test_classes_of_geometry() -> None:
+    course = np.array([0.0, 65.0, 75.0, 165.0, 180.0, 200.5, 270.0, 300.0])
+    assert geometry_class(course).tolist() == [
+        "overtaking", "overtaking", "crossing from the left", "head-on", "head-on",
+        "crossing from the right", "crossing from the right", "overtaking",
+    ]  # fmt: skip
+
+
+def test_generating_says_what_is_wrong(model: Path, tmp_path: Path) -> None:
+    done = call("generate", "--model", model, "--count", 2, "--at", 95, 0, "--out",
+                tmp_path / "s.parquet")  # fmt: skip
+    assert done.exit_code == 2 and "--at 95.0 0.0: latitude must lie within" in done.stderr
+    model.write_text(TURNS[:500], encoding="utf-8")
+    done = call("generate", "--model", model, "--count", 2, "--out", tmp_path / "s.parquet")
+    assert done.exit_code == 2 and str(model) in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "s.parquet").exists()

@@ -1,0 +1,84 @@
+"""Looks that come late, in scenes whose cameras' messages take their time."""
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+
+NEARER = [
+    "blocks.traffic.intruders.0.north_m=4000", "blocks.traffic.intruders.1.north_m=3500",
+    "blocks.traffic.intruders.1.east_m=3000", "blocks.eo.false_alarms_per_frame=0.3",
+    "blocks.tracker.delete_misses=60", "blocks.ir.scan_rate_hz=7",
+]  # fmt: skip
+LATE = ["blocks.eo.latency_s=0.31", "blocks.ir.latency_s=0.117"]
+
+
+def scene(*sets, kind="tracking.ekf", duration_s="4"):
+    swaps = [f"tracker={kind}", "fusion=fusion.pass_through"]
+    return load_scene(
+        "configs/first_light.toml", swaps=swaps, sets=[*NEARER, *sets], duration_s=duration_s
+    )
+
+
+def tracked(simulation_type, scene, **options):
+    sink = MemorySink()
+    simulation = simulation_type(scene, recorder=Recorder([sink]), **options)
+    simulation.run()
+    return simulation, sink.tables()["state_tracks"].combine_chunks()
+
+
+@pytest.mark.parametrize("kind", ["tracking.ekf", "tracking.imm"])
+def test_the_state_at_the_end_is_the_same_to_the_bit(kind):
+    """The cameras stop at 3 s; half a second later all they saw has come, and the radar goes on."""
+    stop = ["blocks.eo.offset_s=0.05", "blocks.eo.scan_rate_hz=2", "blocks.ir.scan_rate_hz=2",
+            "blocks.ir.offset_s=0.1", "blocks.radar.scan_rate_hz=5"]  # fmt: skip
+    rerun = ["blocks.tracker.late='rerun'"]
+    delays = ["blocks.eo.latency_s=0.23", "blocks.ir.latency_s=0.29"]
+    _, on_time = tracked(Simulation, scene(*stop, kind=kind, duration_s="3.45"))
+    _, late = tracked(Simulation, scene(*stop, *delays, *rerun, kind=kind, duration_s="3.45"))
+    # At 3.4 s the radar's scan is the newest of both; the cameras' last were at 3.05 and 3.1 s.
+    rows = [
+        {r["track"]: r for r in t.to_pylist() if r["time_s"] == pytest.approx(3.4)}
+        for t in (on_time, late)
+    ]
+    assert rows[0].keys() == rows[1].keys() and len(rows[0]) >= 2
+    for number, row in rows[0].items():
+        assert {**row, "tick": 0} == {**rows[1][number], "tick": 0}
+    _, dropped = tracked(Simulation, scene(*stop, *delays, kind=kind, duration_s="3.45"))
+    assert "eo" not in "".join(dropped["contributors"].to_pylist())
+
+
+@pytest.mark.parametrize("late", ["drop", "rerun"])
+def test_late_looks_change_no_byte_by_window_or_company(late):
+    one = scene(*LATE, f"blocks.tracker.late='{late}'", duration_s="2.5")
+    _, alone = tracked(Simulation, one)
+    for window in (1, 9):
+        assert tracked(Simulation, one, window=window)[1].equals(alone)
+    scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(3)]
+    for window in (None, 30):
+        _, together = tracked(lock_step, scenes, window=window)
+        for number, single in enumerate(scenes):
+            mine = together.filter(pc.equal(together["replica"], number))
+            mine = mine.drop_columns(["replica"]).combine_chunks()
+            assert mine.equals(tracked(Simulation, single)[1]), (window, number)
+
+
+def test_looks_older_than_the_lag_are_left_out_and_counted():
+    def left_out(*sets):
+        simulation, table = tracked(Simulation, scene(*LATE, *sets, duration_s="2"))
+        block = simulation.nodes["tracker"].component
+        assert np.isfinite(table["existence"].to_numpy()).all()
+        return block.report()["late_looks"]["tracker"]
+
+    rerun = "blocks.tracker.late='rerun'"
+    assert left_out(rerun) == 0
+    most, some = left_out(rerun, "blocks.tracker.lag_s=0.05"), left_out(
+        rerun, "blocks.tracker.lag_s=0.2"
+    )  # fmt: skip
+    assert most > some > 0
+    assert left_out() >= most

@@ -1,0 +1,175 @@
+"""The page in a real browser: what is on screen is what was recorded.
+
+Left out by name where Playwright's Python package or a Chromium is missing.
+"""
+
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+import dsa_des
+from components.examples import folder
+from components.view.command import view
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+if CHROMIUM is None:
+    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
+
+FADE_S = 4.0
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    out = tmp_path_factory.mktemp("watched") / "run"
+    scene = dsa_des.load_scene(folder() / "alerting" / "first_light.toml")
+    dsa_des.run(scene, out=out)
+    done = CliRunner().invoke(view, [str(out)], catch_exceptions=False)
+    assert done.exit_code == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield launched
+        launched.close()
+
+
+@pytest.fixture
+def page(browser, recorded):
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    opened = context.new_page()
+    said, asked = [], []
+    opened.on("console", lambda message: said.append(message.text))
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.goto(f"file://{recorded}.html")
+    yield opened
+    assert said == []
+    assert [url for url in asked if not url.startswith("file://")] == []
+    context.close()
+
+
+def rows(recorded, table, start_s, end_s):
+    found = pq.read_table(recorded / f"{table}.parquet").to_pylist()
+    return [row for row in found if start_s < row["time_s"] <= end_s]
+
+
+@pytest.mark.parametrize("time_s", [0.05, 61.3, 96.1])
+def test_what_is_on_screen_is_what_was_recorded(page, recorded, time_s):
+    page.evaluate("t => App.seek(t)", time_s)
+    shown = page.evaluate("App.state()")
+    wanted = rows(recorded, "detections", time_s - FADE_S, time_s)
+    assert [(d["sensor"], d["target"], d["time_s"]) for d in shown["detections"]] == [
+        (row["block"], row["target"], row["time_s"]) for row in wanted
+    ]
+    ranged = [row["range_m"] is not None for row in wanted]
+    assert [d["ranged"] for d in shown["detections"]] == ranged
+    own = shown["own"]
+    for d, row in zip(shown["detections"], wanted, strict=True):
+        if row["time_s"] == time_s and d["ranged"]:
+            away = np.hypot(d["east_m"] - own["east"], d["north_m"] - own["north"])
+            assert away == pytest.approx(row["range_m"] * np.cos(row["elevation_rad"]), rel=2e-3)
+    last = max((row["time_s"] for row in rows(recorded, "tracks", -1, time_s)), default=None)
+    tracks = [] if last is None else rows(recorded, "tracks", last - 1e-9, last)
+    assert [t["label"] for t in shown["tracks"]] == [row["target"] for row in tracks]
+    alerts = rows(recorded, "alerts", time_s - 1, time_s)
+    assert {a["target"]: a["level"] for a in shown["alerts"]} == {
+        row["target"]: row["level"] for row in alerts if row["level"] > 0
+    }
+
+
+def test_steps_go_from_scan_to_scan_of_a_sensor(page, recorded):
+    page.select_option("#steps", label="ir")
+    times = [r["time_s"] for r in rows(recorded, "scans", 50, 53) if r["block"] == "ir"]
+    page.evaluate("App.seek(50)")
+    for time_s in times:
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("App.state().t") == time_s
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("App.state().t") == times[-2]
+
+
+def test_it_plays_at_a_speed_and_pauses(page):
+    page.select_option("#speed", "10")
+    page.keyboard.press("Escape")
+    page.locator("#plan").focus()
+    page.keyboard.press(" ")
+    for _ in range(100):
+        page.wait_for_timeout(50)
+        if page.evaluate("App.state().t") > 2:
+            break
+    assert page.evaluate("App.state().t") > 2
+    assert page.evaluate("App.state().playing")
+    page.keyboard.press(" ")
+    stopped = page.evaluate("App.state().t")
+    page.wait_for_timeout(120)
+    assert page.evaluate("App.state().t") == stopped
+
+
+def test_a_link_opens_at_its_instant(page, recorded, browser):
+    page.evaluate("App.seek(96.1)")
+    page.locator("#up").click()
+    page.locator("#link").click()
+    assert page.url.endswith("#t=96.1&up=heading")
+    other = browser.new_context().new_page()
+    other.goto(page.url)
+    assert other.evaluate("App.state().t") == 96.1
+    assert other.evaluate("App.options.headingUp")
+    other.context.close()
+
+
+def test_the_table_counts_what_was_seen_so_far(page, recorded):
+    page.evaluate("App.seek(70)")
+    page.evaluate("App.state()")
+    cells = page.locator("#seen tbody tr").nth(0).locator("th, td").all_inner_texts()
+    names = page.locator("#seen thead th").all_inner_texts()
+    counted = [
+        sum(
+            r["block"] == name and r["target"] == cells[0]
+            for r in rows(recorded, "detections", -1, 70)
+        )
+        for name in names[1:]
+    ]
+    assert [0 if text == "–" else int(text) for text in cells[1:]] == counted
+
+
+def test_everything_answers_to_the_keyboard(page):
+    page.locator("#plan").focus()
+    page.keyboard.press("n")
+    assert page.evaluate("App.options.headingUp")
+    page.keyboard.press("f")
+    assert page.locator("#follow").get_attribute("aria-pressed") == "false"
+    page.keyboard.press("End")
+    assert page.evaluate("App.state().t") == 120
+    theme = page.evaluate("document.documentElement.dataset.theme")
+    page.keyboard.press("d")
+    assert page.evaluate("document.documentElement.dataset.theme") != theme
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_stand_out_from_their_ground(browser, recorded, scheme):
+    """The contrast of WCAG 2.2 AA: 4.5 to 1 for text."""
+    context = browser.new_context(color_scheme=scheme)
+    opened = context.new_page()
+    opened.goto(f"file://{recorded}.html")
+    names = ("ink", "faint", "level1", "level2", "level3", "track")
+    script = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
+    ground, panel = (luminance(opened.evaluate(script, name)) for name in ("ground", "panel"))
+    for name in names:
+        mine = luminance(opened.evaluate(script, name))
+        for under in (ground, panel):
+            light, dark = max(mine, under), min(mine, under)
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, name
+    context.close()
+
+
+def luminance(colour):
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))

@@ -1,0 +1,158 @@
+"""Traffic of encounters: which one is flown, where, how, and what damaged ones do."""
+
+import math
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pymap3d
+import pytest
+from covering import covers
+from wired import chain, rows, run, sensor
+
+from tests.encounters.test_pairing import TURNS
+
+RADAR = sensor("radar.range_boundary", scan_rate_hz=1)
+BOTH = ("traffic.encounters", "traffic.encounter_model")
+AT = {"lat_deg": -41.3, "lon_deg": 179.9997}
+
+
+def events(path, **changes) -> str:
+    """Two encounters of straight flights and one turn; the ownship heads 217 degrees."""
+    own = math.radians(217)
+    columns = {
+        "encounter": [4, 4, 9, 9],
+        "weight": [2.0, 2.0, 0.5, 0.5],
+        "aircraft": ["own", "one", "own", "other"],
+        "north_m": [300.0, -900.0, 0.0, 2000.0],
+        "east_m": [-200.0, 700.0, 0.0, 0.0],
+        "altitude_m": [2000.0, 2100.0, 2000.0, 1900.0],
+        "speed_mps": [50.0, 60.0, 50.0, 70.0],
+        "heading_rad": [own, 1.0, own, math.pi],
+        "duration_s": [20.0] * 4,
+        "time_s": [[0.0], [0.0, 3.0], [0.0], [0.0]],
+        "climb_mps": [[0.0], [2.0, 0.0], [0.0], [0.0]],
+        "turn_rad_s": [[0.0], [0.0, 0.1], [0.0], [0.0]],
+        "acceleration_mps2": [[0.0], [0.0, 0.0], [0.0], [0.0]],
+    }
+    pq.write_table(pa.table({**columns, **changes}), path)
+    return str(path)
+
+
+def seen(traffic: dict, duration_s: float = 10, **parts) -> dict[float, dict]:
+    scene = chain({"radar": RADAR}, duration_s=duration_s, **parts)
+    scene["blocks"]["traffic"] = traffic
+    return {row["time_s"]: row for row in rows(run(scene))}
+
+
+@covers("file", "encounter", of=("traffic.encounters",))
+def test_the_encounter_of_a_number_is_flown(tmp_path):
+    file = events(tmp_path / "set.parquet")
+    found = seen({"type": "traffic.encounters", "file": file, "encounter": 4})
+    assert {row["target"] for row in found.values()} == {"one"}
+    for t in (0, 2):  # before the turn: straight lines by hand, one climbing
+        own = (
+            300 + 50 * t * math.cos(math.radians(217)),
+            -200 + 50 * t * math.sin(math.radians(217)),
+        )
+        one = -900 + 60 * t * math.cos(1), 700 + 60 * t * math.sin(1)
+        apart = math.hypot(own[0] - one[0], own[1] - one[1], 100 + 2 * t)
+        assert found[float(t)]["true_range_m"] == pytest.approx(apart, abs=1.0)
+    other = seen({"type": "traffic.encounters", "file": file, "encounter": 9})
+    assert other[0.0]["true_range_m"] == pytest.approx(math.hypot(2000, 100), abs=1.0)
+
+
+@covers("lat_deg", "lon_deg", of=BOTH)
+@pytest.mark.parametrize("kind", BOTH)
+def test_the_origin_is_put_where_it_is_said(kind, tmp_path):
+    file = tmp_path / "set.parquet"
+    if kind == "traffic.encounters":
+        traffic = {"type": kind, "file": events(file), "encounter": 9}
+        offset = np.zeros(2)
+    else:
+        traffic = {"type": kind, "file": model(tmp_path), "encounter": 3}
+        offset = None
+    biased = {"navigation": {"position_bias_m": [0, 0, 1e-6]}}
+    row = seen({**traffic, **AT}, **biased)[0.0]
+    there = pymap3d.geodetic2enu(
+        row["own_lat_deg"], row["own_lon_deg"], 0.0, AT["lat_deg"], AT["lon_deg"], 0.0
+    )
+    other = seen({**traffic, "lat_deg": 10.0, "lon_deg": 20.0}, **biased)[0.0]
+    elsewhere = pymap3d.geodetic2enu(other["own_lat_deg"], other["own_lon_deg"], 0.0, 10.0, 20.0, 0)
+    assert there[:2] == pytest.approx(elsewhere[:2], abs=0.01)
+    if offset is not None:
+        assert there[:2] == pytest.approx(offset, abs=0.01)
+
+
+@covers("dynamics", of=BOTH)
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_point_mass_rolls_into_its_turns(kind, tmp_path):
+    """An Euler track turns at once; a point mass banks first, and so is elsewhere."""
+    file = tmp_path / "set.parquet"
+    if kind == "traffic.encounters":
+        traffic = {"type": kind, "file": events(file), "encounter": 4}
+    else:
+        traffic = {"type": kind, "file": model(tmp_path), "encounter": turning(tmp_path)}
+    ranges = [
+        [row["true_range_m"] for row in seen({**traffic, "dynamics": d}, 10).values()]
+        for d in ("euler", "point_mass")
+    ]
+    assert len(ranges[0]) == len(ranges[1]) == 10
+    assert ranges[0][0] == pytest.approx(ranges[1][0], abs=1e-6)
+    apart = np.abs(np.subtract(*ranges))
+    assert 0.1 < apart[-1] < 200.0
+
+
+@covers("skip_damaged", of=("traffic.encounters",))
+def test_a_set_with_a_damaged_encounter(tmp_path):
+    file = events(tmp_path / "set.parquet", weight=[None, None, 0.5, 0.5])
+    traffic = {"type": "traffic.encounters", "file": file, "encounter": 9}
+    with pytest.raises(Exception, match=r"set\.parquet: encounter 4: weight is missing"):
+        seen(traffic)
+    assert seen({**traffic, "skip_damaged": True})
+
+
+def model(folder, name: str = "model.txt", text: str = TURNS) -> str:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def turning(folder) -> int:
+    """Return the number of a pair in which somebody turns within the first seconds."""
+    from components.encounters.model_file import read_model
+    from components.encounters.pair_densities import PairingRules
+    from components.encounters.pairing import PairSampler
+
+    read = read_model(folder / "model.txt")
+    pairs = PairSampler(read, read, 0, PairingRules()).pairs(range(40))
+    turned = np.abs(np.diff(pairs.turn_rad_s[:, :6], axis=1)).max(axis=(0, 1))
+    return int(np.argmax(turned))
+
+
+@covers("file", "intruder_file", "encounter", "model_seed", of=("traffic.encounter_model",))
+def test_a_model_gives_the_encounter_of_its_number(tmp_path):
+    traffic = {"type": "traffic.encounter_model", "file": model(tmp_path)}
+    first = seen({**traffic, "encounter": 1}, 2)
+    assert first == seen({**traffic, "encounter": 1}, 2)
+    assert first != seen({**traffic, "encounter": 2}, 2)
+    assert first != seen({**traffic, "encounter": 1, "model_seed": 5}, 2)
+    # A slow intruder's speed: its range cannot change faster than both fly.
+    slow = model(tmp_path, "slow.txt", TURNS.replace("60 70 110 160", "5 6 10 12"))
+    pair = {**traffic, "intruder_file": slow, "file": slow, "encounter": 1}
+    apart = [row["true_range_m"] for row in seen(pair, 4).values()]
+    assert np.abs(np.diff(apart)).max() <= 2 * 12 * 1852 / 3600
+    mixed = seen({**traffic, "intruder_file": slow, "encounter": 1}, 4)
+    assert [row["true_range_m"] for row in mixed.values()] != apart
+
+
+@covers("update_rate_hz", of=BOTH)
+@pytest.mark.parametrize("kind", BOTH)
+def test_positions_are_held_between_updates(kind, tmp_path):
+    file = events(tmp_path / "set.parquet") if kind == BOTH[0] else model(tmp_path)
+    traffic = {"type": kind, "file": file, "encounter": 4}
+    held = seen({**traffic, "update_rate_hz": "1/2"}, 6)
+    moving = seen(traffic, 6)
+    for time, row in held.items():
+        assert row["true_range_m"] == moving[2.0 * (time // 2)]["true_range_m"]
+    assert moving[1.0]["true_range_m"] != moving[0.0]["true_range_m"]

@@ -1,0 +1,63 @@
+"""What noise makes of a look at a faint target lies anywhere in its cell, and says no more."""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from scipy.stats import binom, kstest
+from wired import chain, rows, run, sensor
+
+BEAM_DEG, CELL_M, PFA = (3.0, 5.0), 120.0, 0.04
+RADAR = {
+    "errors": "signal", "azimuth_beamwidth_deg": BEAM_DEG[0],
+    "elevation_beamwidth_deg": BEAM_DEG[1],
+    "range_resolution_m": CELL_M, "false_alarm_probability": PFA, "swerling": 1,
+    "scan_rate_hz": 200, "budget": "free", "reference_pd": 0.5,
+}  # fmt: skip
+STILL = {"speed_mps": 0.0, "climb_mps": 0.0}
+OWN = {**crooked.OWNSHIP, **STILL}
+
+
+def reports(rcs_dbsm: float, power_w: float, looks: int = 20_000) -> dict[str, np.ndarray]:
+    target = {**crooked.ROLLING, **STILL, "rcs_dbsm": rcs_dbsm}
+    radar = sensor("radar.swerling", **{**RADAR, "power_w": power_w})
+    scene = chain({"radar": radar}, ownship=OWN, targets=[target], duration_s=looks / 200)
+    found = rows(run(scene))
+    return {name: np.array([row[name] for row in found]) for name in (
+        "azimuth_rad", "elevation_rad", "range_m", "true_azimuth_rad", "true_elevation_rad",
+        "true_range_m", "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
+        "detection_probability")}  # fmt: skip
+
+
+def test_far_below_the_noise_a_report_is_anywhere_in_the_cell():
+    looks = 20_000
+    found = reports(-140.0, 1.0, looks)
+    low, high = binom.interval(0.99, looks, PFA)
+    assert low <= len(found["range_m"]) <= high
+    for name, width, variance in (
+        ("azimuth_rad", math.radians(BEAM_DEG[0]), "azimuth_variance_rad2"),
+        ("elevation_rad", math.radians(BEAM_DEG[1]), "elevation_variance_rad2"),
+        ("range_m", CELL_M, "range_variance_m2"),
+    ):
+        # The cell of the truth, by its number: the same for every target in it.
+        number = np.rint(found[f"true_{name}"][0] / width)
+        place = found[name] / width - number + 0.5
+        step = 0.0 if name != "range_m" else 1.0
+        if step == 0.0:
+            assert kstest(place, "uniform").pvalue > 0.01
+        np.testing.assert_allclose(found[variance], width**2 * (1 / 6 + step / 12), rtol=1e-9)
+    assert not np.any(found["range_m"] == found["true_range_m"])
+
+
+@pytest.mark.parametrize("power_w", [3.0, 30.0])
+def test_the_share_of_noise_among_detections_falls_with_the_signal(power_w):
+    """Pd = 1 - (1 - Pfa)(1 - share of the target)."""
+    found = reports(0.0, power_w)
+    pd = float(found["detection_probability"][0])
+    of_target = (pd - PFA) / (1.0 - PFA)
+    widest = math.radians(BEAM_DEG[0]) ** 2 / 6.0
+    noise = np.count_nonzero(np.isclose(found["azimuth_variance_rad2"], widest, rtol=1e-9))
+    low, high = binom.interval(0.99, 20_000, pd - of_target)
+    assert low <= noise <= high
+    assert 0.2 < pd < 0.999

@@ -1,0 +1,258 @@
+"""Every key of the trackers reaches what it says, seen in the tracks of scenes."""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from covering import covers
+from wired import HEARS_ALL, SEES_ALL, chain, rows, run
+
+TRACKERS = ("tracking.ekf", "tracking.ukf", "tracking.imm")
+RADAR = {**HEARS_ALL, "azimuth_resolution_deg": 0.3, "elevation_resolution_deg": 0.3,
+         "range_resolution_m": 5.0}  # fmt: skip
+PASS = {"type": "fusion.pass_through"}
+
+
+def tracks(kind="tracking.ekf", *, sensors=None, targets=(crooked.ROLLING,), duration_s=4, **keys):
+    tracker = {"type": kind, **keys}
+    scene = chain(sensors or {"radar": RADAR}, targets=targets, duration_s=duration_s, fusion=PASS,
+                  tracker=tracker)  # fmt: skip
+    return rows(run(scene), "state_tracks")
+
+
+AWAY = {
+    "name": "away", "east_m": -900.0, "north_m": -1200.0, "up_m": 150.0, "heading_deg": 217.0,
+    "speed_mps": 130.0,
+}  # fmt: skip
+
+
+def fading(seconds, **keys):
+    """Tracks of a target that a radar sees for so many seconds, and then not."""
+    scene = chain({"radar": RADAR}, targets=[AWAY], duration_s=12)
+    levels = [row["snr_db"] for row in rows(run(scene))]
+    falling = levels if levels[0] > levels[-1] else levels[::-1]
+    assert falling == levels, "the target must fly away"
+    threshold = 0.5 * (levels[seconds - 1] + levels[seconds])
+    radar = {**RADAR, "threshold_db": threshold}
+    return tracks(sensors={"radar": radar}, targets=[AWAY], duration_s=12, **keys)
+
+
+@covers("start_speed_m_s", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_first_detection_s_velocity_is_as_uncertain_as_said(kind):
+    first = tracks(kind, start_speed_m_s=33.0)[0]
+    for name in ("covariance_33_m2_s2", "covariance_44_m2_s2", "covariance_55_m2_s2"):
+        assert first[name] == pytest.approx(33.0**2)
+
+
+@covers("acceleration_intensity_m2_s3", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_white_acceleration_keeps_the_velocity_uncertain(kind):
+    spread = [
+        tracks(kind, acceleration_intensity_m2_s3=q)[-1]["covariance_33_m2_s2"]
+        for q in (0.01, 30.0)
+    ]
+    assert spread[1] > 2.0 * spread[0]
+
+
+@covers("gate_probability", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_gate_that_holds_nothing_starts_a_track_at_every_look(kind):
+    assert {row["track"] for row in tracks(kind)} == {1}
+    assert {row["track"] for row in tracks(kind, gate_probability=1e-9)} == {1, 2, 3, 4}
+
+
+def odds(kind, **keys):
+    """The odds after the second look, both of which hit."""
+    found = tracks(kind, start_existence=1e-9, duration_s=2,
+                   **{"false_alarms_per_scan": 1e4, **keys})  # fmt: skip
+    chance = found[-1]["existence"]
+    return math.log(chance / (1.0 - chance))
+
+
+@covers("detection_probability", "false_alarms_per_scan", "start_existence", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_odds_follow_detections_and_false_alarms(kind):
+    """ln(Pd N / λ) with nothing else changed: differences are those of the logarithms."""
+    usual = odds(kind, detection_probability=0.9)
+    assert odds(kind, detection_probability=0.45) - usual == pytest.approx(-math.log(2), abs=1e-6)
+    more = odds(kind, detection_probability=0.9, false_alarms_per_scan=1e5)
+    assert more - usual == pytest.approx(-math.log(10), abs=1e-6)
+    first = tracks(kind, start_existence=0.37, duration_s=1)[0]
+    assert first["existence"] == pytest.approx(0.37)
+
+
+@covers("confirm_m", "confirm_n", "delete_misses", "delete_after_s", "initiation",
+        "false_confirmation", "missed_confirmation", of=TRACKERS)  # fmt: skip
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_tracks_live_by_their_rules(kind):
+    def life(**keys):
+        return [row["track_status"] for row in fading(5, kind=kind, **keys)]
+
+    usual = {"confirm_m": 4, "confirm_n": 6, "delete_misses": 3}
+    wanted = ["tentative"] * 3 + ["confirmed"] * 2 + ["coasted"] * 2 + ["deleted"]
+    assert life(**usual) == wanted
+    assert life(**{**usual, "confirm_m": 2})[:2] == ["tentative", "confirmed"]
+    # Six hits cannot come any more with the first look in vain.
+    assert life(**{**usual, "confirm_m": 6}) == ["tentative"] * 5 + ["deleted"]
+    assert life(**{**usual, "confirm_m": 6, "confirm_n": 8})[5:8] == ["tentative"] * 2 + ["deleted"]
+    assert life(**{**usual, "delete_misses": 2}) == [*wanted[:6], "deleted"]
+    assert life(**{**usual, "delete_after_s": 1.5}) == [*wanted[:6], "deleted"]
+    wald = {"initiation": "likelihood_ratio", "delete_misses": 3, "false_alarms_per_scan": 1e5,
+            "start_existence": 0.5}  # fmt: skip
+    soon = life(**wald, false_confirmation=0.4).index("confirmed")
+    late = life(**wald, false_confirmation=1e-12)
+    assert soon < (late.index("confirmed") if "confirmed" in late else 99)
+    wald |= {"false_alarms_per_scan": 3e8, "false_confirmation": 1e-12}
+    ends = [life(**wald, missed_confirmation=p).index("deleted") for p in (0.4, 1e-6)]
+    assert ends[0] < ends[1]
+
+
+@covers("delete_above_m", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_track_ends_where_its_position_is_too_uncertain(kind):
+    assert tracks(kind, delete_above_m=0.5)[1]["track_status"] == "deleted"
+    assert "deleted" not in {row["track_status"] for row in tracks(kind)}
+
+
+@covers("assumed_range_m", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_without_a_range_none_is_told_and_nearer_ones_turn_sooner(kind):
+    camera = {**SEES_ALL, "azimuth_pixels": 3600, "elevation_pixels": 1800}
+    spread = []
+    for assumed in (1000.0, 10_000.0):
+        found = tracks(kind, sensors={"eye": camera}, assumed_range_m=assumed)
+        assert not any(row["has_range"] for row in found)
+        assert {row["north_m"] for row in found} == {None}
+        assert {row["covariance_00_m2"] for row in found} == {None}
+        spread.append(found[-1]["azimuth_variance_rad2"])
+    assert abs(spread[0] / spread[1] - 1.0) > 0.01
+
+
+SIDE = {**crooked.ROLLING, "name": "side", "north_m": crooked.ROLLING["north_m"] + 12.0}
+
+
+@covers("association", "jpda_exact_detections", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_who_belongs_to_whom_is_decided_as_said(kind):
+    """Two targets 12 m apart: whoever weighs both detections is less sure than who takes one."""
+    coarse = {**RADAR, "range_resolution_m": 10.0}
+
+    def spread(**keys):
+        found = tracks(kind, sensors={"radar": coarse}, targets=[crooked.ROLLING, SIDE], **keys)
+        return np.array([row["covariance_00_m2"] for row in found if row["time_s"] == 1.0])
+
+    one, all_of_them = spread(association="gnn"), spread(association="jpda")
+    assert all_of_them.min() > 2.0 * one.max()
+    assert spread(association="nearest").max() < 2.0 * one.max()
+    rough = spread(association="jpda", jpda_exact_detections=1)
+    assert rough.max() < 0.5 * all_of_them.min()  # propagation is too sure of itself here
+
+
+@covers("late", "lag_s", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_a_late_look_is_left_out_or_worked_on_again(kind):
+    """The camera's message takes 1.5 s: a radar's look has come since."""
+    sensors = {"radar": RADAR, "eye": {**SEES_ALL, "latency_s": 1.5, "offset_s": 0.2}}
+
+    def updated_by(**keys):
+        names = [row["contributors"] for row in tracks(kind, sensors=sensors, **keys)]
+        return {name for joined in names for name in joined.split("+")}
+
+    assert updated_by() == updated_by(late="rerun", lag_s=0.5) == {"radar"}
+    assert updated_by(late="rerun", lag_s=2.0) == {"radar", "eye"}
+
+
+@covers("alpha", "beta", "kappa", of=("tracking.ukf",))
+def test_sigma_points_are_spread_as_said():
+    def states(**keys):
+        near = {**crooked.ROLLING, "east_m": -300.0, "north_m": -150.0, "up_m": 90.0}
+        return [row["north_m"] for row in tracks("tracking.ukf", targets=[near], **keys)]
+
+    usual = states()
+    for change in ({"alpha": 0.8}, {"kappa": 3.0}, {"beta": 6.0}):
+        assert states(**change) != usual
+
+
+TURNING = {**crooked.ROLLING, "legs": [{"kind": "turn", "rate_deg_s": 6.0}]}
+
+
+def turning(**keys):
+    return tracks("tracking.imm", targets=[TURNING], duration_s=10, **keys)
+
+
+@covers("models", of=("tracking.imm",))
+def test_models_are_those_that_are_named():
+    found = turning(models=["velocity", "turn"])[-1]
+    assert found["probability_velocity"] + found["probability_turn"] == pytest.approx(1.0)
+    assert found["probability_acceleration"] is None
+    assert found["turn_rate_rad_s"] == pytest.approx(math.radians(6.0), rel=0.5)
+    found = turning(models=["velocity", "acceleration"])[-1]
+    assert found["probability_turn"] is None and found["acceleration_north_m_s2"] is not None
+
+
+@covers("transition_rates_per_s", of=("tracking.imm",))
+def test_a_model_that_is_never_entered_fades_away():
+    never = turning(transition_rates_per_s=[[0.0, 0.0], [5.0, 0.0]])[-1]
+    often = turning(transition_rates_per_s=[[0.0, 5.0], [0.0, 0.0]])[-1]
+    assert never["probability_turn"] < 0.01 < 0.99 < often["probability_turn"]
+
+
+@covers("start_turn_deg_s", "turn_rate_intensity_deg2_s3", "turn_acceleration_intensity_m2_s3",
+        "start_acceleration_m_s2", "jerk_intensity_m2_s5", of=("tracking.imm",))  # fmt: skip
+def test_what_a_model_may_do_shows_in_what_it_estimates():
+    stiff = {"start_turn_deg_s": 0.01, "turn_rate_intensity_deg2_s3": 1e-6}
+    slow = turning(**stiff)[-1]["turn_rate_rad_s"]
+    assert abs(slow) < math.radians(0.5)
+    for loose in ({"start_turn_deg_s": 6.0}, {"turn_rate_intensity_deg2_s3": 10.0}):
+        assert turning(**{**stiff, **loose})[-1]["turn_rate_rad_s"] > 2.0 * abs(slow)
+    calm, rough = (
+        turning(turn_acceleration_intensity_m2_s3=q)[-1]["covariance_33_m2_s2"]
+        for q in (0.01, 100.0)
+    )
+    assert rough > calm
+    stiff = {"models": ["velocity", "acceleration"], "start_acceleration_m_s2": 0.001,
+             "jerk_intensity_m2_s5": 1e-9}  # fmt: skip
+    name = "acceleration_north_m_s2"
+    still = abs(turning(**stiff)[-1][name])
+    for loose in ({"start_acceleration_m_s2": 10.0}, {"jerk_intensity_m2_s5": 30.0}):
+        assert abs(turning(**{**stiff, **loose})[-1][name]) > 10.0 * still
+
+
+def test_a_track_with_a_range_is_where_the_target_is():
+    """In north, east, down at the origin that the row tells, by pymap3d."""
+    import pymap3d
+
+    row = tracks(duration_s=6)[-1]
+    origin = row["origin_lat_deg"], row["origin_lon_deg"], row["origin_alt_m"]
+    own = crooked.geodetic(crooked.position(crooked.OWNSHIP))
+    np.testing.assert_allclose(origin[0], own[0], atol=1e-9)
+    np.testing.assert_allclose(origin[2], own[2], atol=1e-3)
+    target = crooked.position(crooked.ROLLING, row["state_s"])
+    known = np.array(pymap3d.ecef2ned(*target, *origin))
+    found = np.array([row["north_m"], row["east_m"], row["down_m"]])
+    deviation = [math.sqrt(row[f"covariance_{i}{i}_m2"]) for i in range(3)]
+    assert (np.abs(found - known) < 4.0 * np.array(deviation)).all()
+    here = crooked.geodetic(crooked.position(crooked.OWNSHIP, row["state_s"]))
+    away = known - np.array(pymap3d.geodetic2ned(*here, *origin))
+    assert row["azimuth_rad"] == pytest.approx(math.atan2(away[1], away[0]) % math.tau, abs=0.01)
+    assert row["elevation_rad"] == pytest.approx(
+        math.atan2(-away[2], math.hypot(away[0], away[1])), abs=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"confirm_m": 4, "confirm_n": 3}, "confirm_n"),
+        ({"type": "tracking.imm", "models": ["turn", "turn"]}, "twice"),
+        ({"type": "tracking.imm", "transition_rates_per_s": [[0.0]]}, "rows"),
+        ({"type": "tracking.imm", "transition_rates_per_s": [[0, -1], [1, 0]]}, "negative"),
+    ],
+)
+def test_what_cannot_be_is_refused(keys, said):
+    from dsa_des.errors import SceneError
+
+    with pytest.raises(SceneError, match=said):
+        tracks(**{"kind": keys.pop("type", "tracking.ekf"), **keys})

@@ -1,0 +1,70 @@
+"""The metric of estimated tracks, through scenes whose sensors are exact but for stated errors."""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from covering import covers
+from wired import chain, measured, rows, run
+
+RADAR = {
+    "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
+    "quantised": False, "azimuth_error_deg": 0.1, "elevation_error_deg": 0.1, "range_error_m": 3.0,
+}  # fmt: skip
+TRACKER = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.01}
+
+
+def scene(targets=(crooked.ROLLING,), duration_s=6, **radar):
+    return chain(
+        {"radar": {**RADAR, **radar}}, targets=targets, duration_s=duration_s,
+        fusion={"type": "fusion.pass_through"}, tracker=TRACKER,
+    )  # fmt: skip
+
+
+FINE = {"azimuth_error_deg": 0.001, "elevation_error_deg": 0.001, "range_error_m": 0.05,
+        "biases": "fixed", "range_bias_m": 100.0}  # fmt: skip
+
+
+def test_errors_are_those_of_the_tracks_told():
+    """Against positions by pymap3d at the instants of the rows, in a run of another seed."""
+    import pymap3d
+
+    found = measured(scene(**FINE), {"metric": "tracking", "step_s": 0.25})
+    errors = []
+    for row in rows(run(scene(**FINE)), "state_tracks"):
+        if row["track_status"] != "confirmed":
+            continue
+        origin = row["origin_lat_deg"], row["origin_lon_deg"], row["origin_alt_m"]
+        true = pymap3d.ecef2ned(*crooked.position(crooked.ROLLING, row["state_s"]), *origin)
+        errors.append(np.array([row["north_m"], row["east_m"], row["down_m"]]) - true)
+    known = math.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
+    assert found["track_position_error_m"] == pytest.approx(known, rel=0.2)
+    assert found["track_completeness"] == pytest.approx(1.0, abs=0.15)
+    assert found["track_false_per_hour"] == found["track_swapped"] == 0.0
+    assert found["track_confirmation_s"] == pytest.approx(0.5)
+
+
+@covers("from_s", "step_s", of=("[metric tracking]",))
+def test_instants_count_as_said():
+    """Before its third look no track is confirmed; afterwards there always is one."""
+    early = measured(scene(), {"metric": "tracking", "step_s": 0.25})
+    late = measured(scene(), {"metric": "tracking", "step_s": 0.25, "from_s": 2.0})
+    seldom = measured(scene(), {"metric": "tracking", "step_s": 3.0})
+    assert early["track_completeness"] < late["track_completeness"] == 1.0
+    assert seldom["track_completeness"] == 1.0
+
+
+@covers("within_m", "order", of=("[metric tracking]",))
+def test_what_is_far_away_is_missed_and_false():
+    """A radar whose ranges are 100 m too long."""
+    wrong = scene(**FINE)
+    keys = {"metric": "tracking", "from_s": 2.0}
+    near = measured(wrong, {**keys, "within_m": 60.0})
+    far = measured(wrong, {**keys, "within_m": 160.0})
+    assert near["track_spuriousness"] == 1.0 and near["track_completeness"] == 0.0
+    assert far["track_spuriousness"] == 0.0 and far["track_completeness"] == 1.0
+    assert near["track_gospa_missed_m"] == pytest.approx(60.0 / math.sqrt(2.0))
+    one = measured(wrong, {**keys, "within_m": 60.0, "order": 1.0})
+    assert one["track_gospa_missed_m"] == pytest.approx(60.0 / 2.0)
+    assert far["track_ospa_m"] == pytest.approx(100.0, rel=0.2)

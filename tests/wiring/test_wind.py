@@ -1,0 +1,238 @@
+"""Wind: noses that do not point along the track, by vectors over the ground and through the air."""
+
+import math
+
+import crooked
+import numpy as np
+import pymap3d
+import pytest
+from covering import covers
+from wired import chain, first_look, rows, run, sensor
+
+from components.traffic.legs import Climb, ScriptedTrajectory, Straight, Turn
+from components.traffic.straight_flights import Starts, flights_of
+from components.traffic.wind import Wind, ground_speed_mps, heading_and_airspeed
+from components.traffic.wind_effect import Crabbing
+from dsa_des.errors import SceneError
+
+G = 9.80665
+WIND = {"wind_mps": 21.0, "wind_from_deg": 305.0}
+# The air goes where the wind does not come from.
+AIR = np.array([-21.0 * math.sin(math.radians(305.0)), -21.0 * math.cos(math.radians(305.0))])
+OWN = {
+    "lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400.0, "heading_deg": 217.0,
+    "speed_mps": 70.0, "climb_mps": 3.0,
+}  # fmt: skip
+TARGET = {
+    "name": "one", "east_m": -2349.0, "north_m": -855.0, "up_m": 420.0, "heading_deg": 35.0,
+    "speed_mps": 60.0, "climb_mps": 7.0,
+    "eo": {"front_m2": 3.0, "side_m2": 40.0, "horizontal_m2": 90.0},
+}  # fmt: skip
+RADAR = sensor("radar.range_boundary", scan_rate_hz=2)
+
+
+def through_air(track_deg, speed_mps):
+    """Heading (deg) and level airspeed of who flies so over the ground."""
+    track = math.radians(track_deg)
+    air = speed_mps * np.array([math.sin(track), math.cos(track)]) - AIR
+    return math.degrees(math.atan2(*air)) % 360.0, float(np.hypot(*air))
+
+
+def pose(row):
+    return [math.degrees(row[f"own_{name}_rad"]) for name in ("heading", "pitch", "roll")]
+
+
+@covers("wind_mps", "wind_from_deg", of=("[weather]",))
+def test_the_nose_turns_into_the_wind_and_the_flight_stays_where_it_was():
+    still = first_look(chain({"radar": RADAR}, ownship=OWN, targets=[TARGET]), "radar")["one"]
+    blown = first_look(
+        chain({"radar": RADAR}, ownship=OWN, targets=[TARGET], weather=WIND), "radar"
+    )["one"]
+    heading, airspeed = through_air(217.0, 70.0)
+    assert abs(heading - 217.0) > 10
+    climb = math.degrees(math.atan2(3.0, airspeed))
+    assert pose(blown) == pytest.approx([heading, climb, 0.0], abs=1e-9)
+    assert pose(still) == pytest.approx([217.0, math.degrees(math.atan2(3.0, 70.0)), 0.0], abs=1e-9)
+    assert blown["true_range_m"] == still["true_range_m"]
+    # What is seen in body axes follows: by matrices.
+    vector = crooked.rotation(heading, climb, 0.0) @ crooked.ned(TARGET, 0.0, OWN)
+    p, q = crooked.angles(vector)
+    assert blown["true_azimuth_rad"] == pytest.approx(p, abs=1e-7)
+    assert blown["true_elevation_rad"] == pytest.approx(q, abs=1e-7)
+
+
+@covers("wind_from_deg", of=("[weather]",))
+@pytest.mark.parametrize(
+    "legs", [[], [{"kind": "straight", "duration_s": 99}, {"kind": "straight"}]]
+)
+def test_a_target_shows_the_side_that_its_heading_gives(legs):
+    eo = sensor("optical.eo", azimuth_pixels=9000, elevation_pixels=4500)
+    scene = chain({"eo": eo}, ownship=OWN, targets=[{**TARGET, "legs": legs}], weather=WIND)
+    row = first_look(scene, "eo")["one"]
+    heading, airspeed = through_air(35.0, 60.0)
+    turned = crooked.rotation(heading, math.degrees(math.atan2(7.0, airspeed)), 0.0)
+    u = turned @ crooked.ned(TARGET, 0.0, OWN)
+    u = u / np.linalg.norm(u)
+    area = 3.0 + 40.0 * math.sqrt(1 - u[0] ** 2) + 90.0 * abs(u[2])
+    pixel_rad = math.radians(360.0 / 9000)
+    assert row["pixels"] == pytest.approx(area / (row["true_range_m"] * pixel_rad) ** 2, rel=1e-6)
+
+
+def test_a_turn_in_wind_banks_for_what_is_across_the_nose():
+    own = {**OWN, "climb_mps": 0.0, "legs": [{"kind": "turn", "rate_deg_s": 3.0}]}
+    scene = chain({"radar": RADAR}, ownship=own, targets=[TARGET], weather=WIND, duration_s=20)
+    for row in rows(run(scene))[1::7]:
+        track = 217.0 + 3.0 * row["time_s"]
+        heading, _ = through_air(track, 70.0)
+        crab = math.radians(heading - track)
+        bank = math.atan(70.0 * math.radians(3.0) / G * math.cos(crab))
+        found = pose(row)
+        assert (found[0] - heading + 180) % 360 - 180 == pytest.approx(
+            0.0, abs=0.02
+        )  # meridians converge
+        assert found[1:] == pytest.approx([0.0, math.degrees(bank)], abs=1e-3)
+
+
+def test_a_beam_that_sweeps_meets_noses_in_the_wind():
+    radar = sensor("radar.threshold", beam_sweep=True, scan_rate_hz="1/2")
+    own = {**OWN, "climb_mps": 0.0, "legs": [{"kind": "turn", "rate_deg_s": 3.0}]}
+    (row,) = rows(run(chain({"radar": radar}, ownship=own, targets=[TARGET], weather=WIND)))
+    heading, _ = through_air(217.0 + 3.0 * row["illuminated_s"], 70.0)
+    assert row["illuminated_s"] > 0.1
+    assert pose(row)[0] == pytest.approx(heading, abs=0.02)
+
+
+def test_the_truth_in_the_run_folder_is_a_wind_triangle():
+    own = {**OWN, "legs": [{"kind": "turn", "rate_deg_s": 2.0}]}
+    scene = chain({"radar": RADAR}, ownship=own, targets=[TARGET], weather=WIND, duration_s=3)
+    found = rows(run(scene), "truth")
+    assert len(found) >= 6
+    for row in found:
+        through = np.array([row["velocity_east_m_s"], row["velocity_north_m_s"]]) - AIR
+        turned = row["heading_rad"] - math.atan2(*through)
+        assert math.remainder(turned, 2 * math.pi) == pytest.approx(0.0, abs=2e-4)
+
+
+def test_a_fixed_attitude_stays_and_so_do_who_stand():
+    fixed = {**OWN, "yaw_deg": 100.0, "roll_deg": 5.0}
+    row = rows(run(chain({"radar": RADAR}, ownship=fixed, targets=[TARGET], weather=WIND)))[0]
+    # Where the yaw says nothing of the track, the pitch is that over the ground.
+    assert pose(row) == pytest.approx([100.0, math.degrees(math.atan2(3.0, 70.0)), 5.0])
+    hovering = {**OWN, "speed_mps": 0.0, "climb_mps": 0.0}
+    row = rows(run(chain({"radar": RADAR}, ownship=hovering, targets=[TARGET], weather=WIND)))[0]
+    assert pose(row) == pytest.approx([217.0, 0.0, 0.0])
+
+
+@covers("ownship.airspeed_mps", of=("traffic.scripted", "traffic.random"))
+@covers("intruders.airspeed_mps", of=("traffic.scripted",))
+def test_an_airspeed_gives_the_speed_over_the_ground():
+    own = {key: value for key, value in OWN.items() if key != "speed_mps"} | {"airspeed_mps": 65.0}
+    target = {k: v for k, v in TARGET.items() if k != "speed_mps"} | {"airspeed_mps": 50.0}
+    scene = chain({"radar": RADAR}, ownship=own, targets=[target], weather=WIND, duration_s=3)
+    seen = rows(run(scene))
+    first, last = seen[0], seen[-1]
+    heading = math.radians(pose(first)[0])
+    over_ground = 65.0 * np.array([math.sin(heading), math.cos(heading)]) + AIR
+    assert math.degrees(math.atan2(*over_ground)) % 360 == pytest.approx(217.0)
+    moved = pymap3d.geodetic2enu(
+        last["own_lat_deg"], last["own_lon_deg"], 2400.0, OWN["lat_deg"], OWN["lon_deg"], 2400.0
+    )
+    assert math.hypot(*moved[:2]) / last["time_s"] == pytest.approx(
+        np.hypot(*over_ground), rel=1e-6
+    )
+    # The target's ground speed: positions rebuilt from what the ownship sees.
+    speed = ground_speed_mps(math.radians(35.0), 50.0, Wind(*AIR))
+    there = crooked.ned(
+        {**TARGET, "speed_mps": speed},
+        last["time_s"],
+        {**OWN, "speed_mps": float(np.hypot(*over_ground))},
+    )
+    assert last["true_range_m"] == pytest.approx(float(np.linalg.norm(there)), abs=0.02)
+    still = {"type": "traffic.random", "ownship": own, "intruders": 3, "radius_km": 3}
+    scene["blocks"]["traffic"] = still
+    row = rows(run({**scene, "weather": {}}))[-1]
+    moved = pymap3d.geodetic2enu(
+        row["own_lat_deg"], row["own_lon_deg"], 2400.0, OWN["lat_deg"], OWN["lon_deg"], 2400.0
+    )
+    assert math.hypot(*moved[:2]) / row["time_s"] == pytest.approx(65.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"airspeed_mps": 15.0, "speed_mps": 0.0}, "ownship: airspeed_mps is 15: .*across"),
+        ({"airspeed_mps": 20.5, "speed_mps": 0.0, "heading_deg": 310.0}, "wind of 21 m/s against"),
+        ({"airspeed_mps": 50.0}, "airspeed_mps is 50 and speed_mps is 70: only one"),
+        ({"airspeed_mps": 50.0, "speed_mps": 0, "legs": [{"kind": "straight"}]}, "are legs"),
+        ({"airspeed_mps": -1.0, "speed_mps": 0.0}, "airspeed_mps"),
+    ],
+)  # fmt: skip
+def test_impossible_winds_are_one_clear_error(changes, says):
+    scene = chain({"radar": RADAR}, ownship={**OWN, **changes}, targets=[TARGET], weather=WIND)
+    with pytest.raises(SceneError, match=says) as caught:
+        run(scene)
+    assert len(caught.value.problems) == 1
+
+
+@covers("wind_mps", of=("[weather]",))
+def test_replayed_flights_turn_into_the_wind_too(tmp_path):
+    lines = ["time,id,lat,lon,alt"]
+    for t in range(8):
+        for name, east, north in (("own", 60.0 * t, 0.0), ("it", 900.0, 50.0 * t - 1500.0)):
+            lat, lon, _ = pymap3d.enu2geodetic(east, north, 0.0, -41.0, 172.0, 900.0)
+            lines.append(f"{t},{name},{float(lat)!r},{float(lon)!r},900")
+    path = tmp_path / "f.csv"
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    scene = chain({"radar": RADAR}, duration_s=6, weather=WIND)
+    scene["blocks"]["traffic"] = {"type": "traffic.csv", "file": str(path)}
+    for row in rows(run(scene)):
+        expected, _ = through_air(90.0, 60.0)
+        assert pose(row)[0] == pytest.approx(expected, abs=0.01)
+    path.write_text(
+        path.read_text("utf-8").replace("alt\n", "alt,heading\n").replace(",900\n", ",900,80\n"),
+        "utf-8",
+    )
+    for row in rows(run(scene)):
+        assert pose(row)[0] == pytest.approx(80.0, abs=1e-9)
+
+
+def test_many_flights_together_by_differences_of_their_positions():
+    wind = Wind(9.0, -14.0)
+    rng = np.random.default_rng(4)
+    straight = flights_of(
+        Starts([str(i) for i in range(20)], rng.uniform(-60, 60, 20), rng.uniform(-180, 180, 20),
+               rng.uniform(0, 5e3, 20), rng.uniform(0, 360, 20), rng.uniform(30, 120, 20),
+               rng.uniform(-8, 8, 20))
+    )  # fmt: skip
+    turning = ScriptedTrajectory(
+        "t", lat_deg=50, lon_deg=8, alt_m=500, heading_deg=80, speed_mps=55,
+        legs=[Straight(duration_s=10), Turn(rate_deg_s=-2, duration_s=20), Climb(climb_mps=4)],
+    )  # fmt: skip
+    for targets in (straight, [*straight[:3], turning]):
+        time_s = np.array([4.0, 17.0, 25.0, 61.0])
+        times = np.broadcast_to(time_s[:, None], (4, len(targets)))
+        states = [flight.at(time_s) for flight in targets]
+        together = type(states[0])(
+            *(
+                np.stack(columns, axis=1)
+                for columns in zip(*(s.arrays() for s in states), strict=True)
+            )
+        )
+        found = Crabbing(wind, targets).of_targets(np.arange(len(targets)), together, times)
+        for place, flight in enumerate(targets):
+            a, b = flight.at(time_s - 0.05), flight.at(time_s + 0.05)
+            east, north, up = pymap3d.geodetic2enu(
+                b.lat_deg, b.lon_deg, b.alt_m, a.lat_deg, a.lon_deg, a.alt_m
+            )
+            through = np.array([east, north]) / 0.1 - np.array([[9.0], [-14.0]])
+            heading = np.arctan2(*through)
+            error = (found.yaw_rad[:, place] - heading + np.pi) % (2 * np.pi) - np.pi
+            np.testing.assert_allclose(error, 0.0, atol=2e-5)
+            pitch = np.arctan2(up / 0.1, np.hypot(*through))
+            np.testing.assert_allclose(found.pitch_rad[:, place], pitch, atol=2e-5)
+
+
+def test_who_drifts_with_the_air_points_along_the_track():
+    air = Wind(10 * math.sin(0.5), 10 * math.cos(0.5))
+    heading, airspeed = heading_and_airspeed(np.array([0.5]), np.array([10.0]), air)
+    assert heading[0] == 0.5 and airspeed[0] == pytest.approx(0.0, abs=1e-12)
