@@ -79,7 +79,7 @@ class Flights:
         self.duration_s = duration_s
         count = int(np.clip(MOST_POINTS // (len(self._targets) + 1), 60, 600))
         times = _times(source.own, duration_s, count)
-        own = source.own.at(times)
+        own = source.own_at(times)
         start = int(np.argmax(own.present))
         self._lat_deg = float(own.lat_deg[start])
         self._lon_deg = float(own.lon_deg[start])

@@ -216,8 +216,8 @@ class TrafficSource(Component):
             if self._culling is not None:
                 columns, fleet, near = self._culling.cut(time_s)
         states = fleet.at(time_s)
+        own = self._own_in_wind(own, time_s)
         for crabbing in self._crabbing:
-            own = crabbing.of_own(self.own, own, time_s)
             times = np.broadcast_to(time_s[:, np.newaxis], states.lat_deg.shape)
             states = crabbing.of_targets(columns, states, times)
         present = states.present & own.present[:, np.newaxis]
@@ -251,6 +251,15 @@ class TrafficSource(Component):
     def records(self) -> list[type[Message]]:
         """Return what is recorded: the truth where a scene is small, or asks for it."""
         return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
+
+    def own_at(self, time_s: FloatArray) -> TrajectoryState:
+        """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
+        return self._own_in_wind(self.own.at(time_s), time_s)
+
+    def _own_in_wind(self, own: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
+        for crabbing in self._crabbing:
+            own = crabbing.of_own(self.own, own, time_s)
+        return own
 
     def flights(
         self,

@@ -102,6 +102,17 @@ def test_a_beam_that_sweeps_meets_noses_in_the_wind():
     assert pose(row)[0] == pytest.approx(heading, abs=0.02)
 
 
+def test_the_truth_in_the_run_folder_is_a_wind_triangle():
+    own = {**OWN, "legs": [{"kind": "turn", "rate_deg_s": 2.0}]}
+    scene = chain({"radar": RADAR}, ownship=own, targets=[TARGET], weather=WIND, duration_s=3)
+    found = rows(run(scene), "truth")
+    assert len(found) >= 6
+    for row in found:
+        through = np.array([row["velocity_east_m_s"], row["velocity_north_m_s"]]) - AIR
+        turned = row["heading_rad"] - math.atan2(*through)
+        assert math.remainder(turned, 2 * math.pi) == pytest.approx(0.0, abs=2e-4)
+
+
 def test_a_fixed_attitude_stays_and_so_do_who_stand():
     fixed = {**OWN, "yaw_deg": 100.0, "roll_deg": 5.0}
     row = rows(run(chain({"radar": RADAR}, ownship=fixed, targets=[TARGET], weather=WIND)))[0]
