@@ -75,7 +75,6 @@ def test_the_ground_is_reported_where_it_crosses_and_no_more_where_the_threshold
     # By range: where the ground is.
     range_m = np.array([row["range_m"] for row in found["noise"]])
     depth = np.clip((range_m - 1000.0 + 1e-6) // 150.0, 0, 19).astype(int)
-    ]
     by_depth = np.bincount(depth, minlength=20)
     wanted = np.array([sum(p for (_, _, j), p in expected.items() if j == d) for d in range(20)])
     assert np.corrcoef(by_depth, wanted)[0, 1] > 0.9
