@@ -13,11 +13,13 @@ def encounters() -> None:
 
 
 @encounters.command()
-@click.argument("table", metavar="TABLE.csv")
+@click.argument("table", metavar="TABLE")
 @click.option("--nominal", required=True, metavar="COLUMN", help="Event without avoidance, 0 or 1.")
 @click.option("--mitigated", required=True, metavar="COLUMN", help="Event with avoidance, 0 or 1.")
 @click.option("--weight", metavar="COLUMN", help="Weight of each encounter [default: all 1].")
-@click.option("--by", metavar="COLUMN", help="Also a ratio for each class that this column names.")
+@click.option(
+    "--by", metavar="COLUMN[,...]", help="Also a ratio for each class that these columns name."
+)
 @click.option(
     "--edges",
     metavar="A,B,...",
@@ -45,7 +47,10 @@ def encounters() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON only.")
 @plain_errors
 def risk(**options: Any) -> None:
-    """Risk ratio of a TABLE with one row per encounter, run without and with avoidance."""
+    """Risk ratio of a TABLE with one row per encounter, run without and with avoidance.
+
+    TABLE is a .csv or .parquet file, or the folder of a study.
+    """
     from components.encounters.risk_table import show_risk
 
     show_risk(**options)

@@ -76,8 +76,11 @@ def _labels(
     if by is None:
         return np.zeros(len(content.lines), dtype=np.int64), {}
     if edges is None:
-        cells = content.column(by, "--by")
-        labels = np.array(["" if cell is None else str(cell) for cell in cells])
+        each = [content.column(name.strip(), "--by") for name in by.split(",")]
+        labels = np.array(
+            [", ".join("" if cell is None else str(cell) for cell in row)
+             for row in zip(*each, strict=True)]
+        )  # fmt: skip
         if len(np.unique(labels)) > _CLASSES:
             raise UsageError(
                 f"{content.path}: --by {by}: has more than {_CLASSES} values; give the edges of "

@@ -13,6 +13,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.files.input_files import (
     InputFileError,
+    is_folder,
     read_input_bytes,
     read_input_text,
     resolve_home,
@@ -66,6 +67,8 @@ def read_table(text: str) -> EncounterTable:
     """
     try:
         path = resolve_home(text)
+        if is_folder(path):
+            return _study(path)
         if path.suffix.lower() == ".parquet":
             return _parquet(path, read_input_bytes(path))
         content = read_input_text(path)
@@ -92,6 +95,28 @@ def read_table(text: str) -> EncounterTable:
         for place, name in enumerate(names)
     }
     return EncounterTable(path, columns, [line for line, _ in rows[1:]])
+
+
+def _study(path: Path) -> EncounterTable:
+    """Return the runs of a study's folder; those without result are left out."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    parts = sorted((path / "parts").glob("*.parquet"))
+    if not parts:
+        raise UsageError(f"{path}: is no folder of a study: there are no parts in it")
+    try:
+        table = pa.concat_tables([pq.read_table(p) for p in parts], promote_options="default")
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: a part is no whole Parquet file: {error}") from None
+    lines = list(range(1, table.num_rows + 1))
+    if "error" in table.column_names:
+        good = np.asarray(table["error"].is_null())
+        table = table.filter(good)
+        lines = (np.flatnonzero(good) + 1).tolist()
+    if not lines:
+        raise UsageError(f"{path}: no run of the study has a result")
+    return EncounterTable(path, {n: table[n].to_pylist() for n in table.column_names}, lines)
 
 
 def _parquet(path: Path, content: bytes) -> EncounterTable:

@@ -3,7 +3,7 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isnan
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight
+from components.messages.steering import Manoeuvre
 from components.traffic.censored import end_of_look, present_together_s
 from components.traffic.sample_times import (
     SampleTimes,
@@ -20,6 +21,7 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.source import TrafficSource
+from components.traffic.steered_flight import SteeredFlight
 from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -70,7 +72,9 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
-def separations(scene: Scene, step_s: float) -> "list[RelativeFlight]":
+def separations(
+    scene: Scene, step_s: float, told: Sequence[tuple[float, Manoeuvre]] = ()
+) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -78,6 +82,8 @@ def separations(scene: Scene, step_s: float) -> "list[RelativeFlight]":
     scene : Scene
     step_s : float
         Spacing of the grid; the times at which the source itself has samples are added.
+    told : sequence of (time in s, Manoeuvre)
+        What the ownship was told to fly, in order of time; by default it flies on.
     """
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
@@ -86,6 +92,10 @@ def separations(scene: Scene, step_s: float) -> "list[RelativeFlight]":
     context.duration_s = duration
     count = regular_count(step_s, float(duration))
     end_s = float(duration)
+    if told:
+        source.own = SteeredFlight(source.own)
+        for time_s, manoeuvre in told:
+            source.own = source.own.steered(time_s, manoeuvre)
     return [
         RelativeFlight(source, number, step_s, count, end_s)
         for number in range(len(source.targets))

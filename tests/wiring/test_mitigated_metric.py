@@ -1,0 +1,92 @@
+"""Events as flown and as they would have been, against the recorded truth of the same run."""
+
+from typing import Any
+
+import crooked
+import numpy as np
+import pymap3d
+import pytest
+from covering import covers
+from test_alert_time_metric import behind
+from wired import chain, measured, rows, run, sensor
+
+KIND = ("[metric mitigated]",)
+RADAR = sensor("radar.range_boundary", scan_rate_hz=20)
+SIZES = {"horizontal_m": 600.0, "vertical_m": 100.0, "nmac_horizontal_m": 150.0,
+         "nmac_vertical_m": 60.0}  # fmt: skip
+
+
+def scene(**wire: Any) -> dict[str, Any]:
+    """An aircraft catches up 50 m above, and is turned away from when it is 800 m near."""
+    found = chain(
+        {"radar": RADAR}, targets=[behind("near", 1500.0, 50.0)], duration_s=60,
+        fusion={"type": "fusion.pick_best"}, tracker={"type": "tracking.stub"},
+    )  # fmt: skip
+    found["blocks"]["avoidance"] = {
+        "type": "avoidance.turn_away", "range_km": 0.8, "turn_deg": 40, "pause_s": 100,
+    }  # fmt: skip
+    found["wires"] += [
+        "tracker -> avoidance",
+        {"from": "avoidance", "to": "traffic", "delay_s": 1.5, "holds": "nothing", **wire},
+    ]
+    return found
+
+
+@pytest.fixture(scope="module")
+def flown() -> np.ndarray:
+    """Horizontal and vertical distance over time, from the truth that the run records."""
+    truth = rows(run(scene()), "truth")
+    own = {row["time_s"]: row for row in truth if row["target"] is None}
+    found = []
+    for row in truth:
+        if row["target"] is not None:
+            here = (own[row["time_s"]][name] for name in ("lat_deg", "lon_deg", "alt_m"))
+            e, n, _ = pymap3d.geodetic2enu(row["lat_deg"], row["lon_deg"], row["alt_m"], *here)
+            found.append((np.hypot(e, n), abs(row["alt_m"] - own[row["time_s"]]["alt_m"])))
+    return np.array(found)
+
+
+def events(**keys: Any) -> dict[str, Any]:
+    return measured(scene(), {"metric": "mitigated", **SIZES, **keys})
+
+
+@covers("horizontal_m", "nmac_horizontal_m", of=KIND)
+def test_what_is_flown_is_what_the_truth_says(flown):
+    nearest = flown[:, 0].min()
+    assert 200 < nearest < 590  # it would have flown right under
+    for factor, happens in ((0.99, 0), (1.01, 1)):
+        size = nearest * factor
+        got = events(horizontal_m=size, nmac_horizontal_m=size, nmac_vertical_m=100.0)
+        assert (got["well_clear_lost_nominal"], got["nmac_nominal"]) == (1, 1)
+        assert (got["well_clear_lost_mitigated"], got["nmac_mitigated"]) == (happens, happens)
+
+
+@covers("vertical_m", "nmac_vertical_m", of=KIND)
+def test_heights_count_in_both():
+    got = events(vertical_m=45.0)
+    assert (got["well_clear_lost_nominal"], got["well_clear_lost_mitigated"]) == (0, 0)
+    assert (got["nmac_nominal"], got["nmac_mitigated"]) == (1, 0)
+    got = events(nmac_vertical_m=45.0)
+    assert (got["nmac_nominal"], got["well_clear_lost_mitigated"]) == (0, 1)
+
+
+@covers("step_s", of=KIND)
+def test_a_coarse_step_steps_over_a_short_event():
+    """Within 20 m for a second, which steps of 10 s do not see."""
+    sparse = scene()
+    sparse["blocks"]["traffic"]["sample_interval_s"] = 100.0
+    keys = {"metric": "mitigated", **SIZES, "nmac_horizontal_m": 20.0}
+    found = [measured(sparse, {**keys, "step_s": s})["nmac_nominal"] for s in (0.1, 10.0)]
+    assert found == [1, 0]
+
+
+@pytest.mark.parametrize("wire", [{"jitter_s": 0.1}, {"drop_probability": 0.1}])
+def test_a_wire_whose_delay_is_not_known_is_refused(wire):
+    with pytest.raises(Exception, match="must have a fixed delay in"):
+        measured(scene(**wire), {"metric": "mitigated"})
+
+
+def test_without_a_loop_there_is_nothing_to_compare():
+    open_loop = chain({"radar": RADAR}, targets=[crooked.ROLLING], duration_s=2)
+    with pytest.raises(Exception, match="manoeuvres"):
+        measured(open_loop, {"metric": "mitigated"})
