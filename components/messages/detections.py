@@ -220,8 +220,8 @@ class Detections(Message):
 
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
-        # A sensor without a rule declares what it detects; no target is behind a false alarm.
-        return {"declared": self.target >= 0, **self.extras}
+        # A sensor without a rule declares whatever it reports: it knows of no false alarm.
+        return {"declared": np.ones(len(self.target), dtype=bool), **self.extras}
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""

@@ -133,7 +133,7 @@ class Sweep:
     ) -> dict[str, FloatArray] | None:
         """Return the believed pose at each entry's own instant, with the error of its scan."""
         believed = detections.pose_columns()
-        if not believed or targets.revisit is None or not len(targets.roster):
+        if not (believed and targets.revisit and len(targets.roster) and len(row)):
             return None
         if len(row) == 0:  # flights need not answer for no instant at all
             return believed

@@ -1,5 +1,6 @@
 """False alarms as an effect: what noise alone adds to a radar's report."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
-from components.radar.false_alarms import false_alarm_count, false_alarm_snr
+from components.radar.false_alarms import false_alarm_count, false_alarm_snr, measured_snr
 from components.radar.field_of_view import cells_of_radar
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -22,6 +23,8 @@ class FalseAlarms(Effect):
 
     Every resolution cell from the minimum range to ``range_km`` may bring one. They are reported
     on the sensor's grid after the true detections of their scan, with no target and nothing true.
+    Where there are some, ``snr_db`` and ``confidence`` are of the output that crossed the
+    threshold, for targets too, and ``detection_probability`` is null for all (``looks`` has it).
     """
 
     lockstep = True
@@ -72,11 +75,13 @@ class NoiseReports:
             )
         self._counts = block.stream("false alarms")
         self._places = block.stream("false alarm places")
+        self._strengths = block.stream("measured strength")
 
     def __call__(
         self, detections: Detections, targets: RelativeTargets, rows: IntArray
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
+        detections = self._as_measured(detections)
         count = false_alarm_count(
             self._counts.uniform(_NO_TARGET, detections.scan),
             cells=self._cells.count,
@@ -116,6 +121,26 @@ class NoiseReports:
             extras={"snr_db": snr_db},
             measured=measured,
         )
+
+    def _as_measured(self, detections: Detections) -> Detections:
+        """Return true detections with what a radar knows of them, as it does of false alarms.
+
+        Their SNR and confidence are those of the output that crossed the threshold, and the
+        probability of detection, which only the truth gives, is left out.
+        """
+        extras = dict(detections.extras)
+        extras.pop("detection_probability", None)
+        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
+        keys = detections.roster.keys_of(detections.target)
+        snr = measured_snr(
+            self._strengths.uniform(keys, detections.scan[row]),
+            10.0 ** (0.1 * detections.extras["snr_db"]),
+            false_alarm_probability=self._pfa,
+            pulses=self._block.p.pulses_summed,
+        )
+        extras["snr_db"] = 10.0 * np.log10(np.maximum(snr, 1e-6))
+        confidence = extras["snr_db"] - self._block.false_alarm_zero_db()
+        return replace(detections, extras=extras, confidence=confidence)
 
 
 def _between(uniform: Any, field: tuple[float, float]) -> Any:

@@ -60,6 +60,8 @@ class Declarations:
             cells.target, look.detected, self.m, self.n, self._memory
         )
         self._note_first(cells, np.flatnonzero(declared))
+        if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
+            return look
         return replace(look, extras={**look.extras, "declared": declared})
 
     def _note_first(self, cells: "Cells", declared: IntArray) -> None:

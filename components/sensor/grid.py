@@ -20,6 +20,9 @@ VARIANCE_OF = {
 }
 AZIMUTH, ELEVATION = VARIANCE_OF["azimuth"], VARIANCE_OF["elevation"]
 
+# The shortest range that is reported where there is no grid.
+_NEAREST_M = 1e-3
+
 # Grids are the same in every run of a scene: they are made once.
 _grid = lru_cache(maxsize=256)(Grid)
 
@@ -83,8 +86,7 @@ class SensorGrid:
     @cached_property
     def _range_grid(self) -> Grid:
         # Nothing is at range 0, however near it comes: the first step is the nearest report.
-        step = self._range_step or 0.0
-        return _grid(step, limit_low=step)
+        return _grid(self._range_step or 0.0, limit_low=self._range_step or _NEAREST_M)
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:

@@ -24,6 +24,9 @@ class Grain:
         Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
     queues : dict
         Shared processors that serve a window at once, and the blocks that line up at each.
+    rehearsed : bool
+        Whether what shared processors do is rehearsed before each window, which is undone where
+        that was wrong.
     """
 
     windowed: set[str]
@@ -31,6 +34,7 @@ class Grain:
     cut_edges: set[tuple[str, str]]
     unwound: dict[str, str]
     queues: dict[str, list[str]] = field(default_factory=dict)
+    rehearsed: bool = False
 
     def order(self, scene: Scene) -> dict[str, int]:
         """Return the place of each block and each queue in a window (`window_order`)."""
@@ -53,6 +57,8 @@ def grain_of(scene: Scene, window: int | None, check_rewinding: bool) -> Grain:
         raise _nothing_rewinds(scene, unwound)
     if window == 1:
         return Grain(set(), False, set(), unwound)
+    if scene.rehearsed:
+        return Grain(set(scene.blocks), False, set(), unwound, rehearsed=True)
     queues = {name: scene.queues[name] for name in sorted(scene.windowed_queues())}
     return Grain(scene.look_ahead_blocks(), False, set(), unwound, queues)
 

@@ -29,6 +29,8 @@ from dsa_des.running.node import Abort
 from dsa_des.running.nodes import build_nodes, start_processors
 from dsa_des.running.pinpoint import pinpoint
 from dsa_des.running.processors import Processing
+from dsa_des.running.rehearsed_lines import RehearsedLines
+from dsa_des.running.rehearsed_windows import RehearsedWindows
 from dsa_des.running.rewind import Rewinder
 from dsa_des.running.rewind_check import WindowsRunTwice
 from dsa_des.running.run_state import RunningBlock
@@ -36,6 +38,7 @@ from dsa_des.running.timeline import Timeline
 from dsa_des.running.timing_effects import timing_plan
 from dsa_des.running.window_size import longest_window, refuse_endless_work, scans_of
 from dsa_des.running.windows import Failure, Window, Windows
+from dsa_des.scene.graph import depths
 from dsa_des.scene.scene import Scene
 
 
@@ -165,6 +168,11 @@ class Simulation:
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(longest, self._cuts, rewinder)
+        for lines in processors.values():
+            if isinstance(lines, RehearsedLines) and not isinstance(self.windows, RehearsedWindows):
+                lines.cast(self.nodes, depths(scene.graph))
+                rewinder = Rewinder(self.nodes.values(), set(), recorder, trace)
+                self.windows = RehearsedWindows(self.end_tick, longest, self._cuts, rewinder, lines)
         if check_rewinding and rewinder is not None:
             self.windows = WindowsRunTwice(self.windows, rewinder, self.nodes, self.ticks_per_s)
 

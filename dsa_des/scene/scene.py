@@ -15,7 +15,13 @@ from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block import Block
 from dsa_des.scene.changeable import Changeable
 from dsa_des.scene.checks import check_activity, check_effects, check_times
-from dsa_des.scene.graph import build_graph, check_graph, windowed_blocks, windowed_queues
+from dsa_des.scene.graph import (
+    build_graph,
+    can_be_rehearsed,
+    check_graph,
+    windowed_blocks,
+    windowed_queues,
+)
 from dsa_des.scene.options import with_latencies
 from dsa_des.scene.overrides import apply_set, apply_swap
 from dsa_des.scene.parts import (
@@ -104,6 +110,8 @@ class Scene(Changeable):
 
     def look_ahead_blocks(self) -> set[str]:
         """Return the blocks that may run in look-ahead windows."""
+        if self.rehearsed:
+            return set(self.blocks)
         apart = set(self.queues) - self.windowed_queues()
         queued = [block for name in apart for block in self.queues[name]]
         return windowed_blocks(self.graph, self.classes, queued)
@@ -121,6 +129,14 @@ class Scene(Changeable):
         """Return the shared processors that serve a look-ahead window at once."""
         able = [name for name, p in self.processors.items() if p.when_busy != "skip"]
         return windowed_queues(self.graph, self.classes, self.queues, able) if able else set()
+
+    @property
+    def rehearsed(self) -> bool:
+        """Whether windows are rehearsed because a shared processor could not serve one at once."""
+        if not self.processors or set(self.queues) <= self.windowed_queues():
+            return False
+        skipping = [name for name, p in self.processors.items() if p.when_busy == "skip"]
+        return can_be_rehearsed(self.graph, self.classes, self.queues, skipping)
 
     def resolved(self) -> dict[str, Any]:
         """Return the scene with every parameter written out, as plain TOML values."""

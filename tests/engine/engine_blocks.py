@@ -135,6 +135,17 @@ class Relay(Component):
         return beat(wake.ticks, 2 * message.value + 1, message.scan)
 
 
+class Fickle(Relay):
+    """Passes on some of what it hears."""
+
+    rewindable = True
+
+    def run(self, wake):
+        message = wake["in"]
+        kept = np.flatnonzero(message.value * 8.0 % 1.0 < 0.5)
+        return beat(wake.ticks[kept], message.value[kept], message.scan[kept])
+
+
 class SlowRelay(Relay):
     """The same, one instant at a time."""
 

@@ -107,3 +107,12 @@ def test_explain_says_that_pick_best_goes_by_the_truth():
         sentences[kind] = " ".join(block.left_out())
     assert "association by truth" in sentences["fusion.pick_best"]
     assert "truth" not in sentences["fusion.gated"]
+
+
+def test_nothing_is_reported_at_range_0():
+    near = {**crooked.ROLLING, "name": "near", "east_m": 20.0, "north_m": 10.0, "up_m": 5.0}
+    for resolution_m, reported in ((150.0, 150.0), (0.0, None)):
+        radar = {**HEARS_ALL, "range_resolution_m": resolution_m, "minimum_range_m": 1.0}
+        found = rows(run(chain({"radar": radar}, targets=[near])))
+        assert len(found) == 1 and found[0]["range_m"] > 0.0
+        assert reported is None or found[0]["range_m"] == reported

@@ -23,14 +23,13 @@ def recorded():
     return run(chain(SENSORS, duration_s=3, fusion={"type": "fusion.pick_best"}))
 
 
-def test_noise_has_no_truth_and_declares_no_target(recorded):
+def test_noise_has_no_truth_and_nothing_else_tells_it_from_a_target(recorded):
     for name in SENSORS:
         found = rows(recorded, block=name, target=None)
         assert len(found) > 8
         for row in found:
             assert all(row[key] is None for key in TRUTH)
-            assert row["declared"] is False
-    assert all(row["declared"] for row in rows(recorded) if row["target"] is not None)
+    assert all(row["declared"] and row["detection_probability"] is None for row in rows(recorded))
 
 
 def test_each_scan_counts_what_it_reports(recorded):
