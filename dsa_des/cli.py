@@ -195,7 +195,7 @@ _workers_option = click.option(
 
 
 @main.command()
-@click.argument("words", nargs=-1, metavar="STUDY.toml | show FOLDER")
+@click.argument("words", nargs=-1, metavar="STUDY.toml | show FOLDER | report FOLDER")
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Change one value of the study file."
 )
@@ -209,7 +209,10 @@ _workers_option = click.option(
 @click.option("--quiet", is_flag=True, help="Print no tables.")
 @plain_errors
 def study(**options: Any) -> None:
-    """Run a STUDY: many runs of a scene over axes and random draws, with their statistics."""
+    """Run a STUDY: many runs of a scene over axes and random draws, with their statistics.
+
+    `show` prints the tables of a folder, `report` writes them as one self-contained HTML page.
+    """
     from dsa_des.commands.study import study_command
 
     study_command(**options)

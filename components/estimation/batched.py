@@ -7,14 +7,17 @@ computed with it; sums run over components in a fixed order.
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 
 def product(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left · right for matrices (a, k, n) and (k, b, n)."""
     total = left[:, 0, np.newaxis] * right[np.newaxis, 0]
-    for k in range(1, left.shape[1]):
-        total += left[:, k, np.newaxis] * right[np.newaxis, k]
+    if left.shape[1] > 1:
+        term = np.empty_like(total)  # one for all terms: memory is the cost here
+        for k in range(1, left.shape[1]):
+            np.multiply(left[:, k, np.newaxis], right[np.newaxis, k], out=term)
+            total += term
     return total
 
 
@@ -29,6 +32,11 @@ def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     for k in range(1, matrix.shape[1]):
         total += matrix[:, k] * vector[k]
     return total
+
+
+def is_everything(which: IntArray, count: int) -> bool:
+    """Return whether an index array takes all of `count` in their order: nothing need be copied."""
+    return len(which) == count and bool((which == np.arange(count)).all())
 
 
 def symmetric(matrix: FloatArray) -> FloatArray:

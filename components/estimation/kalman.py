@@ -10,6 +10,7 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
+    is_everything,
     log_determinant,
     product,
     product_transposed,
@@ -78,7 +79,7 @@ class Moments:
         """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
         spread = self.left_over
-        if which is not None:
+        if which is not None and not is_everything(which, expected.shape[1]):
             expected, total = expected[..., which], total[..., which]
             cross, jacobian = cross[..., which], jacobian[..., which]
             spread = None if spread is None else spread[..., which]

@@ -11,7 +11,6 @@ from components.radar.scatterers import CHANGING, FIXED, Scatterers
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 from dsa_des.time.gauss_markov import GaussMarkov
 
 #: (cells, chosen of them, Swerling model) → power of each echo over its mean.
@@ -58,6 +57,7 @@ class LastingFluctuation(Effect):
     An aspect table's mean is multiplied by it.
     """
 
+    lockstep = True
     name = "lasting fluctuation"
     acts_on = "fading"
     neutral = False
@@ -75,11 +75,9 @@ class LastingFluctuation(Effect):
             return Verdict(False, fluctuates.because)
         said = []
         if lasts_s is not None:
-            period_s = float(1 / block.p.scan_rate_hz)
-            again = f"{np.exp(-2.0 * period_s / lasts_s):.3g}"
             said.append(
-                f"fluctuation_correlation_s is {lasts_s:g}: the power of two scans in a row is "
-                f"correlated with {again}"
+                f"fluctuation_correlation_s is {lasts_s:g}: the power of looks {lasts_s / 2:g} s "
+                "apart is correlated with 0.368"
             )
         if extent_m is not None:
             apart_deg = np.degrees(0.5 * block.budget.wavelength / extent_m)
@@ -101,15 +99,16 @@ class LastingFluctuation(Effect):
                 block.budget.wavelength,
                 FIXED if process is None else CHANGING,
             )
-        ticks_per_s = block.context.ticks_per_s
 
         def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
             keys = cells.roster.keys_of(cells.target)[chosen]
-            instant_ns = _instants_ns(cells, ticks_per_s)[chosen]
+            instant_ns, replica = cells.instant_ns[chosen], cells.replica[chosen]
 
             def pair(number: int) -> tuple[FloatArray, FloatArray]:
                 assert process is not None
-                real, imaginary = (process(keys, instant_ns, 2 * number + part) for part in (0, 1))
+                real, imaginary = (
+                    process(keys, instant_ns, 2 * number + part, replica) for part in (0, 1)
+                )
                 return real, imaginary
 
             amplitudes: list[FloatArray] = []
@@ -119,7 +118,7 @@ class LastingFluctuation(Effect):
                     continue
                 aspect = _aspect(cells, chosen)
                 strengths = None if process is None else pair
-                amplitudes += scatterers.echo(keys, aspect, which, strengths)
+                amplitudes += scatterers.echo(keys, aspect, which, strengths, replica)
             return fading_power(amplitudes)
 
         return fading
@@ -136,12 +135,3 @@ def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArr
     )
     x, y, z = unit_vector(azimuth[chosen], elevation[chosen])
     return x, y, z
-
-
-def _instants_ns(cells: Cells, ticks_per_s: int) -> Any:
-    """Return when each cell is looked at: at its scan, or when a sweeping beam meets it."""
-    instant = nanosecond_of(cells.scan_ticks, ticks_per_s)[cells.row]
-    offset_s = getattr(cells, "offset_s", None)
-    if offset_s is None:
-        return instant
-    return instant + np.rint(offset_s * NANOSECONDS).astype(np.int64)

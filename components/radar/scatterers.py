@@ -10,6 +10,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import first_scan
 
 #: Scatterers of an echo whose strengths are fixed, and of one whose strengths change with time.
 #: Gaussian strengths make the power exponential for any number, over targets; over all aspects of
@@ -54,6 +55,7 @@ class Scatterers:
         aspect: tuple[FloatArray, FloatArray, FloatArray],
         which: int,
         strengths: Callable[[int], tuple[FloatArray, FloatArray]] | None = None,
+        replica: IntArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return real and imaginary part of the amplitude of echoes, each of variance 1.
 
@@ -68,15 +70,21 @@ class Scatterers:
         strengths : callable, optional
             From a scatterer's number to standard normal numbers, (n,) twice; by default they are
             fixed to the target.
+        replica : (n,) array of int, optional
+            Where replicas run in lock step, whose targets they are.
 
         Returns
         -------
         two (n,) arrays
         """
-        targets, of_target = np.unique(keys, return_inverse=True)
+        whose = np.zeros(len(keys), dtype=np.uint64) if replica is None else replica
+        pairs = np.stack([keys, whose.astype(np.uint64)])
+        (targets, runs), of_target = np.unique(pairs, axis=1, return_inverse=True)
+        of_target = of_target.reshape(-1)
+        begin = runs.astype(np.int64) * first_scan(1)
         real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
         for number in range(which * self._count, (which + 1) * self._count):
-            numbers = np.full(len(targets), number, dtype=np.int64)
+            numbers = begin + number
             place = self._places(targets, numbers)
             # One after the other, so that an element's sum has one order in any array.
             phase = np.zeros(len(keys))

@@ -10,9 +10,10 @@ class TimeBudget(Effect):
     """Energy of a look from the time that a scan leaves for each beam.
 
     A radar's link budget then differs with its scan rate, so replicas that differ in it have
-    instances of their own.
+    instances of their own: reading the rate is seen (`dsa_des.replicas.watched_parameters`).
     """
 
+    lockstep = True
     name = "time budget"
     acts_on = "energy of a look"
     neutral = False

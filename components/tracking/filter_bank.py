@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from components.estimation import modes
-from components.estimation.batched import symmetric
+from components.estimation.batched import is_everything, symmetric
 from components.estimation.frame import Place
 from components.estimation.kalman import (
     Innovation,
@@ -137,17 +137,19 @@ class FilterBank:
         which : (k,)
             The pair of each.
         """
-        moved = []
-        for x, p, found, apart in zip(
-            states, covariances, pairs.innovations, pairs.residuals, strict=True
-        ):
-            whole = len(which) == apart.shape[1]
-            moved.append(
-                updated(
-                    x[:, track], p[:, :, track],
-                    found if whole else found.take(which), apart if whole else apart[:, which],
-                )
-            )  # fmt: skip
+        every = is_everything(track, weights.shape[1])
+        whole = is_everything(which, pairs.residuals[0].shape[1])
+        moved = [
+            updated(
+                x if every else x[:, track],
+                p if every else p[:, :, track],
+                found if whole else found.take(which),
+                apart if whole else apart[:, which],
+            )
+            for x, p, found, apart in zip(
+                states, covariances, pairs.innovations, pairs.residuals, strict=True
+            )
+        ]
         if len(self.models) == 1:
             new = weights[:, track]
         else:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.association.gates import gate_threshold
+from components.estimation.batched import is_everything
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind
@@ -158,12 +159,11 @@ def named(states: list[FloatArray], covariances: list[FloatArray]) -> dict[str, 
 
 def put(part: TrackStore, which: IntArray, new: dict[str, Any]) -> TrackStore:
     """Return tracks with other values in some columns of some of them."""
+    if is_everything(which, len(part)):
+        return part.with_columns(**new)
     changed = {}
     for name, values in new.items():
-        if len(which) == len(part):  # which is ascending or a permutation
-            whole = np.empty_like(part.columns[name])
-        else:
-            whole = part.columns[name].copy()
+        whole = part.columns[name].copy()
         whole[..., which] = values
         changed[name] = whole
     return part.with_columns(**changed)

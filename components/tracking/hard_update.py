@@ -44,6 +44,7 @@ def updated_by_one(
         first = last
         if len(mine) == 0:
             continue
+        mine = mine[np.argsort(one.track[mine])]
         which = one.track[mine]
         states, covariances, weights = rules.bank.update(
             part.states(), part.covariances(), part.weights, which, one.said, mine

@@ -92,7 +92,10 @@ def state_tracks(
     state, covariance = store.state(models)
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(look), axis=2)
     seen, by_state = linearised(Kind(False), state, Place(places.position_m[:, look], axes))
-    spread = product_transposed(product(by_state, covariance[:3, :3]), by_state)
+    position = np.stack(
+        [np.stack([covariance[min(i, j), max(i, j)] for j in range(3)]) for i in range(3)]
+    )
+    spread = product_transposed(product(by_state, position), by_state)
     unknown = ~store.plain("ranged")
     hidden = bool(unknown.any())
 
@@ -121,7 +124,7 @@ def state_tracks(
         origin_lat_deg=origin[0, look],
         origin_lon_deg=origin[1, look],
         origin_alt_m=origin[2, look],
-        covariance={name: known(covariance[i, j]) for (i, j), name in COVARIANCE.items()},
+        covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
         extras={} if models == 1 else store.extras(models, known),
         sensors=sensors,
         **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
@@ -143,19 +146,21 @@ class _Columns:
         """Return one component of a vector, or one element of a matrix."""
         return np.concatenate([part[name][place] for part in self._parts])[self._order]
 
-    def state(self, models: int) -> tuple[FloatArray, FloatArray]:
-        """Return position and velocity with their covariance, over all models."""
+    def state(self, models: int) -> tuple[FloatArray, dict[tuple[int, int], FloatArray]]:
+        """Return position and velocity, and their covariance by its elements, over all models."""
         states, covariances = [], []
         for m in range(models):
             states.append(np.stack([self.element(f"state{m}", i) for i in range(6)]))
-            whole = np.empty((6, 6, len(self._order)))
-            for i, j in COVARIANCE:
-                whole[i, j] = whole[j, i] = self.element(f"covariance{m}", i, j)
-            covariances.append(whole)
+            covariances.append({k: self.element(f"covariance{m}", *k) for k in COVARIANCE})
         if models == 1:
             return states[0], covariances[0]
         weights = np.stack([self.element("weights", m) for m in range(models)])
-        return modes.combined(states, covariances, weights)
+        whole = [
+            np.stack([np.stack([one[min(i, j), max(i, j)] for j in range(6)]) for i in range(6)])
+            for one in covariances
+        ]
+        state, covariance = modes.combined(states, whole, weights)
+        return state, {place: covariance[place] for place in COVARIANCE}
 
     def extras(
         self, models: int, known: Callable[[FloatArray], FloatArray]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import claim_folder, named
 from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
@@ -46,7 +47,9 @@ def study_command(
         _list_metrics()
     elif len(words) == 2 and words[0] == "show":
         show_study(Path(words[1]), draw=not no_figures)
-    elif len(words) == 1 and words[0] != "show":
+    elif len(words) == 2 and words[0] == "report":
+        _report(Path(words[1]), out, draw=not no_figures)
+    elif len(words) == 1 and words[0] not in ("show", "report"):
         study = read_study(chosen_file(words[0], "study"), sets=sets)
 
         def again(path: Path) -> str:
@@ -60,7 +63,7 @@ def study_command(
             _stopped("interrupted", again(folder.path), 130)
         tell_crashed([tables], again(folder.path))
     else:
-        raise UsageError("give STUDY.toml, or: show FOLDER")
+        raise UsageError("give STUDY.toml, or: show FOLDER, or: report FOLDER")
 
 
 def _target(study: Study, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
@@ -222,6 +225,23 @@ def show_study(
     folder = StudyFolder(path)
     every = known_results(folder.record.results_list(), only)
     finish(folder.record, folder, only=only or every, first=first, draw=draw)
+
+
+def _report(path: Path, out: str | None, *, draw: bool) -> None:
+    """Write one HTML page about a study's folder, into it or where `--out` says."""
+    from dsa_des.studies.report import REPORT, study_report
+
+    folder = StudyFolder(path)
+    target = path / REPORT if out is None else named(out)
+    if out is not None:
+        check_file(target)
+    try:
+        if draw:
+            Tables(folder.record, folder).draw()
+        write_file(target, study_report(folder))
+    except OSError as error:
+        raise UsageError(f"{target}: cannot be written: {error.strerror or error}") from error
+    say(f"wrote {target}")
 
 
 def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:

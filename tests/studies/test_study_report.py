@@ -1,0 +1,67 @@
+"""``dsa-des study report``: one page that holds all and loads nothing."""
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dsa_des.cli import main
+
+ROOT = Path(__file__).parents[2]
+STUDY = """\
+scene = "SCENE"
+title = "Ranges <b>& phases</b>"
+replicas = 3
+metrics = ["first_detection"]
+compare = { axis = "blocks.radar.scan_rate_hz", baseline = 1 }
+[set]
+duration_s = 10
+[axes]
+blocks.radar.scan_rate_hz = [1, 5]
+[draws]
+blocks.radar.offset_s = { uniform = [0, 0.2] }
+[[figures]]
+metric = "detected.radar"
+axis = "blocks.radar.scan_rate_hz"
+"""
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(main, ["study", *(str(w) for w in words)], catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("report")
+    scene = ROOT / "configs" / "first_light.toml"
+    (home / "s.toml").write_text(STUDY.replace("SCENE", str(scene)), encoding="utf-8")
+    done = call(home / "s.toml", "--out", home / "out", "--workers", 1, "--quiet")
+    assert done.exit_code == 0, done.output
+    return home / "out"
+
+
+def test_the_page_holds_what_was_asked_and_what_came_of_it(folder: Path) -> None:
+    done = call("report", folder)
+    assert done.exit_code == 0 and "report.html" in done.stdout
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for said in (
+        "What was asked", "radar.scan_rate_hz", "blocks.radar.offset_s", "first_light.toml",
+        "dsa-des explain", "detected.radar", "Paired differences", "data:image/png;base64,",
+        "6 done", "SHA-256", "part-000-000000.parquet", "dsa-des run", "numpy",
+    ):  # fmt: skip
+        assert said in page, said
+    # A title is text, and nothing comes from elsewhere.
+    assert "Ranges &lt;b&gt;&amp; phases&lt;/b&gt;" in page and "<b>" not in page
+    assert not re.findall(r"""(?:src|href)=["'](?!data:)""", page)
+    again = folder / "report.html"
+    first = again.read_bytes()
+    call("report", folder)
+    assert again.read_bytes() == first
+
+
+def test_it_can_stand_elsewhere_and_says_what_is_no_study(folder: Path, tmp_path: Path) -> None:
+    assert call("report", folder, "--out", tmp_path / "page.html", "--no-figures").exit_code == 0
+    assert (tmp_path / "page.html").stat().st_size > 3000
+    done = call("report", tmp_path)
+    assert done.exit_code == 2 and "is not the folder of a study" in done.stderr
