@@ -77,13 +77,10 @@ def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
     """
     if terrain is None or parameters.clutter_threshold != "noise":
         return []
-    said = (
+    return [
         "clutter_threshold is 'noise': the echo of the ground counts as signal, so that clutter "
         "raises detections; 'adaptive' keeps the probability of false alarm"
-    )
-    if getattr(parameters, "false_alarms", False):
-        said += ". Of false alarms only those of noise are reported, not the ground's"
-    return [said]
+    ]
 
 
 def many_false_alarms(parameters: Any, cells: int) -> list[str]:

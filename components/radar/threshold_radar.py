@@ -13,6 +13,7 @@ from components.messages.detections import Detections
 from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
+from components.radar.clutter_alarms import ClutterAlarms
 from components.radar.clutter_effects import GroundClutter, terrain_of
 from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
@@ -68,6 +69,7 @@ class LinkBudgetRadar(Radar):
         CellAveraging(),
         OneReportByCell(),
         FalseAlarms(),
+        ClutterAlarms(),
         TimeBudget(),
         BeamSweep(),
     )

@@ -133,7 +133,8 @@ class Scene(Changeable):
     @property
     def rehearsed(self) -> bool:
         """Whether windows are rehearsed because a shared processor could not serve one at once."""
-        if not self.processors or set(self.queues) <= self.windowed_queues():
+        used = {name for name, blocks in self.queues.items() if blocks}
+        if not used or used <= self.windowed_queues():
             return False
         skipping = [name for name, p in self.processors.items() if p.when_busy == "skip"]
         return can_be_rehearsed(self.graph, self.classes, self.queues, skipping)

@@ -192,3 +192,10 @@ def test_a_failure_is_that_of_message_by_message(lab):
                 lab.run(path, window=window)
         said.append(str(failure.value))
     assert said == said[:1] * len(said)
+
+
+def test_a_processor_that_nobody_uses_changes_nothing(lab):
+    path = lab.write({"radar": "Pulse; scan_rate_hz = 4", "sink": "Relay"}, ['"radar -> sink"'])
+    alone = lab.run(path).tables["beats"]
+    path.write_text(path.read_text() + '\n[processors.idle]\nservice_s = 1\nwhen_busy = "skip"\n')
+    assert lab.run(path).tables["beats"].equals(alone)

@@ -65,7 +65,7 @@ cell of each target, as far as the beam meets it. The threshold rises with it (`
 "adaptive"`, the default): the false alarms stay what they are, a target needs its SNR over noise
 *and* clutter, and every radar sees less far. With `"noise"` the threshold stays where noise alone
 has it, as it did before there was a choice: then clutter is detected as if it were the target, and
-`check` says so.
+`check` says so; with `false_alarms` the ground is reported in every cell in which it crosses.
 
 By default the mean power of noise and clutter is known. A real radar averages the cells around:
 `cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few

@@ -1,0 +1,199 @@
+"""False alarms of the ground as an effect: clutter that crosses a threshold set for noise."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from components.geometry.attitude import body_to_ned, unit_vector
+from components.messages.detections import Detections
+from components.messages.false_detections import add_false_detections
+from components.messages.targets import RelativeTargets
+from components.radar.clutter import clutter_detection_probability
+from components.radar.clutter_effects import beamwidths_rad, terrain_of
+from components.radar.false_alarm_effects import MOST_PER_SCAN
+from components.radar.field_of_view import cells_of_radar
+from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, ground_clutter_rcs_m2
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+
+
+class ClutterAlarms(Effect):
+    """Reports of cells in which the ground crosses the threshold that noise does not.
+
+    With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
+    ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
+    be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
+    where the ownship believes to look; behind a moving-target filter none is reported.
+    """
+
+    lockstep = True
+    name = "clutter false alarms"
+    acts_on = "report"
+    neutral = False
+    outside_the_proof = "a report without the ground is what there is without it"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
+        p = block.p
+        if not (p.false_alarms and p.enabled):
+            return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
+        if terrain_of(block) is None:
+            return Verdict(False, "[terrain] height_m is not given")
+        if p.clutter_threshold != "noise":
+            return Verdict(False, "clutter_threshold is 'adaptive': they are as many as of noise")
+        if p.moving_target_filter != "none":
+            return Verdict(False, f"moving_target_filter is {p.moving_target_filter!r}")
+        return Verdict(True, "clutter_threshold is 'noise'")
+
+    def build(self, block: Any) -> "GroundReports":
+        """Return what adds the ground's false alarms to a report."""
+        return GroundReports(block)
+
+
+class _GroundCells:
+    """Cells of the ground as effects on the SNR ask for them."""
+
+    def __init__(self, range_m: FloatArray, own_alt_m: float, ground_alt_m: float) -> None:
+        self.range_m = range_m
+        self.alt_m = np.full(len(range_m), ground_alt_m)
+        self._own_alt_m = own_alt_m
+
+    def __len__(self) -> int:
+        return len(self.range_m)
+
+    def of_row(self, name: str) -> AnyArray:
+        """Return the ownship's altitude for each cell."""
+        assert name == "own_alt_m"
+        return np.full(len(self), self._own_alt_m)
+
+
+class GroundReports:
+    """Draws for every cell that holds ground, keyed by cell and scan.
+
+    Parameters
+    ----------
+    block : LinkBudgetRadar
+    """
+
+    def __init__(self, block: Any) -> None:
+        self._block, self._terrain = block, terrain_of(block)
+        self._cells = cells = cells_of_radar(block)
+        self._beam_rad = beamwidths_rad(block)
+        self._draws = block.stream("clutter false alarms")
+        self._pfa = block.p.cell_pfa
+        axes = (
+            (cells.azimuth_rad, cells.azimuth),
+            (cells.elevation_rad, cells.elevation),
+            (cells.range_m, cells.range),
+        )
+        #: Size of the cells, and their first edges.
+        self._size = [width / count for (_, width), count in axes]
+        self._start = [start for (start, _), _ in axes]
+        centres = [
+            start + (np.arange(count) + 0.5) * size
+            for ((start, _), count), size in zip(axes, self._size, strict=True)
+        ]
+        self._range_m = centres[2]
+        azimuth, elevation = (grid.ravel() for grid in np.meshgrid(*centres[:2], indexing="ij"))
+        self._body = unit_vector(*block.axes.pointing(azimuth, elevation))
+
+    def __call__(
+        self, detections: Detections, targets: RelativeTargets, rows: IntArray
+    ) -> Detections:
+        """Return the report with the ground's false alarms of its scans."""
+        numbers = zip(rows.tolist(), detections.scan.tolist(), strict=True)
+        found = [self._of_scan(targets, row, scan) for row, scan in numbers]
+        counts = [len(cell) for cell, _ in found]
+        row = np.repeat(np.arange(len(found)), counts)
+        if len(row) == 0:
+            return detections
+        cell, cnr = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        scan, key = detections.scan[row], cell.astype(np.uint64)
+        beam, depth = np.divmod(cell, self._cells.range)
+        across, upwards = np.divmod(beam, self._cells.elevation)
+        where = {
+            name: start + (number + self._draws.uniform(key, scan, draw)) * size
+            for draw, (name, number, start, size) in enumerate(
+                zip(("azimuth", "elevation", "range"), (across, upwards, depth), self._start,
+                    self._size, strict=True), start=1,
+            )
+        }  # fmt: skip
+        # What lies beyond the threshold of an exponential power is exponential again.
+        beyond = -np.log1p(-self._draws.uniform(key, scan, 4)) * (1.0 + cnr)
+        snr = np.maximum(beyond - math.log(self._pfa) - 1.0, 1e-6)
+        if self._block.p.measures_range_rate:
+            rate = self._block.noise_range_rate(self._draws.uniform(key, scan, 5))
+            where["range_rate"] = rate
+        azimuth, elevation, range_m, measured = self._block.report_noise(where, {"snr": snr})
+        snr_db = 10.0 * np.log10(snr)
+        return add_false_detections(
+            detections,
+            row,
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
+            range_m=range_m,
+            confidence=snr_db - self._block.false_alarm_zero_db(),
+            extras={"snr_db": snr_db},
+            measured=measured,
+        )
+
+    def _of_scan(
+        self, targets: RelativeTargets, row: int, scan: int
+    ) -> tuple[IntArray, FloatArray]:
+        """Return the cells that the ground crosses the threshold in, and their CNR."""
+        believed = targets.believed
+        if believed is None:
+            raise ValueError("clutter's false alarms need to know how the ownship is turned")
+        own_alt_m = float(targets.own_alt_m[row])
+        height_m = own_alt_m - self._terrain.height_m
+        turned = [float(believed[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")]
+        elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
+        parts = [
+            (depth + beam * self._cells.range, *self._clutter(height_m, own_alt_m, depth, away))
+            for depth, beam, away in self._lit(height_m, elevation_rad)
+        ]
+        if not parts:
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        cell, pfa, cnr = (np.concatenate(each) for each in zip(*parts, strict=True))
+        # Beyond noise, whose false alarms are reported anyway.
+        extra = (pfa - self._pfa) / (1.0 - self._pfa)
+        if (most := float(extra.sum())) > MOST_PER_SCAN:
+            raise ValueError(
+                f"clutter_threshold is 'noise': the ground makes {most:,.0f} false alarms in a "
+                f"scan, and at most {MOST_PER_SCAN:,.0f} are allowed; 'adaptive' keeps their number"
+            )
+        draw = self._draws.uniform(cell.astype(np.uint64), np.full(len(cell), scan), 0)
+        crossing = np.flatnonzero(draw < extra)
+        return cell[crossing], cnr[crossing]
+
+    def _lit(
+        self, height_m: float, elevation_rad: FloatArray
+    ) -> Iterator[tuple[int, IntArray, FloatArray]]:
+        """Give each range cell that holds ground, the beams that meet it, and where they point."""
+        reach_rad = BEAM_REACH_BEAMWIDTHS * self._beam_rad[1]
+        for depth, range_m in enumerate(self._range_m.tolist()):
+            if range_m >= height_m:
+                off = elevation_rad + math.asin(height_m / range_m)
+                beam = np.flatnonzero(np.abs(off) <= reach_rad)
+                if len(beam):
+                    yield depth, beam, elevation_rad[beam]
+
+    def _clutter(
+        self, height_m: float, own_alt_m: float, depth: int, elevation_rad: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return how often the ground in some cells crosses the threshold, and its CNR."""
+        terrain = self._terrain
+        range_m = np.full(len(elevation_rad), self._range_m[depth])
+        rcs_m2 = ground_clutter_rcs_m2(
+            range_m, elevation_rad, height_m, gamma_db=terrain.clutter_gamma_db,
+            azimuth_beamwidth_rad=self._beam_rad[0], elevation_beamwidth_rad=self._beam_rad[1],
+            range_resolution_m=self._block.range_step_m,
+        )  # fmt: skip
+        cells: Any = _GroundCells(range_m, own_alt_m, terrain.height_m)
+        cnr = self._block.echo_snr(cells, rcs_m2)
+        pfa = clutter_detection_probability(
+            0.0, cnr, false_alarm_probability=self._pfa, clutter=terrain.clutter_mean
+        )
+        return pfa, cnr

@@ -1,0 +1,92 @@
+"""The ground crosses a threshold that was set for noise; one that follows it keeps Pfa.
+
+The cells of a banked ownship are gone through one by one, each with its own line of sight.
+"""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from covering import LINK_BUDGETS
+from scipy.stats import binom, norm
+from wired import alone, chain, rows, run, sensor
+
+import dsa_des
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.running.simulation import Simulation
+
+PFA, GROUND_M, GAMMA_DB = 1e-3, 1500.0, -22.0
+STILL = {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}
+RADAR = {
+    "azimuth_deg": [-20, 20], "elevation_deg": [-24, 0], "range_km": 4.0, "minimum_range_m": 1000.0,
+    "azimuth_resolution_deg": 4.0, "elevation_resolution_deg": 4.0, "range_resolution_m": 150.0,
+    "false_alarms": True, "false_alarm_probability": PFA, "scan_rate_hz": 50, "power_w": 0.1,
+}  # fmt: skip
+TERRAIN = {"height_m": GROUND_M, "clutter_gamma_db": GAMMA_DB}
+
+
+def expected_cells() -> dict[tuple[int, int, int], float]:
+    """How often each cell is reported by ground or noise: exp(-V / (1 + CNR))."""
+    height = STILL["alt_m"] - GROUND_M
+    wavelength = 299_792_458.0 / 35e9
+    gain = 10.0**3.0
+    noise = 1.380649e-23 * 290.0 * 1e5
+    found = {}
+    for i in range(10):
+        for k in range(6):
+            look = crooked.attitude(STILL).T @ crooked.direction(
+                math.radians(-18.0 + 4.0 * i), math.radians(-22.0 + 4.0 * k)
+            )
+            elevation = math.asin(-look[2])
+            for j in range(20):
+                range_m = 1075.0 + 150.0 * j
+                cnr = 0.0
+                if range_m >= height:
+                    grazing = math.asin(height / range_m)
+                    off = (elevation + grazing) / math.radians(4.0)
+                    along = min(150.0 / math.cos(grazing),
+                                range_m * math.radians(4.0) / math.sin(grazing))  # fmt: skip
+                    area = range_m * math.radians(4.0) * along
+                    if abs(off) <= 2.0:
+                        sigma = 10 ** (0.1 * GAMMA_DB) * math.sin(grazing) * area
+                        sigma *= math.exp(-8.0 * math.log(2.0) * off**2)
+                        echo = 0.1 * gain**2 * wavelength**2 * sigma
+                        cnr = echo / ((4 * math.pi) ** 3 * range_m**4 * noise)
+                found[i, k, j] = PFA ** (1.0 / (1.0 + cnr))
+    return found
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_the_ground_is_reported_where_it_crosses_and_no_more_where_the_threshold_follows(kind):
+    scans, expected = 100, expected_cells()
+    scene = {"ownship": STILL, "targets": [{**crooked.ROLLING, "north_m": 90_000.0}],
+             "terrain": TERRAIN, "duration_s": scans / 50}  # fmt: skip
+    found = {
+        mode: rows(run(chain({"r": sensor(kind, **RADAR, clutter_threshold=mode)}, **scene)))
+        for mode in ("noise", "adaptive")
+    }
+    low, high = binom.interval(0.99, len(expected) * scans, PFA)
+    assert low <= len(found["adaptive"]) <= high
+    mean = sum(expected.values()) * scans
+    deviation = math.sqrt(sum(p * (1.0 - p) for p in expected.values()) * scans)
+    assert mean > 3.0 * high
+    assert abs(len(found["noise"]) - mean) < norm.ppf(0.995) * deviation
+    # By range: where the ground is.
+    range_m = np.array([row["range_m"] for row in found["noise"]])
+    depth = np.clip((range_m - 1000.0 + 1e-6) // 150.0, 0, 19).astype(int)
+    by_depth = np.bincount(depth, minlength=20)
+    wanted = np.array([sum(p for (_, _, j), p in expected.items() if j == d) for d in range(20)])
+    assert np.corrcoef(by_depth, wanted)[0, 1] > 0.9
+    assert all(row["target"] is None for row in found["noise"])
+
+
+def test_windows_change_nothing():
+    radar = sensor("radar.threshold", **RADAR, clutter_threshold="noise")
+    scene = chain({"r": radar}, terrain=TERRAIN, duration_s=0.5)
+    whole = run(scene)["detections"]
+    memory = MemorySink()
+    Simulation(dsa_des.load_scene(scene), recorder=Recorder([memory]), window=1).run()
+    assert memory.tables()["detections"].equals(whole)
+    assert whole.num_rows > 30
+    assert not rows(alone("radar.threshold", **{**RADAR, "enabled": False}))
