@@ -88,9 +88,10 @@ class AgeOfInformation(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return mean and percentile of every replica."""
         columns = group.tables[FUSED]
-        lines = _Lines(columns, of_target(columns, self.p.target), "measured_s")
+        known = "measured_s" if "measured_s" in columns else "time_s"
+        lines = _Lines(columns, of_target(columns, self.p.target), known)
         # A sweeping beam measures after its scan has begun, which is when its report is sent.
-        made_s = np.minimum(lines.rows["measured_s"][lines.order], lines.time_s)
+        made_s = np.minimum(lines.rows[known][lines.order], lines.time_s)
         # What arrives now may be older than what is held: the newest counts.
         origin = _running_max(made_s, lines)
         low = lines.time_s[lines.end - 1] - origin[lines.end - 1]
@@ -157,6 +158,8 @@ def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
 
 def _updated(columns: Any, rows: BoolArray) -> BoolArray:
     """Return which of the rows hold another measurement than the one before of their line."""
+    if "measured_s" not in columns:  # a recording that knows ages only, from arrivals
+        return rows & np.asarray(columns["age_s"] <= 0.0)
     lines = _Lines(columns, rows, "measured_s", "updated_by")
     made_s = lines.rows["measured_s"][lines.order]
     sensors = lines.rows["updated_by"].codes[lines.order]
@@ -184,7 +187,7 @@ class TrackUpdates(TargetMetric):
     """
 
     Parameters = TrackParameters
-    tables = {"tracks": ("target", "time_s", "measured_s", "updated_by", "block")}
+    tables = {"tracks": ("target", "time_s", "age_s", "measured_s", "updated_by", "block")}
 
     def results(self) -> list[Result]:
         """Return interval, continuity and breaks."""

@@ -135,6 +135,8 @@ def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns
     counts = [len(parts[number]["tick"]) for number in full]
     joined: Columns = {"replica": np.repeat(np.array(full, dtype=np.int64), counts)}
     for name in columns:
+        if any(name not in parts[number] for number in full):
+            continue  # a recording of before the column; a metric asks whether it is there
         pieces: list[Any] = [parts[number][name] for number in full]
         if not pieces:
             text = any(isinstance(part.get(name), Text) for part in parts)

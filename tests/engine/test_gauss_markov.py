@@ -37,11 +37,11 @@ class OneDraw:
         return tuple(columns)
 
 
-@pytest.mark.parametrize("tau_s", [1e-9, 1e-3, 1.0, 300.0, 7 * 86400.0, LONGEST_S])
+@pytest.mark.parametrize("tau_s", [1e-9, 1e-3, 300.0, LONGEST_S])
 def test_its_covariance_is_exponential_to_the_last_digits(tau_s):
     """The weights of all draws in each value, multiplied out."""
     days = 90 * 86400 * 10**9
-    lags = [0.0, 1e-9, 1e-7, 1e-3, 0.02, 0.3, 1.0, 1.01, 2.5, 7.0, 30.0, 63.9, 64.0, 200.0]
+    lags = [0.0, 1e-7, 1e-3, 0.3, 1.0, 1.01, 7.0, 63.9, 64.0]
     instants = np.array([days + int(tau_s * 1e9 * lag) for lag in lags])
     stream = OneDraw()
     made = GaussMarkov(stream, tau_s)

@@ -204,7 +204,9 @@ def test_updates_and_breaks_of_tracks(recorded, target, break_after_s):
     keys = {"target": target, "break_after_s": break_after_s}
     found = measured(scene(), {"metric": "track_updates", **keys})
     held = rows(recorded, "tracks", target=target)
-    times = [row["time_s"] for row in held if row["age_s"] == 0.0]
+    told = [(row["measured_s"], row["updated_by"]) for row in held]
+    times = [row["time_s"] for row, now, before in zip(held, told, [None, *told], strict=False)
+             if now != before]  # fmt: skip
     assert (len(held) > len(times) + 3) is (target == "rolling")
     gaps = np.diff(times)
     assert found["track_update_interval_s"] == pytest.approx(np.mean(gaps))
