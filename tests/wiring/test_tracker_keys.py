@@ -256,3 +256,35 @@ def test_what_cannot_be_is_refused(keys, said):
 
     with pytest.raises(SceneError, match=said):
         tracks(**{"kind": keys.pop("type", "tracking.ekf"), **keys})
+
+
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_jpda_lives_with_looks_whose_detections_fall_into_no_gate(kind):
+    """Attitude that errs far beyond the stated variances leaves every gate empty."""
+    scene = chain(
+        {"radar": RADAR}, targets=[crooked.ROLLING], duration_s=4, fusion=PASS,
+        tracker={"type": kind, "association": "jpda"},
+        navigation={"attitude_noise_deg": [20.0, 10.0, 10.0]},
+    )  # fmt: skip
+    found = rows(run(scene), "state_tracks")
+    assert len({row["track"] for row in found}) > 2
+
+
+@pytest.mark.parametrize(
+    ("key", "quantity"),
+    [
+        ("azimuth_resolution_deg", "azimuth"),
+        ("elevation_resolution_deg", "elevation"),
+        ("range_resolution_m", "range"),
+    ],
+)
+def test_what_is_measured_exactly_is_refused_before_the_run(key, quantity):
+    from dsa_des.errors import SceneError
+
+    with pytest.raises(SceneError, match=f"radar measures its {quantity} exactly.*radar.{key}"):
+        tracks(sensors={"radar": {**RADAR, key: 0.0}})
+
+
+def test_a_range_rate_is_no_part_of_a_track_and_may_be_exact():
+    with_rate = tracks(sensors={"radar": {**RADAR, "measures_range_rate": True}})
+    assert with_rate == tracks()
