@@ -71,6 +71,11 @@ class Node:
         summed[np.arange(self.size) >= last[:, np.newaxis]] = 1.0
         return np.concatenate([np.zeros((len(summed), 1)), summed], axis=1)
 
+    @cached_property
+    def flat_edges(self) -> FloatArray:
+        """`edges`, row after row."""
+        return np.ascontiguousarray(self.edges).reshape(-1)
+
     def column(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
         """Return the column for the bins of all variables, each (n,)."""
         found: AnyArray = np.zeros(np.shape(bins[0]), dtype=np.int64)

@@ -22,6 +22,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Tracks that are sampled together: their arrays stay in the processor's cache.
 TRACKS_AT_ONCE = 2048
+_BELOW_1 = float(np.nextafter(1.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -182,9 +183,11 @@ class _Step:
 
 def _drawn(node: Node, column: IntArray, uniform: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the bins into which draws fall, and what is left of them within the bin, [0, 1)."""
-    edges = node.edges
+    edges, at = node.flat_edges, column * (node.size + 1)
     bins: IntArray = np.zeros(len(column), dtype=np.int64)
     for k in range(1, node.size):
-        bins += uniform >= edges[column, k]
-    begin, end = edges[column, bins], edges[column, bins + 1]
-    return bins, np.minimum((uniform - begin) / (end - begin), np.nextafter(1.0, 0.0))
+        bins += uniform >= edges.take(at + k)
+    at += bins
+    begin = edges.take(at)
+    at += 1
+    return bins, np.minimum((uniform - begin) / (edges.take(at) - begin), _BELOW_1)

@@ -21,6 +21,9 @@ from components.estimation.batched import (
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 
+# So many tracks are updated at a time: their matrices stay in the processor's cache.
+_TOGETHER = 384
+
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
@@ -46,7 +49,7 @@ class Innovation:
     jacobian: FloatArray
     spread: FloatArray
 
-    def take(self, which: IntArray) -> "Innovation":
+    def take(self, which: IntArray | slice) -> "Innovation":
         """Return those of some tracks."""
         return Innovation(
             self.expected[..., which], self.root[..., which], self.cross[..., which],
@@ -134,6 +137,21 @@ def updated(
     -------
     state, covariance : arrays of the same shapes
     """
+    count = state.shape[1]
+    if count <= _TOGETHER:
+        return _updated(state, covariance, found, residual)
+    moved, spread = np.empty_like(state), np.empty_like(covariance)
+    for first in range(0, count, _TOGETHER):
+        part = slice(first, first + _TOGETHER)
+        moved[:, part], spread[:, :, part] = _updated(
+            state[:, part], covariance[:, :, part], found.take(part), residual[:, part]
+        )
+    return moved, spread
+
+
+def _updated(
+    state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     gain = gain_of(found)
     moved = state.copy()
     for k in range(len(residual)):

@@ -251,6 +251,16 @@ def test_models_that_never_meet_say_so(tmp_path: Path, monkeypatch: pytest.Monke
         pairing.pairs(range(2))
 
 
+def test_whoever_begins_near_but_high_above_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The smallest range is compared with the range, and the smallest height with the height."""
+    monkeypatch.setattr("components.encounters.pairing._MOST_ATTEMPTS", 3000)
+    far = {"start_range_ft": 1e6, "start_vertical_ft": 800.0}
+    pairs = sampler(tmp_path, GAS, **far).pairs(range(20))
+    assert (np.abs(pairs.up_ft[1, 0] - pairs.up_ft[0, 0]) >= 800).all()
+
+
 def test_rules_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="closest_s = 200: must lie between 0 and"):
         PairingRules(closest_s=200)

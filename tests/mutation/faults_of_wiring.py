@@ -373,6 +373,13 @@ FAULTS = [
         ("no-limit", "residue + self._limit", "residue"),
     ),
     *in_file(
+        _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
+        ("ground-and-noise-twice", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
+         "extra = pfa * 1.2"),
+        ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")]', '("yaw", "pitch", "yaw")]'),
+        ("ground-in-the-neighbour-s-range", "depth + beam * self._cells.range", "beam + 0 * depth"),
+    ),
+    *in_file(
         _GROUP, "components/radar/resolution_effects.py", "wiring/test_resolution_cells.py",
         ("weakest-echo-speaks", "cells.target, -power,", "cells.target, power,"),
         ("powers-not-added", "summed[more] += power", "summed[more] += 0.0 * power"),

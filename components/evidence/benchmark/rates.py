@@ -1,4 +1,4 @@
-"""Time functions by what they do in a second: alert levels of pairs, and bands of states.
+"""Time functions by what they do in a second: alert levels, bands of states, track updates.
 
 ``python -m components.evidence.benchmark.rates RATE`` prints one JSON object; the command starts it
 anew for every rate.
@@ -17,6 +17,7 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
 from components.evidence.benchmark.measure import pin
+from components.evidence.benchmark.track_updates import LOOKS, updates
 from components.examples import folder
 from components.guidance.bands import guidance_of_many
 from components.guidance.kinds import KINDS
@@ -78,9 +79,32 @@ def _bands(count: int) -> Callable[[], object]:
     return lambda: [guidance_of_many(kind, configuration, own, intruders) for kind in KINDS]
 
 
+def _tracks_in_lock_step(count: int) -> Callable[[], object]:
+    return updates(count // (4 * LOOKS), 4)
+
+
+def _tracks_of_one_run(count: int) -> Callable[[], object]:
+    return updates(1, count // LOOKS)
+
+
 RATES = (
     Rate("pair_alerts", "levels of pairs of aircraft, three volumes each", 1e6, 200_000, _levels),
     Rate("bands", "states of an ownship and an intruder, four kinds of bands", 1e3, 1000, _bands),
+    Rate(
+        "track_updates",
+        "updates of tracks, EKF and global nearest neighbour, 4 targets and three "
+        "sensors in 1000 replicas in lock step",
+        5e5,
+        4000 * LOOKS,
+        _tracks_in_lock_step,
+    ),
+    Rate(
+        "track_updates_alone",
+        "the same of 100 targets in a single run",
+        2e4,
+        100 * LOOKS,
+        _tracks_of_one_run,
+    ),
 )
 
 
