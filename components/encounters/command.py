@@ -69,9 +69,9 @@ def risk(**options: Any) -> None:
 @click.option(
     "--duration-s",
     required=True,
-    type=click.IntRange(0, 86_400),
+    type=click.FloatRange(0, 86_400),
     metavar="T",
-    help="Length of each; rows at 0, 1, ... T seconds.",
+    help="Length of each; rows at 0, 1, ... up to T seconds.",
 )
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option(

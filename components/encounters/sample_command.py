@@ -28,7 +28,7 @@ def sample_tracks(
     model: str,
     count: int,
     first: int,
-    duration_s: int,
+    duration_s: float,
     seed: int,
     raw: bool,
     dynamics: str,
@@ -46,9 +46,10 @@ def sample_tracks(
     found = open_model(model)
     path = named(out)
     check_file(path)
-    batches = _raw(found, seed, range(first, first + count), duration_s)
+    seconds = int(duration_s)
+    batches = _raw(found, seed, range(first, first + count), seconds)
     if not raw:
-        batches = _flown(found, seed, range(first, first + count), duration_s, dynamics)
+        batches = _flown(found, seed, range(first, first + count), seconds, dynamics)
     try:
         rows = _write(path, batches)
     except TrackError as error:
@@ -57,7 +58,7 @@ def sample_tracks(
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     for note in found.notes:
         say(f"note: {note}")
-    say(f"{path}: {count} tracks of {duration_s} s, {rows} rows")
+    say(f"{path}: {count} tracks of {seconds} s, {rows} rows")
 
 
 def open_model(text: str) -> EncounterModel:
