@@ -319,7 +319,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/sensor/grid.py", "wiring/test_measured_values.py",
-        ("reports-at-range-0", "_grid(step, limit_low=step)", "_grid(step, limit_low=0.0)"),
+        ("reports-at-range-0", "limit_low=self._range_step or _NEAREST_M", "limit_low=0.0"),
     ),
     *in_file(
         _GROUP, "components/sensor/grid.py", "wiring/test_variances_of_detections.py",
