@@ -71,13 +71,13 @@ class Tracker(Component):
             If a sensor measures an angle or a range exactly: its weight would be infinite.
         """
         for name, offer in sorted(self._offers().items()):
-            for column, step in _EXACT.items():
+            for column, key in _EXACT.items():
                 if isinstance(offer, SensorOffer) and getattr(offer, column) == 0.0:
-                    quantity = step.rpartition("_")[0].replace("_resolution", "")
+                    quantity = key.rpartition("_")[0].replace("_resolution", "")
                     raise ValueError(
                         f"{name} measures its {quantity} exactly (the {column} of its detections "
                         "is 0), and a tracker weighs measurements by their variances: they must "
-                        f"be above 0, by a grid (blocks.{name}.{step}) or by errors = 'stated'"
+                        f"be above 0, by a grid (blocks.{name}.{key}) or by errors = 'stated'"
                     )
         self.rules: TrackerRules | None = None
         self._sensors: tuple[str, ...] = ()

@@ -32,8 +32,8 @@ def parameter_rows(
             default = "see below"
         bounds = _bounds(info)
         rows.append(
-            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name, kind), default,
-             info.description or "")
+            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name, kind),
+             default, info.description or "")
         )  # fmt: skip
         for inner in nested:
             rows += parameter_rows(inner, f"{prefix}{name}.")

@@ -87,5 +87,5 @@ def test_looks_do_not_depend_on_windows_or_on_what_is_culled(options):
 
 def test_a_value_of_neither_kind_is_one_problem():
     scene = chain({"radar": HEARS_ALL}, record={"truth": "maybe"})
-    with pytest.raises(dsa_des.SceneError, match="'maybe': must be true or false or 'auto'$"):
+    with pytest.raises(dsa_des.SceneError, match=r"'maybe': must be true or false or 'auto'$"):
         dsa_des.load_scene(scene)
