@@ -168,6 +168,7 @@ class Fusion(Component):
             roster=next(iter(arrivals.values())).message.roster,
             sensors=self.sensors,
             measured_tick=measured_tick,
+            ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             **values,
         )

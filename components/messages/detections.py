@@ -290,6 +290,7 @@ class FusedDetections(Message):
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
     measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
+    ticks_per_s: int = static(default=10**9, kw_only=True)
     own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     range_rate_m_s: FloatArray = _measured()
     azimuth_variance_rad2: FloatArray = _measured()
@@ -352,6 +353,7 @@ class Tracks(Message):
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
     measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
+    ticks_per_s: int = static(default=10**9, kw_only=True)
     updated: BoolArray = per_entry(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

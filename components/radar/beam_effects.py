@@ -133,9 +133,9 @@ class Sweep:
     ) -> dict[str, FloatArray] | None:
         """Return the believed pose at each entry's own instant, with the error of its scan."""
         believed = detections.pose_columns()
-        if not (believed and targets.revisit and len(targets.roster) and len(row)):
+        if not believed or targets.revisit is None or not len(targets.roster):
             return None
-        if len(row) == 0:  # flights need not answer for no instant at all
+        if len(row) == 0:  # flights need not answer for no instant, but messages must join
             return believed
         # Where the ownship is does not depend on the target that is asked for with it.
         flights, anyone = targets.revisit.take_rows(row), np.zeros(1, dtype=np.int64)

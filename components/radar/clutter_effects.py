@@ -45,6 +45,11 @@ class GroundClutter(Effect):
                     f"{name} is 0: ground clutter fills a resolution cell, it must be above 0"
                 )
         if block.p.pulses_summed > 1:
+            if block.p.budget == "dwell" and block.p.integration == "noncoherent":
+                raise ValueError(
+                    f"integration is 'noncoherent', which sums {block.p.pulses_summed} pulses: "
+                    "ground clutter is known for one look only; set it to 'coherent'"
+                )
             raise ValueError(
                 f"pulses is {block.p.pulses_summed}: ground clutter is known for one look only; "
                 "set it to 1, with integration_gain_db for pulses integrated coherently"

@@ -191,7 +191,8 @@ def _refuse(
             "a report does not say where the ownship believed to be (own_lat_deg, own_lon_deg, "
             "own_alt_m, own_heading_rad, own_pitch_rad, own_roll_rad): a tracker needs its pose"
         )
-    bad = ~np.isnan(measured) & ~(variance > 0.0)
+    # Trackers do not use range rates: a variance of theirs is never divided by.
+    bad = (~np.isnan(measured) & ~(variance > 0.0))[:3]
     if bad.any():
         what, entry = (int(values[0]) for values in bad.nonzero())
         sensors = "+".join(

@@ -31,7 +31,7 @@ def updated_by_all(
     A track is hit where it is likelier than not that one of its detections is its own.
     """
     count = len(part)
-    if not kinds:
+    if not any(len(one.track) for one in kinds):
         return part, np.zeros(count, dtype=bool), np.zeros(count)
     track = np.concatenate([one.track for one in kinds])
     entry = np.concatenate([one.detection for one in kinds])

@@ -144,6 +144,7 @@ class TrackerStub(Component):
             roster=fused.roster,
             sensors=fused.sensors,
             measured_tick=pool["measured_tick"][entry],
+            ticks_per_s=self.context.ticks_per_s,
             updated=entry >= first[row],
             **({"own_of_entries": pose} if pose else {}),
         )

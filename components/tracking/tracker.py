@@ -35,6 +35,12 @@ from dsa_des.block.wake import Wake
 # What a sensor that tells no reach is taken to see: all around, as far as this.
 _FARTHEST_M = 20_000.0
 _WHOLE_RATE_M_S = 600.0
+# What makes a measured quantity exact, by the variance that then is 0.
+_EXACT = {
+    "azimuth_variance_rad2": "azimuth_resolution_deg",
+    "elevation_variance_rad2": "elevation_resolution_deg",
+    "range_variance_m2": "range_resolution_m",
+}
 
 
 class Tracker(Component):
@@ -57,7 +63,22 @@ class Tracker(Component):
         return FilterBank((ConstantVelocity(self.p.acceleration_intensity_m2_s3),))
 
     def setup(self) -> None:
-        """Start with no tracks."""
+        """Start with no tracks.
+
+        Raises
+        ------
+        ValueError
+            If a sensor measures an angle or a range exactly: its weight would be infinite.
+        """
+        for name, offer in sorted(self._offers().items()):
+            for column, key in _EXACT.items():
+                if isinstance(offer, SensorOffer) and getattr(offer, column) == 0.0:
+                    quantity = key.rpartition("_")[0].replace("_resolution", "")
+                    raise ValueError(
+                        f"{name} measures its {quantity} exactly (the {column} of its detections "
+                        "is 0), and a tracker weighs measurements by their variances: they must "
+                        f"be above 0, by a grid (blocks.{name}.{key}) or by errors = 'stated'"
+                    )
         self.rules: TrackerRules | None = None
         self._sensors: tuple[str, ...] = ()
         self._store = TrackStore.empty(self.bank().sizes, 0)
@@ -67,11 +88,15 @@ class Tracker(Component):
         self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
         self._late = 0
 
-    def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
+    def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
         for producer in self.context.producers:
             if isinstance(producer.offer, dict):
                 offers |= producer.offer
+        return offers
+
+    def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
+        offers = self._offers()
         told = [offers.get(name) for name in sensors]
         fields = tuple(o.reach if isinstance(o, SensorOffer) else None for o in told)
         farthest = max(

@@ -38,15 +38,21 @@ class Instants:
     Parameters
     ----------
     ticks : ndarray of int64
+    ticks_per_s : int
+        As the message knows it (its field of that name, 10⁹ without one); a recorder knows it
+        itself. A single value is given in seconds.
     """
 
     ticks: IntArray
+    ticks_per_s: int = 10**9
 
     def __len__(self) -> int:
         return len(self.ticks)
 
-    def __getitem__(self, rows: Any) -> "Instants":
-        return Instants(self.ticks[rows])
+    def __getitem__(self, rows: Any) -> Any:
+        if isinstance(rows, int):
+            return self.ticks[rows] / self.ticks_per_s
+        return Instants(self.ticks[rows], self.ticks_per_s)
 
 
 #: Recorded columns by name, and what kind each is: "int64", "float64", "bool" or "text".
@@ -202,7 +208,7 @@ class DerivedColumns:
                 continue
             values = getattr(message, item.field) if item.value is None else item.value(message)
             if item.instant:
-                values = Instants(values)
+                values = Instants(values, getattr(message, "ticks_per_s", 10**9))
             if item.in_entries and counts is not None:
                 values = _repeated(values, counts)
             columns[item.name] = values

@@ -12,7 +12,8 @@ from pydantic_core import PydanticUndefined
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",
     "db": "dB", "dbsm": "dBsm", "m2": "m²", "mps": "m/s", "w": "W", "ppm": "ppm",
-    "deg_s": "deg/s", "mm_h": "mm/h", "pixels": "pixels",
+    "deg_s": "deg/s", "mm_h": "mm/h", "m_s": "m/s", "m2_s3": "m²/s³", "g_m3": "g/m³",
+    "pixels": "pixels", "c": "°C",
 }  # fmt: skip
 
 
@@ -31,8 +32,8 @@ def parameter_rows(
             default = "see below"
         bounds = _bounds(info)
         rows.append(
-            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name), default,
-             info.description or "")
+            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), _unit(name, kind),
+             default, info.description or "")
         )  # fmt: skip
         for inner in nested:
             rows += parameter_rows(inner, f"{prefix}{name}.")
@@ -90,7 +91,9 @@ def _default(info: FieldInfo) -> str:
     return str(value)
 
 
-def _unit(name: str) -> str:
+def _unit(name: str, kind: str) -> str:
+    if kind == "whole number" and name.endswith("_m"):
+        return ""  # a count: the m of m out of n
     parts = name.split("_")
     for length in (2, 1):
         suffix = "_".join(parts[-length:])

@@ -3,6 +3,7 @@
 import re
 import typing
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -11,6 +12,8 @@ from pydantic import ValidationError
 from dsa_des.block.component import Parameters, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene.scene_file import Key, SceneFile
+
+_MUST = "must be "
 
 
 def explain(
@@ -59,7 +62,24 @@ def explain(
                 close = nearest(str(item["input"]), names)
                 message += f"; did you mean {close!r}?" if close else ""
             problems.append(_refused(scene_file, at, message, item["input"]))
-    return problems
+    return _one_by_key(problems)
+
+
+def _one_by_key(problems: list[Problem]) -> list[Problem]:
+    """Return problems with one for each key: "must be true or false" "or 'auto'"."""
+    found: dict[tuple[str, str], Problem] = {}
+    rest = []
+    for problem in problems:
+        first = found.setdefault((problem.source, problem.key), problem)
+        if first is problem:
+            rest.append(problem)
+        elif first.message.startswith(_MUST) and problem.message.startswith(_MUST):
+            more = problem.message.removeprefix(_MUST)
+            merged = replace(first, message=f"{first.message} or {more}")
+            rest[rest.index(first)] = found[problem.source, problem.key] = merged
+        else:
+            rest.append(problem)
+    return rest
 
 
 def _refused(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:

@@ -55,6 +55,8 @@ def _split(name: str) -> tuple[str, str]:
         above, below = (_UNITS.get(part, part) for part in found.groups())
         return name[: found.start()], f"{above}/{below}"
     rest, _, ending = name.rpartition("_")
+    if rest.endswith("_m") and ending == "s":
+        return rest.removesuffix("_m"), "m/s"
     return (rest, _UNITS[ending]) if rest and ending in _UNITS else (name, "")
 
 

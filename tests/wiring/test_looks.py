@@ -83,3 +83,9 @@ def test_looks_do_not_depend_on_windows_or_on_what_is_culled(options):
     assert plain["looks"] == other["looks"]
     assert [row["evaluated"] for row in plain["looks"].to_pylist()[:2]] == [True, False]
     assert math.isfinite(plain["looks"]["true_range_m"][0].as_py())
+
+
+def test_a_value_of_neither_kind_is_one_problem():
+    scene = chain({"radar": HEARS_ALL}, record={"truth": "maybe"})
+    with pytest.raises(dsa_des.SceneError, match=r"'maybe': must be true or false or 'auto'$"):
+        dsa_des.load_scene(scene)

@@ -256,3 +256,34 @@ def test_what_cannot_be_is_refused(keys, said):
 
     with pytest.raises(SceneError, match=said):
         tracks(**{"kind": keys.pop("type", "tracking.ekf"), **keys})
+
+
+def test_jpda_lives_with_looks_whose_detections_fall_just_beside_every_gate():
+    """Attitude that errs beyond the stated variances: near enough to be compared, and too far."""
+    scene = chain(
+        {"radar": RADAR}, targets=[crooked.ROLLING], duration_s=6, fusion=PASS,
+        tracker={"type": "tracking.ekf", "association": "jpda"},
+        navigation={"attitude_noise_deg": [1.5, 1.5, 1.5]},
+    )  # fmt: skip
+    found = rows(run(scene), "state_tracks")
+    assert len({row["track"] for row in found}) > 1
+
+
+@pytest.mark.parametrize(
+    ("key", "quantity"),
+    [
+        ("azimuth_resolution_deg", "azimuth"),
+        ("elevation_resolution_deg", "elevation"),
+        ("range_resolution_m", "range"),
+    ],
+)
+def test_what_is_measured_exactly_is_refused_before_the_run(key, quantity):
+    from dsa_des.errors import SceneError
+
+    with pytest.raises(SceneError, match=f"radar measures its {quantity} exactly.*radar.{key}"):
+        tracks(sensors={"radar": {**RADAR, key: 0.0}})
+
+
+def test_a_range_rate_is_no_part_of_a_track_and_may_be_exact():
+    with_rate = tracks(sensors={"radar": {**RADAR, "measures_range_rate": True}})
+    assert with_rate == tracks()
