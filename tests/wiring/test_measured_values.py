@@ -277,7 +277,7 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
     def spread(noise, blur):
         keys = {"errors": "signal", "quantised": False, "noise_equivalent_contrast": noise,
-                "blur_pixels": blur}  # fmt: skip
+                "blur_pixels": blur, "elevation_pixels": 9000}  # fmt: skip
         return columns(kind, "pixels", "azimuth_variance_rad2", "elevation_variance_rad2", **keys)
 
     pixel = math.radians(360.0) / 36000.0
@@ -287,7 +287,19 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
         contrast = np.array([1.0, 1.0])
         expected = 8.0 * math.pi * s2**2 / (pixels * contrast / noise) ** 2
         np.testing.assert_allclose(across / pixel**2, expected, rtol=1e-9)
-        np.testing.assert_allclose(upward / pixel**2, expected, rtol=1e-9)
+        np.testing.assert_allclose(upward / (2.0 * pixel) ** 2, expected, rtol=1e-9)
+
+
+def test_a_camera_s_false_alarm_errs_like_one_pixel_at_the_threshold():
+    """Signature 0.6 of weight 0.3 is a contrast of 2, over noise 8."""
+    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 1.0}
+    run_ = alone("optical.eo", threshold=0.6, static_weight=0.3, quantised=False, **keys)
+    found = rows(run_, target=None)
+    pixel = math.radians(0.01)
+    expected = pixel**2 * 8.0 * math.pi * (0.25 + 2.0 / 12.0) ** 2 / 8.0**2
+    assert found
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(expected)
 
 
 ANGLE = "azimuth_error_deg"

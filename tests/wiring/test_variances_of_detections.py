@@ -25,13 +25,18 @@ def test_a_grid_s_variance_is_a_twelfth_of_its_step_squared(kind):
         assert row["range_rate_m_s"] is None and row["range_rate_variance_m2_s2"] is None
 
 
+@pytest.mark.parametrize("off_deg", [(0.0, 0.0, 0.0), (7.0, -5.0, 19.0)])
 @pytest.mark.parametrize("kind", SENSORS)
-def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind):
-    """By brute force: where the corners of a small cell of the sensor's grid lie in body axes."""
+def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind, off_deg):
+    """By brute force: where the corners of a small cell of the sensor's grid lie in body axes.
+
+    They are turned as the values are, by the mounting that is believed.
+    """
     across, upward = np.radians([0.03, 0.01])
     steps = {name: step / 100.0 for name, step in STEPS.items()}
-    turned = crooked.rotation(*MOUNT.values())
-    for row in rows(alone(kind, **MOUNT, **steps), block="sensor"):
+    turned = crooked.rotation(*np.add(list(MOUNT.values()), off_deg))
+    mount = {**MOUNT, "misalignment_deg": list(off_deg)}
+    for row in rows(alone(kind, **mount, **steps), block="sensor"):
         middle = crooked.direction(row["azimuth_rad"], row["elevation_rad"])
         azimuth, elevation = crooked.angles(turned @ middle)
         part = (np.arange(20) + 0.5) / 20.0 - 0.5
