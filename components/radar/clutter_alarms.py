@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from components.geometry.attitude import body_to_ned, unit_vector
+from components.geometry.normals import Vector
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
@@ -97,7 +99,13 @@ class GroundReports:
         ]
         self._range_m = centres[2]
         azimuth, elevation = (grid.ravel() for grid in np.meshgrid(*centres[:2], indexing="ij"))
-        self._body = unit_vector(*block.axes.pointing(azimuth, elevation))
+        self._beams = azimuth, elevation
+
+    @cached_property
+    def _body(self) -> Vector:
+        """Where the beams truly point in body axes; the sensor's are known once all is built."""
+        x, y, z = unit_vector(*self._block.axes.pointing(*self._beams))
+        return x, y, z
 
     def __call__(
         self, detections: Detections, targets: RelativeTargets, rows: IntArray

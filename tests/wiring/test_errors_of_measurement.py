@@ -1,6 +1,7 @@
 """Errors of measured values over a hundred thousand looks of every sensor, in every mode."""
 
 import math
+from itertools import combinations
 
 import looks
 import numpy as np
@@ -73,6 +74,21 @@ def test_lasting_errors_forget_with_their_time(detections, kind):
         assert mean_is(new**2, 1.0, 4 * EACH)
         assert mean_is(new[:, 1:] * new[:, :-1], 0.0, 4 * EACH)
         assert mean_is(new[:, 30:] * new[:, :-30], 0.0, 4 * EACH)
+
+
+@pytest.mark.parametrize("mode", ["stated", "lasting", "signal"])
+def test_the_error_of_one_quantity_tells_nothing_of_another(detections, kind, mode):
+    if mode not in detections:
+        pytest.skip("it has no signal")
+    new = {}
+    for quantity in quantities(kind):
+        error = errors_of(detections[mode], quantity)
+        rho = math.exp(-1.0 / looks.RATE_HZ / TAU_S[quantity]) if mode == "lasting" else 0.0
+        fresh = error[:, 1:] - rho * error[:, :-1]
+        variance = detections[mode][COLUMNS[quantity][2]].reshape(error.shape)[:, 1:]
+        new[quantity] = (fresh - fresh.mean()) / np.sqrt(variance)
+    for one, other in combinations(new, 2):
+        assert mean_is(new[one] * new[other], 0.0, 5 * EACH)
 
 
 def test_rounding_is_in_the_variance_of_what_is_rounded(detections, kind):

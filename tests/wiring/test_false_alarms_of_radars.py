@@ -69,3 +69,25 @@ def test_cells_begin_at_the_minimum_range(nearest_m):
 def test_a_radar_that_is_off_reports_no_noise():
     found = alone("radar.threshold", **VIEW, enabled=False, targets=crooked.TARGETS)
     assert not rows(found)
+
+
+@pytest.mark.parametrize("pulses", [1, 10])
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_echoes_are_as_strong_as_measured_and_spread_as_their_pulses_do(kind, pulses):
+    """A strong target's SNR plus the noise of 1: gamma of as many pulses, its mean the true one."""
+    keys = {"pulses": pulses, "power_w": 1e4, "swerling": 0, "scan_rate_hz": 500}
+    if kind == "radar.threshold":
+        keys.pop("swerling")
+    view = {**VIEW, "azimuth_deg": [-180, 180], "elevation_deg": [-90, 90], **keys,
+            "cell_false_alarm_probability": 1e-9}  # fmt: skip
+    true, seen = (
+        {row["scan"]: row["snr_db"] for row in rows(alone(kind, **keys), target="rolling")}
+        for keys in ({**view, "false_alarms": False}, view)
+    )
+    assert len(seen) == 500 and min(true.values()) > 30.0
+    share = np.array([
+        (10.0 ** (0.1 * seen[scan]) + 1.0) / (10.0 ** (0.1 * true[scan]) + 1.0) for scan in seen
+    ])  # fmt: skip
+    spread = 1.0 / math.sqrt(pulses)
+    assert abs(share.mean() - 1.0) < 2.58 * spread / math.sqrt(500)
+    assert share.std() == pytest.approx(spread, rel=0.2)

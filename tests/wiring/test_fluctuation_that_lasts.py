@@ -182,6 +182,25 @@ def test_who_is_seen_from_one_side_does_not_scintillate():
     assert still == pytest.approx(np.broadcast_to(still[0], still.shape), abs=0.03, nan_ok=True)
 
 
+def test_echoes_of_targets_with_models_of_their_own_scintillate_as_if_alone():
+    """Who flies beside whom, and fluctuates how, changes nobody's echo."""
+    targets = [
+        {**target, "swerling": model, "yaw_deg": 31.0 + 40.0 * number}
+        for number, (target, model) in enumerate(zip(formation(4), (3, 1, 0, 3), strict=True))
+    ]
+    each = {key: value for key, value in RADAR.items() if key != "swerling"}
+    radar = {**each, **LOUD, "scan_rate_hz": 1, "scintillation_extent_m": 5.0}
+
+    def seen(some: list[dict[str, Any]]) -> dict[str, float]:
+        scene = chain({"sensor": radar}, targets=some, duration_s=0.5)
+        return {row["target"]: row["snr_db"] for row in rows(dsa_des.run(scene))}
+
+    together = seen(targets)
+    assert len(together) == 4
+    for target in targets:
+        assert seen([target]) == {target["name"]: together[target["name"]]}
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_over_targets_the_echo_of_scatterers_is_gaussian(seed):
     """Power of one and of two echoes against Gamma(1) and Gamma(2), 20,000 targets: 99 %."""

@@ -120,20 +120,35 @@ def test_looks_coincide_within_their_time(coincidence_s, together):
     ],
 )
 def test_each_gate_parts_what_lies_beyond_it(gates, sensors):
-    """Two radars a quarter of a second apart, off by 2 deg in elevation and some 20 m in range."""
+    """Two radars a quarter of a second apart, off by 2 deg in elevation and some 12 m in range.
+
+    It is the target that moves: what the ownship's own way does to the range is known and undone.
+    """
     far = sensor("radar.range_boundary", misalignment_deg=[0, 2, 0])
     near = sensor("radar.range_boundary", offset_s=0.25)
-    still = {**crooked.ROLLING, "speed_mps": 0.0, "climb_mps": 0.0}
-    own = {**crooked.OWNSHIP, "climb_mps": 0.0}
+    own = {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}
     scene = chain(
-        {"far": far, "near": near}, ownship=own, targets=[still],
+        {"far": far, "near": near}, ownship=own, targets=[crooked.ROLLING],
         fusion={"type": "fusion.gated", **gates},
     )  # fmt: skip
-    before, after = (np.linalg.norm(crooked.ned(still, t, own)) for t in (0.0, 0.25))
+    before, after = (np.linalg.norm(crooked.ned(crooked.ROLLING, t, own)) for t in (0.0, 0.25))
     assert 6.0 < abs(before - after) < 49.0
     last = [row for row in rows(run(scene), "fused") if row["time_s"] == 0.25]
     expected = {"far+near"} if sensors == {"far+near"} else {"near"}
     assert {row["sensors"] for row in last} == expected
+
+
+def test_the_ownship_s_own_way_is_undone_before_gates_are_asked():
+    """A quarter of a second of its flight takes it 17 m nearer to who hangs in the air."""
+    still = {**crooked.ROLLING, "speed_mps": 0.0, "climb_mps": 0.0}
+    radars = {"one": sensor("radar.range_boundary"),
+              "two": sensor("radar.range_boundary", offset_s=0.25)}  # fmt: skip
+    fusion = {"type": "fusion.gated", "time_gate_s": 0.3, "angle_gate_deg": 0.05,
+              "range_gate_m": 2.0}  # fmt: skip
+    before, after = (np.linalg.norm(crooked.ned(still, t)) for t in (0.0, 0.25))
+    assert abs(before - after) > 10.0
+    found = rows(run(chain(radars, targets=[still], fusion=fusion)), "fused", time_s=0.25)
+    assert [row["sensors"] for row in found] == ["one+two"]
 
 
 @covers("drop_after_s", of=("tracking.stub", "tracking.hold_last"))

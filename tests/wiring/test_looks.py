@@ -39,6 +39,9 @@ def test_every_sensor_looks_at_every_target_and_says_what_came_of_it():
         if row["evaluated"]:
             assert row["true_range_m"] == pytest.approx(true_m, abs=0.02)
             assert row["snr_db"] is not None
+            expected = crooked.angles(crooked.body(flight, row["time_s"]))
+            found_rad = row["true_azimuth_rad"], row["true_elevation_rad"]
+            assert found_rad == pytest.approx(expected, abs=1e-5)
         else:
             assert row["true_range_m"] is None
     # A sensor that is switched off fills no rows anywhere.

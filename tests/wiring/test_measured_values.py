@@ -219,6 +219,44 @@ def test_range_rate_resolves_by_the_time_of_a_look(kind):
     np.testing.assert_allclose(np.sqrt(found[1]), expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+@pytest.mark.parametrize("rate_hz", [1, 4])
+def test_errors_follow_the_look_that_a_scan_leaves_time_for(kind, rate_hz):
+    """Four beams share a scan: 1 / (4 rate) on each, 100 pulses a second summed in power.
+
+    The look that the link budget states, of one pulse, has no part in it.
+    """
+    keys = {
+        **looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False, "scan_rate_hz": rate_hz,
+        "budget": "dwell", "prf_hz": 100.0, "integration": "noncoherent",
+        "azimuth_beamwidth_deg": 180.0, "elevation_beamwidth_deg": 90.0,
+        "measures_range_rate": True,
+    }  # fmt: skip
+    names = "snr_db", "range_variance_m2", "range_rate_variance_m2_s2"
+    snr_db, of_range, of_rate = columns(kind, *names, **keys)
+    dwell_s = 1.0 / (4.0 * rate_hz)
+    twice = 2.0 * 100.0 * dwell_s // 1.0 * 10.0 ** (0.1 * snr_db)
+    assert (twice > 24.0).all()
+    np.testing.assert_allclose(of_range, 40.0**2 / twice, rtol=1e-9)
+    doppler_m_s = 299_792_458.0 / 35e9 / (2.0 * dwell_s)
+    np.testing.assert_allclose(of_rate, doppler_m_s**2 / twice, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["radar.swerling", "optical.eo"])
+def test_stated_errors_come_on_top_of_those_of_the_signal(kind):
+    """Two errors of one size, each drawn by itself: their squares add up."""
+    keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False}
+    (alone_rad2,) = columns(kind, "azimuth_variance_rad2", **keys)
+    deviation_deg = math.degrees(math.sqrt(alone_rad2.mean()))
+    names = "azimuth_rad", "true_azimuth_rad", "azimuth_variance_rad2"
+    measured, true, variance = columns(
+        kind, *names, **keys, azimuth_error_deg=deviation_deg, scan_rate_hz=2000
+    )
+    off = (measured - true + math.pi) % (2.0 * math.pi) - math.pi
+    assert len(off) == 4000 and variance.mean() == pytest.approx(2.0 * alone_rad2.mean(), rel=0.1)
+    assert looks.mean_is(off**2 / variance, 1.0, 2)
+
+
 def test_errors_in_clutter_follow_the_ratio_to_noise_and_clutter():
     """Confidence counts clutter as noise, the recorded SNR does not."""
     keys = {**looks.SIGNAL_KEYS["radar.threshold"], "errors": "signal", "quantised": False}
@@ -239,7 +277,7 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
     def spread(noise, blur):
         keys = {"errors": "signal", "quantised": False, "noise_equivalent_contrast": noise,
-                "blur_pixels": blur}  # fmt: skip
+                "blur_pixels": blur, "elevation_pixels": 9000}  # fmt: skip
         return columns(kind, "pixels", "azimuth_variance_rad2", "elevation_variance_rad2", **keys)
 
     pixel = math.radians(360.0) / 36000.0
@@ -249,7 +287,19 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
         contrast = np.array([1.0, 1.0])
         expected = 8.0 * math.pi * s2**2 / (pixels * contrast / noise) ** 2
         np.testing.assert_allclose(across / pixel**2, expected, rtol=1e-9)
-        np.testing.assert_allclose(upward / pixel**2, expected, rtol=1e-9)
+        np.testing.assert_allclose(upward / (2.0 * pixel) ** 2, expected, rtol=1e-9)
+
+
+def test_a_camera_s_false_alarm_errs_like_one_pixel_at_the_threshold():
+    """Signature 0.6 of weight 0.3 is a contrast of 2, over noise 8."""
+    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 1.0}
+    run_ = alone("optical.eo", threshold=0.6, static_weight=0.3, quantised=False, **keys)
+    found = rows(run_, target=None)
+    pixel = math.radians(0.01)
+    expected = pixel**2 * 8.0 * math.pi * (0.25 + 2.0 / 12.0) ** 2 / 8.0**2
+    assert found
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(expected)
 
 
 ANGLE = "azimuth_error_deg"

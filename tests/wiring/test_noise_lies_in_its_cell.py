@@ -31,7 +31,7 @@ def reports(rcs_dbsm: float, power_w: float, looks: int = 20_000) -> dict[str, n
 
 
 def test_far_below_the_noise_a_report_is_anywhere_in_the_cell():
-    looks = 20_000
+    looks, places = 20_000, []
     found = reports(-140.0, 1.0, looks)
     low, high = binom.interval(0.99, looks, PFA)
     assert low <= len(found["range_m"]) <= high
@@ -43,11 +43,27 @@ def test_far_below_the_noise_a_report_is_anywhere_in_the_cell():
         # The cell of the truth, by its number: the same for every target in it.
         number = np.rint(found[f"true_{name}"][0] / width)
         place = found[name] / width - number + 0.5
+        places.append(place)
         step = 0.0 if name != "range_m" else 1.0
         if step == 0.0:
             assert kstest(place, "uniform").pvalue > 0.01
         np.testing.assert_allclose(found[variance], width**2 * (1 / 6 + step / 12), rtol=1e-9)
     assert not np.any(found["range_m"] == found["true_range_m"])
+    # Where it lies across the cell tells nothing of how high up in it.
+    assert abs(np.corrcoef(places[0], places[1])[0, 1]) < 2.58 / math.sqrt(len(place))
+
+
+def test_what_the_ground_makes_of_a_look_lies_in_the_cell_as_well():
+    """A threshold for noise alone, and ground that crosses it: nothing is where the target is."""
+    target = {**crooked.DIVING, **STILL, "rcs_dbsm": -100.0}
+    radar = sensor("radar.swerling", **{**RADAR, "clutter_threshold": "noise"})
+    terrain = {"height_m": 1850.0, "clutter_gamma_db": -75.0}
+    scene = chain({"radar": radar}, ownship=OWN, targets=[target], duration_s=10, terrain=terrain)
+    found = rows(run(scene))
+    assert len(found) > 3 * PFA * 2000
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(math.radians(3.0) ** 2 / 6.0)
+        assert row["azimuth_rad"] != row["true_azimuth_rad"]
 
 
 @pytest.mark.parametrize("power_w", [3.0, 30.0])

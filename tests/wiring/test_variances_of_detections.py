@@ -25,13 +25,18 @@ def test_a_grid_s_variance_is_a_twelfth_of_its_step_squared(kind):
         assert row["range_rate_m_s"] is None and row["range_rate_variance_m2_s2"] is None
 
 
+@pytest.mark.parametrize("off_deg", [(0.0, 0.0, 0.0), (7.0, -5.0, 19.0)])
 @pytest.mark.parametrize("kind", SENSORS)
-def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind):
-    """By brute force: where the corners of a small cell of the sensor's grid lie in body axes."""
+def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind, off_deg):
+    """By brute force: where the corners of a small cell of the sensor's grid lie in body axes.
+
+    They are turned as the values are, by the mounting that is believed.
+    """
     across, upward = np.radians([0.03, 0.01])
     steps = {name: step / 100.0 for name, step in STEPS.items()}
-    turned = crooked.rotation(*MOUNT.values())
-    for row in rows(alone(kind, **MOUNT, **steps), block="sensor"):
+    turned = crooked.rotation(*np.add(list(MOUNT.values()), off_deg))
+    mount = {**MOUNT, "misalignment_deg": list(off_deg)}
+    for row in rows(alone(kind, **mount, **steps), block="sensor"):
         middle = crooked.direction(row["azimuth_rad"], row["elevation_rad"])
         azimuth, elevation = crooked.angles(turned @ middle)
         part = (np.arange(20) + 0.5) / 20.0 - 0.5
@@ -63,3 +68,29 @@ def test_false_alarms_have_the_variances_of_their_sensor():
     assert [row["azimuth_variance_rad2"] for row in frames] == pytest.approx(
         [math.radians(0.01) ** 2 / 12.0] * len(frames)
     )
+
+
+def test_false_alarms_err_like_what_is_there():
+    """On the grid where that is kept, with the stated errors in their variances."""
+    noise = {"false_alarms": True, "cell_false_alarm_probability": 0.02, "range_km": 5.0}
+    keys = {
+        **noise, "errors": "stated", "azimuth_error_deg": 2.0, "range_error_m": 70.0,
+        "azimuth_resolution_deg": 6.0, "elevation_resolution_deg": 5.0, "range_resolution_m": 400.0,
+        "measures_range_rate": True, "range_rate_error_m_s": 2.0, "range_rate_resolution_m_s": 8.0,
+    }  # fmt: skip
+    names = "azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s"
+    steps = np.array([math.radians(6.0), math.radians(5.0), 400.0, 8.0])
+    found = rows(alone("radar.threshold", **keys), block="sensor", target=None)
+    value = np.array([[row[name] for name in names] for row in found])
+    assert len(value) > 300
+    np.testing.assert_allclose(value / steps, np.rint(value / steps), atol=1e-9)
+    assert (np.abs(value[:, 0]) <= math.pi).all() and (value[:, 2] >= 400.0).all()
+    for row in found:
+        assert row["azimuth_variance_rad2"] == pytest.approx(
+            math.radians(2.0) ** 2 + math.radians(6.0) ** 2 / 12.0
+        )
+        assert row["range_variance_m2"] == pytest.approx(70.0**2 + 400.0**2 / 12.0)
+        assert row["range_rate_variance_m2_s2"] == pytest.approx(2.0**2 + 8.0**2 / 12.0)
+    # Noise comes as often towards us as away from us.
+    assert abs(np.mean(value[:, 3] > 0.0) - 0.5) < 2.58 * 0.5 / math.sqrt(len(value))
+    assert value[:, 3].min() < -400.0 and value[:, 3].max() > 400.0

@@ -1,0 +1,109 @@
+"""Faults of measured values: what their errors are drawn by, follow from, and are stated as."""
+
+from fault import in_file
+
+_GROUP = "measurements"
+_VALUES = "wiring/test_measured_values.py"
+_ERRORS = (
+    "wiring/test_errors_of_measurement.py::test_the_error_of_one_quantity_tells_nothing_of_another"
+)
+_IN_CELL = "wiring/test_noise_lies_in_its_cell.py"
+_VARIANCES = "wiring/test_variances_of_detections.py"
+
+FAULTS = [
+    *in_file(
+        _GROUP, "components/sensor/measurement_errors.py", (_IN_CELL, _VARIANCES),
+        ("places-of-noise-by-one-draw", "uniform(keys[noise], scan[noise], number)",
+         "uniform(keys[noise], scan[noise], 0)"),
+        ("cell-of-noise-by-its-edge", "np.rint(true[name][noise] / width)",
+         "np.floor(true[name][noise] / width)"),
+        ("noise-in-its-cell-errs-too", "drawn[name][noise] = 0.0",
+         "drawn[name][noise] = drawn[name][noise]"),
+        ("false-alarms-off-the-grid", "return self._valid(where), columns",
+         "return dict(where), columns"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/measurement_errors.py",
+        "lockstep/test_errors_in_lock_step.py",
+        ("errors-of-the-first-replica", "cells.instant_ns[found], cells.replica[found]",
+         "cells.instant_ns[found], np.zeros_like(cells.replica[found])"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/quantity_error.py", (_VALUES, _ERRORS),
+        ("lasting-errors-alike", 'stream(f"lasting error of {name}")', 'stream("lasting error")'),
+        ("errors-alike", 'stream(f"error of {name}")', 'stream("error")'),
+        ("biases-alike", 'stream(f"bias of {name}")', 'stream("bias")'),
+        ("stated-error-is-the-signal-s", "_OWN, _OF_SIGNAL = 0, 1", "_OWN, _OF_SIGNAL = 0, 0"),
+        ("drawn-bias-stated-as-fixed", "(3.0 if drawn_bias else 1.0)",
+         "(1.0 if drawn_bias else 1.0)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/signal_errors.py", _VALUES,
+        ("errors-by-stated-pulses", "ratio = p.pulses_summed * snr", "ratio = p.pulses * snr"),
+        ("doppler-by-stated-dwell", "dwell_s = p.stated_dwell_s if look is None else look.dwell_s",
+         "dwell_s = p.stated_dwell_s"),
+        ("doppler-one-way", "wavelength_m / (2.0 * dwell_s)", "wavelength_m / dwell_s"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/radar_block.py", _VARIANCES,
+        ("noise-only-recedes", "FASTEST_M_S * (2.0 * uniform - 1.0)", "FASTEST_M_S * uniform"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/swerling.py", _IN_CELL,
+        ("ground-taken-for-the-target", "if cnr is not None:\n            pfa = np.empty",
+         "if False:\n            pfa = np.empty"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/fading.py",
+        "wiring/test_fluctuation_that_lasts.py::test_echoes_of_targets_with_models_of_their_own_"
+        "scintillate_as_if_alone",
+        ("aspect-of-whoever-comes-first",
+         "x, y, z = unit_vector(azimuth[chosen], elevation[chosen])",
+         "x, y, z = (v[: len(azimuth[chosen])] for v in unit_vector(azimuth, elevation))"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/carried.py", "wiring/test_fused_and_tracked_positions.py",
+        ("carried-away-from-the-ownship-s-way", "away * seen - step)", "away * seen + step)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
+        ("ground-counted-with-its-noise", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
+         "extra = pfa"),
+        ("cells-of-the-ground-mixed-up", "np.divmod(beam, self._cells.elevation)",
+         "np.divmod(beam, self._cells.azimuth)"),
+        ("ground-below-the-threshold", "np.maximum(beyond - math.log(self._pfa) - 1.0, 1e-6)",
+         "np.maximum(beyond - 1.0, 1e-6)"),
+        ("ground-as-strong-as-noise", "* (1.0 + cnr)\n        snr", "\n        snr"),
+        ("ground-where-it-is-believed", "self._block.axes.pointing(*self._beams)",
+         "self._block.axes.to_body(*self._beams)"),
+        ("ground-in-the-ownship-s-axes", "self._block.axes.pointing(*self._beams)", "self._beams"),
+        ("ground-that-always-fluctuates", "clutter=terrain.clutter_mean", 'clutter="fluctuating"'),
+        ("axes-before-they-are-built", "self._beams = azimuth, elevation",
+         "self._beams = azimuth, elevation\n        self._body"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/false_alarm_effects.py", "wiring/test_false_alarms_of_radars.py",
+        ("strength-of-one-pulse", "pulses=self._block.p.pulses_summed,\n        )\n        extras",
+         "pulses=1,\n        )\n        extras"),
+        ("strength-by-half-its-decibels", '10.0 ** (0.1 * detections.extras["snr_db"])',
+         '10.0 ** (0.05 * detections.extras["snr_db"])'),
+    ),
+    *in_file(
+        _GROUP, "components/messages/every_look.py", "wiring/test_looks.py",
+        ("looks-by-the-horizon", '"true_elevation_rad": cells.body_elevation_rad',
+         '"true_elevation_rad": cells.elevation_rad'),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/mounting.py", _VARIANCES,
+        ("variances-by-the-true-mounting",
+         "            elevation_variance_rad2,\n            self.believed_rad",
+         "            elevation_variance_rad2,\n            self.true_rad"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/camera.py", _VALUES,
+        ("height-by-the-width-of-a-pixel", "self.pixel_elevation_rad**2 * variance",
+         "self.pixel_azimuth_rad**2 * variance"),
+        ("false-alarms-without-weight", "max(self.p.threshold, 0.0) / weight",
+         "max(self.p.threshold, 0.0)"),
+    ),
+]  # fmt: skip
