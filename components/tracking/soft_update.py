@@ -42,7 +42,7 @@ def updated_by_all(
     taken = np.bincount(track, weights=share, minlength=count)
     none = np.maximum(1.0 - taken, 0.0)
     gain = missing + np.log1p(np.bincount(track, weights=weight, minlength=count))
-    # Where nothing is in the gate all stays as it was, to the bit: so it does without this function.
+    # Where nothing is in the gate all stays as it was, to the bit, as without this function.
     paired = np.bincount(track, minlength=count) > 0
     # Per model: probability of each (pair, model) and of each (miss, model).
     by_model, states, covariances = [], [], []
