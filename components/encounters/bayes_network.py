@@ -23,7 +23,7 @@ class NetworkError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class NetworkNode:
     """One variable given its parents.
 
     Parameters
@@ -92,7 +92,7 @@ class BayesNetwork:
     ----------
     labels : tuple of str
     sizes : tuple of int
-    nodes : dict of int to Node
+    nodes : dict of int to NetworkNode
         Place → node; of a transition network only what is drawn.
     order : tuple of int
         Places of all nodes, parents first.
@@ -100,7 +100,7 @@ class BayesNetwork:
 
     labels: tuple[str, ...]
     sizes: tuple[int, ...]
-    nodes: dict[int, Node]
+    nodes: dict[int, NetworkNode]
     order: tuple[int, ...]
 
 
@@ -149,13 +149,13 @@ def make_network(
         table = some.reshape(columns, sizes[place])
         if not table.any():
             raise NetworkError("all its counts are 0", labels[place])
-        nodes[place] = Node(labels[place], sizes[place], parents, tuple(strides), table)
+        nodes[place] = NetworkNode(labels[place], sizes[place], parents, tuple(strides), table)
     if start < len(counts):
         raise NetworkError(f"{len(counts)} counts stand there, {start} are needed")
     return BayesNetwork(tuple(labels), tuple(sizes), nodes, _order(labels, nodes))
 
 
-def _order(labels: Sequence[str], nodes: dict[int, Node]) -> tuple[int, ...]:
+def _order(labels: Sequence[str], nodes: dict[int, NetworkNode]) -> tuple[int, ...]:
     """Return the nodes with parents first, and otherwise in the file's order."""
     left, done = list(nodes), []
     while left:

@@ -63,10 +63,10 @@ def _read(path: Path, state: object) -> EncounterModel:
         text = read_input_text(path)
     except InputFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
-    return _Reader(path, text).model()
+    return _ModelReader(path, text).model()
 
 
-class _Reader:
+class _ModelReader:
     def __init__(self, path: Path, text: str) -> None:
         self.path = path
         self.parts = self._parts(text)

@@ -10,7 +10,7 @@ _NAUTICAL_MILE_FT = 6076.115485564304
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class StepDensity:
     """A function that is constant between edges.
 
     Parameters
@@ -64,8 +64,8 @@ class Steps:
         return found
 
 
-def _steps(edges: list[float], heights: list[float]) -> Steps:
-    return Steps(np.array(edges), np.array(heights))
+def _steps(edges: list[float], heights: list[float]) -> StepDensity:
+    return StepDensity(np.array(edges), np.array(heights))
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ class PairingRules:
     ----------
     duration_s, closest_s : int
         Length of the tracks, and when they are closest.
-    vertical_ft : Steps
+    vertical_ft : StepDensity
         Probability (times any factor) with which a vertical miss distance is accepted; none is
         outside its edges.
-    horizontal_ft : Steps
+    horizontal_ft : StepDensity
         Density (times any factor) from which the signed horizontal miss distance is drawn.
     start_vertical_ft, start_range_ft : float
         Pairs that begin nearer than both are rejected.
@@ -89,12 +89,12 @@ class PairingRules:
 
     duration_s: int = 180
     closest_s: int = 150
-    vertical_ft: Steps = field(
+    vertical_ft: StepDensity = field(
         default_factory=lambda: _steps(
             [-1500, -500, -100, 0, 100, 500, 1500], [1 / 2, 1 / 1.5, 1, 1, 1 / 1.5, 1 / 2]
         )
     )
-    horizontal_ft: Steps = field(
+    horizontal_ft: StepDensity = field(
         default_factory=lambda: _steps(
             [-18240, -1500, -500, 0, 500, 1500, 18240],
             [1 / 1.5 / 16740, 1 / 1.25 / 1000, 1 / 500, 1 / 500, 1 / 1.25 / 1000, 1 / 1.5 / 16740],

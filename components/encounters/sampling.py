@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.encounters.bayes_network import Node
+from components.encounters.bayes_network import NetworkNode
 from components.encounters.draws import EncounterDraws, Ints
 from components.encounters.model import EncounterModel
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -181,7 +181,7 @@ class _Step:
             value[moved] = self._low[bins] + self._width[bins] * rest
 
 
-def _drawn(node: Node, column: IntArray, uniform: FloatArray) -> tuple[IntArray, FloatArray]:
+def _drawn(node: NetworkNode, column: IntArray, uniform: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the bins into which draws fall, and what is left of them within the bin, [0, 1)."""
     edges, at = node.flat_edges, column * (node.size + 1)
     bins: IntArray = np.zeros(len(column), dtype=np.int64)

@@ -70,10 +70,10 @@ def _read(path: Path, state: object, skip_damaged: bool) -> EncounterSet:
         raise EncounterSetError(
             f"{path}: is no whole Parquet file: it may be cut short ({str(error)[:200]})"
         ) from None
-    return _Reader(path, table).encounters(skip_damaged)
+    return _SetReader(path, table).encounters(skip_damaged)
 
 
-class _Reader:
+class _SetReader:
     def __init__(self, path: Path, table: "pa.Table") -> None:
         self.path, self.table = path, table
         names = set(table.column_names)

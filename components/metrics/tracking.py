@@ -11,7 +11,7 @@ from pydantic import Field
 from components.messages.state_tracks import COVARIANCE, STATUSES
 from components.metrics.rows import is_named
 from components.metrics.set_distances import assigned, chi_square_bounds, set_distance
-from components.metrics.true_states import TrueStates
+from components.metrics.true_states import RecordedTruth
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
@@ -125,7 +125,7 @@ class Tracking(Metric):
         first: Mapping[str, float],
         duration_s: float,
     ) -> dict[str, float]:
-        truth = TrueStates(scene)
+        truth = RecordedTruth(scene)
         tally = _Tally()
         time_s = columns["time_s"][rows]
         instants, start = np.unique(time_s, return_index=True)

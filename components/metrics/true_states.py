@@ -16,7 +16,7 @@ from dsa_des.time.randomness import Streams
 _STEP_S = 0.02
 
 
-class TrueStates:
+class RecordedTruth:
     """The targets of one scene, asked at any time.
 
     Parameters

@@ -22,7 +22,7 @@ class InfraredParameters(CameraParameters):
         description="Whether to add the exhaust plume of each aircraft's engine. The areas of "
         "Tables 3.2 and 4.6 hold it already, as a doubled back; pair it with one that is not.",
     )
-    band: Literal["visible", "mwir", "lwir"] = Field(
+    extinction_band: Literal["visible", "mwir", "lwir"] = Field(
         default="visible",
         description="Whose air the contrast passes: that of visible light, as in the thesis, or of "
         "3-5 µm or 8-12 µm, where clear air absorbs by its humidity and haze takes less.",

@@ -40,7 +40,7 @@ class Visibility(Effect):
         """Ask ``[weather]`` for a visibility, fog or rain."""
         weather = block.context.sections["weather"]
         if own_band(block) is not None:
-            return Verdict(False, f"band is {block.p.band!r}: the air takes what it takes there")
+            return Verdict(False, f"{_band_said(block)}: the air takes what it takes there")
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -75,8 +75,8 @@ class BandExtinction(Effect):
     acts_on = "contrast"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``band``."""
-        return Verdict(own_band(block) is not None, f"band is {block.p.band!r}")
+        """Ask for ``extinction_band``."""
+        return Verdict(own_band(block) is not None, _band_said(block))
 
     def build(self, block: Any) -> Callable[[Cells], FloatArray]:
         """Return the factor on every cell's contrast."""
@@ -120,9 +120,13 @@ class Night(Effect):
         return True
 
 
+def _band_said(block: Any) -> str:
+    return f"extinction_band is {block.p.extinction_band!r}"
+
+
 def own_band(block: Any) -> str | None:
     """Return the infrared band of a camera whose air is that of its band, or None."""
-    band = getattr(block.p, "band", None)
+    band = getattr(block.p, "extinction_band", None)
     return band if band in BANDS else None
 
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from components.traffic.daa_file import read_daa_samples
 from components.traffic.traffic_file import TrafficFileError
-from components.view.picture import Picture, Plane
+from components.view.picture import RunPicture, TangentPlane
 from dsa_des.errors import UsageError
 
 
-def encounter_picture(path: Path) -> Picture:
+def encounter_picture(path: Path) -> RunPicture:
     """Return the page's picture of a ``.daa`` file.
 
     Raises
@@ -24,8 +24,8 @@ def encounter_picture(path: Path) -> Picture:
         raise UsageError(str(error)) from error
     own, *others = samples
     first, last = (float(samples[own]["time"][place]) for place in (0, -1))
-    plane = Plane(float(samples[own]["lat"][0]), float(samples[own]["lon"][0]))
-    picture = Picture(path.name, {"ownship": own}, last - first, first, targets=others)
+    plane = TangentPlane(float(samples[own]["lat"][0]), float(samples[own]["lon"][0]))
+    picture = RunPicture(path.name, {"ownship": own}, last - first, first, targets=others)
     columns = []
     for place, name in enumerate(samples):
         table = samples[name]

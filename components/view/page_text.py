@@ -8,7 +8,7 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
-from components.view.picture import Picture
+from components.view.picture import RunPicture
 from dsa_des.text.safe_text import printable
 
 #: The program's parts, in the order in which they need each other.
@@ -17,7 +17,7 @@ SCRIPTS = (
 )  # fmt: skip
 
 
-def page_text(picture: Picture) -> str:
+def page_text(picture: RunPicture) -> str:
     """Return the page of a picture.
 
     Its content security policy lets the browser run the one program inside and fetch nothing. Text

@@ -16,7 +16,7 @@ _SINGLE, _DOUBLE = np.dtype("<f4"), np.dtype("<f8")
 
 
 @dataclass
-class Picture:
+class RunPicture:
     """A run as the page shows it.
 
     Parameters
@@ -70,7 +70,7 @@ def _column(name: str, values: AnyArray) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Plane:
+class TangentPlane:
     """The tangent plane at a place of the Earth (WGS 84): east and north of it, m.
 
     Parameters

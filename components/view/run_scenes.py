@@ -11,7 +11,7 @@ import numpy as np
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
 from components.sensor.marks import EO, IR, RADAR
-from components.view.picture import Picture, Plane
+from components.view.picture import RunPicture, TangentPlane
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import NEUTRAL
 from dsa_des.errors import UsageError
@@ -24,7 +24,7 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 Table = Mapping[str, Any]
 
 
-def run_picture(folder: Path) -> Picture:
+def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run.
 
     Raises
@@ -44,7 +44,7 @@ def run_picture(folder: Path) -> Picture:
     names = _names(found)
     own = _own(found)
     plane = _plane(own)
-    picture = Picture(
+    picture = RunPicture(
         title=str(scene.get("title") or folder.name),
         facts=_facts(info, scene),
         duration_s=float(info.get("duration_s", 0.0)),
@@ -205,13 +205,13 @@ def _in_order(own: dict[str, FloatArray]) -> dict[str, FloatArray]:
     return {**{name: values[first] for name, values in own.items()}, "time_s": time_s}
 
 
-def _plane(own: Mapping[str, FloatArray]) -> Plane:
+def _plane(own: Mapping[str, FloatArray]) -> TangentPlane:
     if len(own["time_s"]) == 0:
-        return Plane(0.0, 0.0)
-    return Plane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
+        return TangentPlane(0.0, 0.0)
+    return TangentPlane(float(own["own_lat_deg"][0]), float(own["own_lon_deg"][0]))
 
 
-def _own_columns(own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyArray]:
+def _own_columns(own: Mapping[str, FloatArray], plane: TangentPlane) -> dict[str, AnyArray]:
     east, north = plane.east_north_m(own["own_lat_deg"], own["own_lon_deg"], own["own_alt_m"])
     return {
         "time_s": own["time_s"],
@@ -222,7 +222,7 @@ def _own_columns(own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyAr
     }
 
 
-def _truth(truth: Table, plane: Plane, targets: Mapping[str, int]) -> dict[str, AnyArray]:
+def _truth(truth: Table, plane: TangentPlane, targets: Mapping[str, int]) -> dict[str, AnyArray]:
     """Return the targets' true positions, by target and then by time."""
     code = _codes(truth["target"], targets)
     keep = np.flatnonzero((code >= 0) & np.isfinite(truth["lat_deg"]))
@@ -238,7 +238,9 @@ def _truth(truth: Table, plane: Plane, targets: Mapping[str, int]) -> dict[str, 
     }
 
 
-def _estimates(table: Table, own: Mapping[str, FloatArray], plane: Plane) -> dict[str, AnyArray]:
+def _estimates(
+    table: Table, own: Mapping[str, FloatArray], plane: TangentPlane
+) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
     keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
 
@@ -289,7 +291,7 @@ def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, Flo
     return found
 
 
-def _seen(table: Table, pose: Mapping[str, Any], plane: Plane) -> dict[str, AnyArray]:
+def _seen(table: Table, pose: Mapping[str, Any], plane: TangentPlane) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
     Returns

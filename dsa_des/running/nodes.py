@@ -11,7 +11,7 @@ from dsa_des.errors import SceneError
 from dsa_des.running.grain import Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Node
 from dsa_des.running.processors import Processor, Service
-from dsa_des.running.rehearsal import Line
+from dsa_des.running.rehearsal import WaitingLine
 from dsa_des.running.rehearsed_lines import RehearsedLines
 from dsa_des.running.run_state import RunState
 from dsa_des.running.timeline import Timeline
@@ -80,14 +80,14 @@ def start_processors(
     order = grain.order(scene)
     ticks_per_s = scene.ticks_per_s
     processors: dict[str, Processor | WindowedQueue | RehearsedLines] = {}
-    lines: dict[str, Line] = {}
+    lines: dict[str, WaitingLine] = {}
     for name, p in scene.processors.items():
         try:
             service = Service(name, p, ticks_per_s, streams.stream(name, "service time"))
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
         if grain.rehearsed:
-            lines[name] = Line(service, p.when_busy)
+            lines[name] = WaitingLine(service, p.when_busy)
             continue
         if name in grain.queues:
             processors[name] = WindowedQueue(

@@ -46,7 +46,7 @@ class Player:
 
 
 @dataclass
-class Line:
+class WaitingLine:
     """One processor and those who wait for it.
 
     Parameters
@@ -63,9 +63,9 @@ class Line:
     working: tuple[Job, int, int] | None = None
     waiting: deque[Job] = field(default_factory=deque)
 
-    def copy(self) -> "Line":
+    def copy(self) -> "WaitingLine":
         """Return another one that stands as this one does."""
-        return Line(self.service, self.when_busy, self.working, self.waiting.copy())
+        return WaitingLine(self.service, self.when_busy, self.working, self.waiting.copy())
 
 
 @dataclass
@@ -91,7 +91,7 @@ class Rehearsed:
         What each job goes back to.
     """
 
-    lines: dict[str, Line]
+    lines: dict[str, WaitingLine]
     sent: dict[str, list[int]] = field(default_factory=dict)
     refused: dict[str, set[int]] = field(default_factory=dict)
     left: dict[Job, int] = field(default_factory=dict)
@@ -119,7 +119,7 @@ class Rehearsal:
 
     def play(
         self,
-        lines: Mapping[str, Line],
+        lines: Mapping[str, WaitingLine],
         woken: Mapping[str, np.ndarray],
         end: int,
         roots: Mapping[Job, Root],
@@ -164,7 +164,7 @@ class Rehearsal:
                 if arrival is not None and arrival < end:
                     push(events, (arrival, _WAKE, players[target].place, target, root))
 
-        def begin(name: str, line: Line, now: int) -> None:
+        def begin(name: str, line: WaitingLine, now: int) -> None:
             job = line.waiting.popleft()
             done = now + line.service.of(*job)
             line.working = (job, now, done)

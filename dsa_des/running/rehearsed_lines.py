@@ -10,7 +10,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
 from dsa_des.running.processors import Deliver, Processing
-from dsa_des.running.rehearsal import Job, Line, Player, Rehearsal, Rehearsed, Root
+from dsa_des.running.rehearsal import Job, Player, Rehearsal, Rehearsed, Root, WaitingLine
 
 
 class Performer(Protocol):
@@ -52,7 +52,7 @@ class RehearsedLines:
 
     def __init__(
         self,
-        lines: Mapping[str, Line],
+        lines: Mapping[str, WaitingLine],
         processor_of: Mapping[str, str],
         ticks_per_s: int,
         record: Callable[[str, Message], None],

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import (
     PairingRules,
-    Steps,
+    StepDensity,
     speeds_over_directions,
 )
 from components.encounters.pairing import Pairs, PairSampler
@@ -97,8 +97,8 @@ TURNS = """\
 #: Nothing is rejected that is only near when it begins.
 FREE = {"start_vertical_ft": 0.0}
 PLAIN = {
-    "vertical_ft": Steps(np.array([-1500.0, 1500.0]), np.array([1.0])),
-    "horizontal_ft": Steps(np.array([-18240.0, 18240.0]), np.array([1.0])),
+    "vertical_ft": StepDensity(np.array([-1500.0, 1500.0]), np.array([1.0])),
+    "horizontal_ft": StepDensity(np.array([-18240.0, 18240.0]), np.array([1.0])),
 }
 
 
@@ -265,9 +265,9 @@ def test_rules_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="closest_s = 200: must lie between 0 and"):
         PairingRules(closest_s=200)
     with pytest.raises(ValueError, match="3 edges need 2 proportions; there are 1"):
-        Steps(np.array([0.0, 1.0, 2.0]), np.array([1.0]))
+        StepDensity(np.array([0.0, 1.0, 2.0]), np.array([1.0]))
     with pytest.raises(ValueError, match="rising"):
-        Steps(np.array([1.0, 0.0]), np.array([1.0]))
+        StepDensity(np.array([1.0, 0.0]), np.array([1.0]))
 
 
 def test_published_models_pair(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
+from components.messages.steering import Manoeuvre
 from components.traffic.steered_flight import SteeredFlight
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
@@ -111,7 +112,8 @@ def test_a_scan_follows_the_flight_that_is_known_when_it_begins(
     came_s = [order["time_s"] + delay_s for order in orders]
     flights: list[Any] = [SteeredFlight(traffic.own.flight)]
     for order, at_s in zip(orders, came_s, strict=True):
-        flights.append(flights[-1].turned(at_s, order["turn_rad"], order["rate_rad_s"]))
+        turn = Manoeuvre(order["turn_rad"], order["rate_rad_s"])
+        flights.append(flights[-1].steered(at_s, turn))
     compared = under_way = 0
     for row in tables["detections"].to_pylist():
         scan_s, lit_s = float(row["scan"]), row["illuminated_s"]

@@ -168,7 +168,7 @@ def camera(dice: Dice, table: dict[str, Any]) -> None:
         if dice.chance(0.2, "plume"):
             table["plume"] = True
         if dice.chance(0.3, "infrared band"):
-            table["band"] = dice.pick("mwir", "lwir")
+            table["extinction_band"] = dice.pick("mwir", "lwir")
     elif dice.chance(0.4, "background"):
         table["background"] = dice.pick("auto", "sky", "ground")
         dice.maybe(table, "sky", 0.5, "clear", "partly_cloudy", "overcast")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from components.geometry.ellipsoid import line_of_sight
+from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
@@ -59,7 +60,8 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
         for row in (0, 17):  # an instant alone says the same
             _, alone, _, at_once = culling.cut(own, times[row : row + 1])
             assert alone[at_once[0]].tolist() == columns[near[row]].tolist()
-        own = own.turned(later, math.radians(draw.uniform(-170, 170)), math.radians(3.0))
+        turn = Manoeuvre(math.radians(draw.uniform(-170, 170)), math.radians(3.0))
+        own = own.steered(later, turn)
         assert own.max_speed_mps < 70.0 * 1.01
         now = later
     assert in_reach > 0

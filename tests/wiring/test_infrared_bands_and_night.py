@@ -45,12 +45,12 @@ def clear_air(band, target, density):
     return float(np.exp(-depth * range_m / 1e3).mean())
 
 
-@covers("band", of=("optical.ir",))
+@covers("extinction_band", of=("optical.ir",))
 @covers("vapour_density_g_m3", of=("[weather]",))
 @pytest.mark.parametrize("band", ["mwir", "lwir"])
 @pytest.mark.parametrize("density", [3.0, 20.0])
 def test_clear_air_takes_its_share_by_its_humidity(band, density):
-    found = transmissions(sensor("optical.ir", band=band), vapour_density_g_m3=density)
+    found = transmissions(sensor("optical.ir", extinction_band=band), vapour_density_g_m3=density)
     assert set(found) == {"rolling", "diving"}
     for target in crooked.TARGETS:
         expected = clear_air(band, target, density)
@@ -59,10 +59,10 @@ def test_clear_air_takes_its_share_by_its_humidity(band, density):
     assert visible["rolling"] == pytest.approx(1.0)
 
 
-@covers("band", of=("optical.ir",))
+@covers("extinction_band", of=("optical.ir",))
 @pytest.mark.parametrize("band", ["mwir", "lwir"])
 def test_haze_takes_less_than_of_visible_light_and_rain_as_much(band):
-    camera = sensor("optical.ir", band=band)
+    camera = sensor("optical.ir", extinction_band=band)
     range_m = path(crooked.ROLLING)[0]
     dry = transmissions(camera, vapour_density_g_m3=0.0)["rolling"]
     hazy = transmissions(camera, vapour_density_g_m3=0.0, visibility_km=8.0)["rolling"]
@@ -102,7 +102,10 @@ def test_at_night_cameras_for_visible_light_see_nothing():
 
 @pytest.mark.parametrize(
     ("changes", "says"),
-    [({"band": "swir"}, "band.*'visible', 'mwir' or 'lwir'"), ({"band": 4}, "band")],
+    [
+        ({"extinction_band": "swir"}, "extinction_band.*'visible', 'mwir' or 'lwir'"),
+        ({"extinction_band": 4}, "extinction_band"),
+    ],
 )
 def test_a_band_that_there_is_not_is_named(changes, says):
     from dsa_des.errors import SceneError

@@ -16,7 +16,7 @@ _PHASES = 32
 
 
 @dataclass(frozen=True)
-class Approach:
+class HeadOn:
     """Describe a head-on encounter and the one look whose Pd is known.
 
     Parameters
@@ -52,13 +52,13 @@ def known_snr_at_1_m(
 
 
 def ranges_of_declaration(
-    approach: Approach, scan_rate_hz: float, m: int, n: int, *, pulses: int, summed: bool = False
+    approach: HeadOn, scan_rate_hz: float, m: int, n: int, *, pulses: int, summed: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Return ranges of the looks of all phases, and the probability of a first declaration there.
 
     Parameters
     ----------
-    approach : Approach
+    approach : HeadOn
     scan_rate_hz : float
     m, n : int
         Detections that declare, of so many looks; 1 and 1 for the first detection.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.checks import FloatArray
-from components.evidence.scan_rate.expected import Approach
+from components.evidence.scan_rate.expected import HeadOn
 from components.evidence.thesis.plotting import BLUE, GREEN, GREY, legend_below, panels
 from dsa_des.library.study import study
 
@@ -46,7 +46,7 @@ outlasts n scans.
 
 
 def declared_by_recursion(
-    approach: Approach,
+    approach: HeadOn,
     scan_rate_hz: float,
     m: int,
     n: int,
@@ -63,7 +63,7 @@ def declared_by_recursion(
 
     Parameters
     ----------
-    approach : Approach
+    approach : HeadOn
     scan_rate_hz : float
     m, n : int
     pulses : int
@@ -101,14 +101,14 @@ def declared_by_recursion(
     return declared
 
 
-def fading_section(images: Path, approach: Approach, m: int, n: int, certain: float) -> str:
+def fading_section(images: Path, approach: HeadOn, m: int, n: int, certain: float) -> str:
     """Run the study of fades that last, draw its figure and return the section.
 
     Parameters
     ----------
     images : Path
         Folder that receives the figure.
-    approach : Approach
+    approach : HeadOn
     m, n : int
     certain : float
         Share that is declared by the range that is told.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.evidence.scan_rate.expected import (
-    Approach,
+    HeadOn,
     certain_range_m,
     known_snr_at_1_m,
     mean_range_m,
@@ -108,7 +108,7 @@ def study_scene() -> Scene:
     return changed_scene(described.base, described.swaps, described.sets, str(path))
 
 
-def approach_of(scene: Scene) -> Approach:
+def approach_of(scene: Scene) -> HeadOn:
     """Return the encounter of the study, from its scene's own numbers."""
     radar: Any = scene.blocks["radar"].parameters
     traffic: Any = scene.blocks["traffic"].parameters
@@ -116,7 +116,7 @@ def approach_of(scene: Scene) -> Approach:
     target = next(one for one in traffic.intruders if one.name == "head_on")
     closing = traffic.ownship.speed_mps + target.speed_mps
     away_m = math.hypot(target.east_m, target.north_m, target.up_m)
-    return Approach(
+    return HeadOn(
         known_snr_at_1_m(
             rcs_dbsm=radar.calibrate.rcs_dbsm,
             range_m=1000.0 * radar.calibrate.range_km,
@@ -133,7 +133,7 @@ def approach_of(scene: Scene) -> Approach:
 
 
 def of_budget(
-    approach: Approach, budget: str, rate_hz: float, m: int = M, n: int = N
+    approach: HeadOn, budget: str, rate_hz: float, m: int = M, n: int = N
 ) -> tuple[Any, Any]:
     """Return ranges and probabilities with a free scan, or what the scan leaves of 5 pulses."""
     pulses = approach.pulses
@@ -145,7 +145,7 @@ def of_budget(
 
 
 def best_rate(
-    approach: Approach, value: Callable[[Any, Any], float], budget: str = "dwell"
+    approach: HeadOn, value: Callable[[Any, Any], float], budget: str = "dwell"
 ) -> tuple[float, float]:
     """Return the scan rate at which a range is largest, of 5 Hz over whole numbers, and that."""
     rates = [approach.pulses / pulses for pulses in range(1, 61)]
@@ -158,7 +158,7 @@ def _certain(range_m: Any, probability: Any) -> float:
     return certain_range_m(range_m, probability, CERTAIN)
 
 
-def table(found: dict[tuple[str, float], Any], approach: Approach, rates: list[float]) -> list[str]:
+def table(found: dict[tuple[str, float], Any], approach: HeadOn, rates: list[float]) -> list[str]:
     """Return the lines of the table: range declared by 95 % and on average, run and computed."""
     lines = [
         "| scan rate, Hz | pulses | free: 95 %, km | computed | mean | with a budget: 95 %, km "
@@ -186,7 +186,7 @@ def _km(range_m: float) -> str:
     return f"{range_m / 1000:.2f}" if range_m > 0 else "never"
 
 
-def _explained(approach: Approach) -> str:
+def _explained(approach: HeadOn) -> str:
     rate, range_m = best_rate(approach, _certain)
     mean_rate, _ = best_rate(approach, mean_range_m)
     scan_m = approach.closing_m_s / rate
@@ -205,7 +205,7 @@ def _explained(approach: Approach) -> str:
 
 
 def draw(
-    path: Path, found: dict[tuple[str, float], Any], approach: Approach, rates: list[float]
+    path: Path, found: dict[tuple[str, float], Any], approach: HeadOn, rates: list[float]
 ) -> None:
     """Draw ranges over scan rate: on average, and declared by 95 %."""
     fine = [approach.pulses / pulses for pulses in range(1, 51)]
