@@ -27,9 +27,9 @@ _TIFF = (".tif", ".tiff")
 _PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class RasterOfFile:
-    """A raster that was read while the scene was checked.
+    """A raster that was read while the scene was checked; equal where the same file was read once.
 
     Parameters
     ----------

@@ -42,6 +42,8 @@ def updated_by_all(
     taken = np.bincount(track, weights=share, minlength=count)
     none = np.maximum(1.0 - taken, 0.0)
     gain = missing + np.log1p(np.bincount(track, weights=weight, minlength=count))
+    # Where nothing is in the gate all stays as it was, to the bit, as without this function.
+    paired = np.bincount(track, minlength=count) > 0
     # Per model: probability of each (pair, model) and of each (miss, model).
     by_model, states, covariances = [], [], []
     parts = []
@@ -61,11 +63,11 @@ def updated_by_all(
         state = np.concatenate([part.states()[m], *(one[0][m] for one in parts)], axis=1)
         within = np.concatenate([part.covariances()[m], *(one[1][m] for one in parts)], axis=2)
         mean, spread = mixture_by_track(every, count, chance / safe[every], state, within)
-        nothing = total <= modes.LEAST  # an impossible model stays as predicted
-        states.append(np.where(nothing, part.states()[m], mean))
-        covariances.append(np.where(nothing, part.covariances()[m], spread))
+        moved = paired & (total > modes.LEAST)  # an impossible model stays as predicted
+        states.append(np.where(moved, mean, part.states()[m]))
+        covariances.append(np.where(moved, spread, part.covariances()[m]))
     weights = np.stack(by_model)
-    weights = weights / weights.sum(axis=0)
+    weights = np.where(paired, weights / weights.sum(axis=0), part.weights)
     hit = taken > 0.5
     order = np.lexsort((share, track))
     last = np.flatnonzero(np.append(track[order][1:] != track[order][:-1], True))

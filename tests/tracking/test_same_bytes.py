@@ -15,8 +15,10 @@ KINDS = {
     "nearest": ["tracker=tracking.ekf", "blocks.tracker.association='nearest'"],
     "ukf": ["tracker=tracking.ukf"],
     "imm": ["tracker=tracking.imm", "blocks.tracker.models=['velocity','turn','acceleration']"],
-    "jpda": ["tracker=tracking.imm", "blocks.tracker.association='jpda'"],
-}
+    # Detections fall beside the gates of tracks that company would have gone through again.
+    "jpda": ["tracker=tracking.imm", "blocks.tracker.association='jpda'",
+             "navigation.attitude_noise_deg=[0.3,0.3,0.3]"],
+}  # fmt: skip
 NEARER = [
     "blocks.traffic.intruders.0.north_m=4000", "blocks.traffic.intruders.1.north_m=3500",
     "blocks.traffic.intruders.1.east_m=3000", "blocks.radar.false_alarms=true",

@@ -145,6 +145,14 @@ def test_a_beam_that_sweeps_meets_the_fade_of_its_own_instant():
     assert np.nanmin(late) < 0.3 < np.nanmax(late)
 
 
+def test_an_echo_fades_between_two_publications_of_where_its_target_is():
+    radar = {**RADAR, **LOUD, "fluctuation_correlation_s": 0.2}
+    scene = chain({"sensor": radar}, targets=formation(3))
+    scene["blocks"]["traffic"]["update_rate_hz"] = 1
+    published = {(row["scan"], row["target"]): row["snr_db"] for row in rows(dsa_des.run(scene))}
+    assert len(published) == len(set(published.values())) == 30
+
+
 def ball(x: Any) -> Any:
     """Return the Fourier transform of an even ball of radius 1, over its volume."""
     return 3.0 * (np.sin(x) - x * np.cos(x)) / x**3

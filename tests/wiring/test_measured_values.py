@@ -114,6 +114,17 @@ def test_range_rate_of_published_positions_is_that_of_the_flight():
     np.testing.assert_allclose(held[:10:2], exact[0], rtol=1e-9)
 
 
+def test_range_rate_of_a_late_picture_is_that_of_its_own_instant():
+    block = sensor("radar.threshold", scan_rate_hz=10, measures_range_rate=True)
+    scene = chain({"sensor": block})
+    exact = [row["range_rate_m_s"] for row in rows(run(scene))]
+    scene["wires"] = [
+        {"from": "traffic", "to": "transform", "delay_s": 0.3}, "transform -> gate -> sensor"
+    ]  # fmt: skip
+    late = [row["range_rate_m_s"] for row in rows(run(scene))]
+    assert late == pytest.approx(exact[:-6], abs=1e-6) and len(late) == 14
+
+
 def test_range_rate_begins_and_ends_with_a_flight():
     short = {**crooked.ROLLING, "start_time_s": 0.2, "end_time_s": 0.8}
     keys = {"measures_range_rate": True, "scan_rate_hz": 10}

@@ -1,6 +1,7 @@
 """The operator in a closed loop: when it acts, by how much, and what its keys change."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -87,6 +88,29 @@ def test_drawn_pilots_differ_and_each_is_the_same_again(tmp_path):
 def test_an_alert_that_ends_is_not_acted_on(tmp_path):
     found = scene(tmp_path, initial_delay_s=200.0)
     assert rows(run(found), "manoeuvres") == []
+
+
+def test_as_long_as_an_alert_lasts_the_next_decisions_follow_after_the_mean_pause(tmp_path):
+    """At level 1 after 9 + 6 s, at 2 after 6 + 3 s; then it takes 3 s more to execute it.
+
+    A second aircraft's alert, long after the first one's, is answered as the first one's was.
+    """
+    loop = scene(tmp_path, turn_share=0.0, vertical_rate_mps=0.05)
+    first_one = loop["blocks"]["traffic"]["intruders"][0]
+    late = {**first_one, "name": "late", "up_m": -120.0, "east_m": 2.6 * first_one["east_m"],
+            "north_m": 2.6 * first_one["north_m"]}  # fmt: skip
+    loop["blocks"]["traffic"]["intruders"] = [first_one, late]
+    loop["duration_s"] = 250
+    found = run(loop)
+    told = [row["time_s"] for row in rows(found, "manoeuvres")]
+    level = {row["time_s"]: 0 for row in rows(found, "alerts")}
+    for row in rows(found, "alerts"):
+        level[row["time_s"]] = max(level[row["time_s"]], row["level"])
+    times = sorted(level)
+    begins = [b for a, b in pairwise(times) if level[a] == 0 < level[b]]
+    assert len(begins) == 2 and begins[1] - begins[0] > 100.0
+    answers = [[t - begin for t in told if begin <= t <= begin + 60.0] for begin in begins]
+    assert answers[0][:3] == [23.0, 41.0, 53.0] and answers[1][0] == 23.0
 
 
 def uniforms(count):

@@ -197,3 +197,21 @@ def test_noise_fills_the_beams_of_the_field_of_view():
                        false_alarm_probability=1e-3, duration_s=4), target=None)  # fmt: skip
     low, high = binom.interval(0.99, 20 * 10 * 30 * 200, 1e-3)
     assert low <= len(found) <= high
+
+
+@pytest.mark.parametrize("kind", RADARS)
+def test_astern_the_last_cell_is_the_first_one(kind):
+    """One to the left of the tail and one to its right, both within half a cell of it."""
+    own = {**crooked.OWNSHIP, "yaw_deg": 217.0, "pitch_deg": 0.0, "roll_deg": 0.0}
+    still = {"up_m": 0.0, "heading_deg": 217.0, "speed_mps": 70.0, "climb_mps": 3.0}
+    behind = []
+    for off in (-1.0, 1.0, 2.5):
+        bearing = math.radians(37.0 + off)
+        place = {"east_m": 2100.0 * math.sin(bearing), "north_m": 2100.0 * math.cos(bearing)}
+        behind.append({"name": f"at {off}", **place, **still})
+    cell = {name: step for name, step in CELL.items() if not name.startswith("mount")}
+    scene = chain(
+        {"radar": sensor(kind, **cell, resolution_cells=True)}, ownship=own, targets=behind
+    )
+    reported = {row["target"] for row in rows(run(scene))}
+    assert len(reported) == 2 and "at 2.5" in reported

@@ -141,6 +141,29 @@ def test_a_ridge_hides_what_is_behind_it(offset_m, tmp_path):
     assert len(rows(free)) == 4
 
 
+@covers("refraction", of=("[terrain]",))
+@pytest.mark.parametrize("horizon", [True, False])
+def test_bent_rays_pass_a_ridge_that_straight_ones_do_not(horizon, tmp_path):
+    """The air lifts the ray over the crest by a quarter of what the Earth falls away there."""
+    crest = round(line_over_the_crest_m(600.0))
+    place = OWN["lat_deg"], OWN["lon_deg"], 1000.0
+    there = pymap3d.geodetic2ned(OWN["lat_deg"], -179.8, 600.0, *place)
+    length_m, share = float(np.linalg.norm(there)), (179.9997 - 179.9) / (179.9997 - 179.8)
+    arch_m = 0.25 * length_m**2 * share * (1.0 - share) / (2.0 * R)
+    assert 1.0 < arch_m < 2.0
+    targets = [behind_the_wall(600.0 + 2 * up, f"at {up}") for up in (-3, -1, 1)]
+    own = {**OWN, "alt_m": 1000.0}
+    for refraction, lift_m in (("none", 0.0), ("four_thirds", arch_m)):
+        terrain = {"raster": wall(tmp_path, crest), "refraction": refraction, "horizon": horizon}
+        found = rows(run(chain({"radar": RADAR}, ownship=own, targets=targets, terrain=terrain)))
+        expected = {
+            one["name"] for one in targets
+            if line_over_the_crest_m(one["alt_m"]) + lift_m > crest
+        }  # fmt: skip
+        assert len(expected) == (1 if refraction == "none" else 2)
+        assert {row["target"] for row in found} == expected
+
+
 @covers("horizon", of=("[terrain]",))
 def test_from_above_there_is_sky_down_to_the_dip_of_the_horizon():
     """From 2400 m the horizon dips by 1.57°: a target 1° below the horizontal is before the sky."""
@@ -204,3 +227,22 @@ def test_bad_values_are_one_clear_error(terrain, says, tmp_path, monkeypatch):
     import re
 
     assert re.search(says, str(caught.value).replace("\n", " "))
+
+
+def test_replicas_over_one_raster_run_in_lock_step():
+    """Each reads its scene anew; the ground is the same one."""
+    import pyarrow.compute as pc
+
+    from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.replicas.lockstep import lock_step
+
+    def load(seed):
+        sets = [f"seed={seed}", "blocks.radar.false_alarm_probability=0.2"]
+        return dsa_des.load_scene("configs/terrain/behind_the_ridge.toml", sets=sets, duration_s=4)
+
+    memory = MemorySink()
+    lock_step([load(1), load(2)], recorder=Recorder([memory])).run()
+    together = memory.tables()["scans"]
+    for number, seed in enumerate((1, 2)):
+        mine = together.filter(pc.equal(together["replica"], number)).drop_columns("replica")
+        assert mine.to_pylist() == dsa_des.run(load(seed)).scans.to_pylist()

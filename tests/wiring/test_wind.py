@@ -7,6 +7,7 @@ import numpy as np
 import pymap3d
 import pytest
 from covering import covers
+from test_avoidance_by_bands import scene as steered_scene
 from wired import chain, first_look, rows, run, sensor
 
 from components.traffic.legs import Climb, ScriptedTrajectory, Straight, Turn
@@ -118,6 +119,14 @@ def test_a_fixed_attitude_stays_and_so_do_who_stand():
     row = rows(run(chain({"radar": RADAR}, ownship=fixed, targets=[TARGET], weather=WIND)))[0]
     # Where the yaw says nothing of the track, the pitch is that over the ground.
     assert pose(row) == pytest.approx([100.0, math.degrees(math.atan2(3.0, 70.0)), 5.0])
+    # Each angle that is fixed stays alone.
+    heading, airspeed = through_air(217.0, 70.0)
+    derived = {"yaw_deg": heading, "pitch_deg": math.degrees(math.atan2(3.0, airspeed)),
+               "roll_deg": 0.0}  # fmt: skip
+    for angle in ("pitch_deg", "roll_deg"):
+        part = {**OWN, angle: 9.0}
+        row = rows(run(chain({"radar": RADAR}, ownship=part, targets=[TARGET], weather=WIND)))[0]
+        assert pose(row) == pytest.approx([*{**derived, angle: 9.0}.values()])
     hovering = {**OWN, "speed_mps": 0.0, "climb_mps": 0.0}
     row = rows(run(chain({"radar": RADAR}, ownship=hovering, targets=[TARGET], weather=WIND)))[0]
     assert pose(row) == pytest.approx([217.0, 0.0, 0.0])
@@ -236,3 +245,48 @@ def test_who_drifts_with_the_air_points_along_the_track():
     air = Wind(10 * math.sin(0.5), 10 * math.cos(0.5))
     heading, airspeed = heading_and_airspeed(np.array([0.5]), np.array([10.0]), air)
     assert heading[0] == 0.5 and airspeed[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_who_is_culled_changes_nobody_s_nose():
+    """Flights of many speeds and of fixed attitudes, with others first that nobody looks at."""
+    legs = {"climb_mps": 0.0, "legs": [{"kind": "turn", "rate_deg_s": 3.0, "duration_s": 2},
+                                       {"kind": "straight"}]}  # fmt: skip
+    near = [
+        {**TARGET, **legs, "name": "turns"}, {**TARGET, "name": "rolled", "roll_deg": 33.0},
+        {**TARGET, "name": "slow", "speed_mps": 35.0},
+    ]  # fmt: skip
+    far = [
+        {**TARGET, "name": "far", "north_m": 90_000.0, "yaw_deg": 10.0, "speed_mps": 99.0},
+        {**TARGET, **legs, "name": "fast", "north_m": -90_000.0, "speed_mps": 120.0},
+    ]
+    eo = sensor("optical.eo", scan_rate_hz=2, range_km=5.0)
+    seen = []
+    for targets in (near, [*far, *near]):
+        found = rows(run(chain({"eo": eo}, ownship=OWN, targets=targets, weather=WIND,
+                               duration_s=4)))  # fmt: skip
+        seen.append({(row["scan"], row["target"]): row["pixels"] for row in found})
+    assert seen[0] == seen[1] and len(seen[0]) == 24
+
+
+def test_a_steered_ownship_leaves_its_fixed_attitude_and_turns_into_the_wind(tmp_path):
+    loop = steered_scene(tmp_path, level=1)
+    loop["blocks"]["traffic"]["ownship"] |= {"roll_deg": 5.0}
+    loop["weather"] = WIND
+    loop["duration_s"] = 60
+    found = run(loop)
+    told_s = rows(found, "manoeuvres")[0]["time_s"]
+    own = [row for row in rows(found, "truth") if row["target"] is None]
+    assert {row["time_s"] > told_s + 1.0 for row in own} == {True, False}
+    for row in own:
+        through = np.array([row["velocity_east_m_s"], row["velocity_north_m_s"]]) - AIR
+        turned = row["heading_rad"] - math.atan2(*through)
+        assert math.remainder(turned, 2 * math.pi) == pytest.approx(0.0, abs=2e-2)
+        track = math.atan2(row["velocity_east_m_s"], row["velocity_north_m_s"])
+        # Of the turn's acceleration, what is across the nose.
+        bank = math.tan(row["roll_rad"]) / math.cos(row["heading_rad"] - track)
+        if row["time_s"] <= told_s:
+            assert row["roll_rad"] == pytest.approx(math.radians(5.0))
+        elif abs(bank) > 1e-9:
+            assert abs(bank) == pytest.approx(50.0 * math.radians(3.0) / G, rel=0.02)
+    assert own[-1]["roll_rad"] == pytest.approx(0.0, abs=1e-9)
+    assert any(abs(row["roll_rad"]) > 0.15 for row in own)
