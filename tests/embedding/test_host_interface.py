@@ -47,7 +47,7 @@ def test_one_plane_dead_ahead(simulator):
 
 @pytest.mark.parametrize("height_m", [0.0, 900.0])
 def test_ground_clutter_hides_a_host_s_plane(scene, height_m):
-    """The ground may lie at or above the ellipsoid: it is where the scene says for a host as well."""
+    """Ground at the ellipsoid or above it, where the scene says: for a host as well."""
     beam = ["radar.azimuth_beamwidth_deg=10", "radar.elevation_beamwidth_deg=30",
             "radar.budget='free'", "radar.false_alarm_probability=1e-6"]  # fmt: skip
     own, low = (0.9, 0.07, height_m + 300.0), (0.9 + 2e-4, 0.07, height_m + 30.0)
