@@ -178,7 +178,10 @@ def _draw(
     from dsa_des.record.drawing import drawing
 
     styles: list[Any] = list(zip(contours, ("#FFFFFF", "#D55E00"), ("--", "-"), strict=True))
-    with drawing(7.4, 3.5, path) as figure:
+    # A column for each model, and one for the bar of shades.
+    width_in = 1.4 + 2.0 * len(maps)
+    left, pitch = 0.56 / width_in, 2.0 / width_in
+    with drawing(width_in, 3.5, path) as figure:
         figure.suptitle(
             f"{title}, worst of all bearings, both aircraft 1 km high\n{note}",
             x=0.06,
@@ -187,7 +190,7 @@ def _draw(
         )
         shades: Any = None
         for column, (found, error) in enumerate(zip(maps, errors, strict=True)):
-            axes = figure.add_axes((0.075 + 0.272 * column, 0.235, 0.25, 0.53))
+            axes = figure.add_axes((left + pitch * column, 0.235, 0.92 * pitch, 0.53))
             inside = np.clip(error, *limits)
             shades = axes.pcolormesh(
                 found.range_m / 1000.0,
@@ -210,7 +213,8 @@ def _draw(
             axes.set_title(found.model.replace("_", " "), loc="left")
             if column == 0:
                 axes.set_ylabel("latitude [deg]")
-        bar = figure.colorbar(shades, cax=figure.add_axes((0.885, 0.235, 0.018, 0.53)))
+        place = (left + pitch * len(maps), 0.235, 0.13 / width_in, 0.53)
+        bar = figure.colorbar(shades, cax=figure.add_axes(place))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.set_title(unit, fontsize=9)
         handles = [

@@ -55,7 +55,7 @@ def test_a_run_whose_figures_do_not_fit_is_kept(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     done = limited(
-        30_000, "run", configs / "first_light.toml", "--duration", "20", "--quiet", "--out", "o"
+        60_000, "run", configs / "first_light.toml", "--duration", "20", "--quiet", "--out", "o"
     )
     assert done.returncode == 1
     assert done.stderr == (

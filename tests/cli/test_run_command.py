@@ -54,6 +54,7 @@ def test_run_folder_is_complete_and_readable(first_light: tuple[Path, dict]) -> 
         "fused.parquet",
         "scans.parquet",
         "tracks.parquet",
+        "truth.parquet",
         "plan.png",
         "timeline.png",
     }

@@ -47,6 +47,7 @@ from components.sensor import Look, Sensor, SensorParameters
 
 class FragileParameters(SensorParameters):
     reach_km: float = 5.0
+    range_resolution_m: float = 0.0
     flaw: str = "none"
 
 

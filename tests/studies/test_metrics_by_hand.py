@@ -200,9 +200,29 @@ def with_alerts(folder: Path) -> str:
     return "alarm.toml"
 
 
-@pytest.mark.parametrize("name", sorted(registered(METRICS)))
+def with_estimates(folder: Path) -> str:
+    """The small scene with a tracker that estimates states."""
+    text = (folder / "small.toml").read_text(encoding="utf-8")
+    for old, new in (
+        ("fusion.pick_best", "fusion.pass_through"),
+        ("tracking.stub", "tracking.ekf"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    grid = "azimuth_resolution_deg = 0.5\nelevation_resolution_deg = 0.5\nrange_resolution_m = 20\n"
+    text = text.replace("reach_km =", f"{grid}reach_km =")
+    (folder / "estimates.toml").write_text(text, encoding="utf-8")
+    return "estimates.toml"
+
+
+# Of traffic and loops that the small scene has not; tests/encounters and tests/wiring have them.
+ELSEWHERE = {"encounter_weight", "mitigated"}
+
+
+@pytest.mark.parametrize("name", sorted(registered(METRICS).keys() - ELSEWHERE))
 def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) -> None:
-    scene = load_scene(with_alerts(small) if name == "alert_times" else "small.toml")
+    of_others = {"alert_times": with_alerts, "tracking": with_estimates}
+    scene = load_scene(of_others[name](small) if name in of_others else "small.toml")
     metric = MetricSpec(name).build(scene)
     wanted = wanted_by([metric])
     replicas = [

@@ -160,9 +160,9 @@ FITS = {**VIEW, **BEAMS, "dwell_s": 0.01}
         ({**DWELL, "bandwidth_hz": None, "calibrate": {"rcs_dbsm": 3.0, "range_km": 2.0,
           "pd": 0.9}}, "how long was the look"),
         ({**DWELL, "moving_target_filter": "filter_bank", "filter_pulses": 40},
-         "takes 40 pulses, and a look has 35"),
+         "adds up 40 pulses, and a look has 35"),
         ({**FITS, "prf_hz": 250.0, "moving_target_filter": "double_canceller"},
-         "takes 3 pulses, and a look has 2"),
+         "adds up 3 pulses, and a look has 2"),
         ({"budget": "dwel"}, "did you mean 'dwell'"),
     ],
 )  # fmt: skip
