@@ -182,4 +182,11 @@ FAULTS = [
         ("false-alarms-made-when-they-come", "new.message.measured_ticks()[false]",
          "np.repeat(new.tick, np.diff(new.message.offsets))[false]"),
     ),
+    *in_file(
+        _GROUP, "components/optical/background.py", "wiring/test_what_the_earth_hides.py",
+        ("dip-of-straight-rays", "terrain.height_m or 0.0, terrain.refraction",
+         'terrain.height_m or 0.0, "none"'),
+        ("dip-of-the-sea", 'cells.of_row("own_alt_m") - surface_m, refraction',
+         'cells.of_row("own_alt_m"), refraction'),
+    ),
 ]  # fmt: skip

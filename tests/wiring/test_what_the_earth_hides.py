@@ -169,6 +169,7 @@ def test_from_above_there_is_sky_down_to_the_dip_of_the_horizon():
     """From 2400 m the horizon dips by 1.57°: a target 1° below the horizontal is before the sky."""
     targets = [
         far("above the limb", 6e3, OWN["alt_m"] + 2300 - 105.0),
+        far("between", 6e3, OWN["alt_m"] + 2300 - 149.0),
         far("below it", 6e3, OWN["alt_m"] + 2300 - 210.0),
     ]
     own = {**OWN, "alt_m": 2400.0}
@@ -185,6 +186,12 @@ def test_from_above_there_is_sky_down_to_the_dip_of_the_horizon():
     assert with_horizon["below it"] == ground["below it"]
     fixed = signatures("ground", terrain={"horizon": True})
     assert fixed == ground
+    # At 1.45°: over the sea's limb, below that of bent rays (1.36°) and of a plateau (1.24°).
+    assert with_horizon["between"] == sky["between"] != ground["between"]
+    for nearer in ({"refraction": "four_thirds"}, {"height_m": 900.0}):
+        found = signatures("auto", terrain={"horizon": True, **nearer})["between"]
+        assert found == pytest.approx(ground["between"], rel=1e-3)
+        assert found != pytest.approx(sky["between"], rel=1e-3)
 
 
 @pytest.mark.parametrize(
