@@ -265,6 +265,9 @@ class Simulator:
         own, count = np.zeros((1, 6)), len(self._planes)
         rows = np.zeros((count, 6))
         rows[:, 0] = 1e-4  # some 600 m ahead
+        terrain: Any = self.scene.sections.get("terrain")
+        if terrain is not None and terrain.height_m is not None:
+            own[0, 2] = rows[:, 2] = terrain.height_m + 1000.0  # nobody flies below the ground
         traffic: Any = chain.components[self._source]
         for _ in range(len(self.scene.blocks)):
             step = chain.due(chain.tick_of(chain.next_scan_s()))

@@ -45,6 +45,20 @@ def test_one_plane_dead_ahead(simulator):
     assert sighting.confidence["radar"] > 20  # dB
 
 
+@pytest.mark.parametrize("height_m", [0.0, 900.0])
+def test_ground_clutter_hides_a_host_s_plane(scene, height_m):
+    """Ground at the ellipsoid or above it, where the scene says: for a host as well."""
+    beam = ["radar.azimuth_beamwidth_deg=10", "radar.elevation_beamwidth_deg=30",
+            "radar.budget='free'", "radar.false_alarm_probability=1e-6"]  # fmt: skip
+    own, low = (0.9, 0.07, height_m + 300.0), (0.9 + 2e-4, 0.07, height_m + 30.0)
+    for gamma_db, seen in ((-80, True), (-10, False)):
+        ground = [f"terrain.height_m={height_m}", f"terrain.clutter_gamma_db={gamma_db}"]
+        simulator = Simulator(scene, sets=[f"blocks.{key}" for key in beam] + ground)
+        simulator.add_plane("near", rcs_dbsm=20.0)
+        result = simulator.simulate(own, LEVEL, low, HEAD_ON, 0.2)
+        assert ("radar" in result["near"].sensors) is seen
+
+
 def test_nothing_due_nothing_seen(simulator):
     simulator.simulate(OWN, LEVEL, AHEAD, HEAD_ON, 0.2)
     result = simulator.simulate(OWN, LEVEL, AHEAD, HEAD_ON, 0.21)

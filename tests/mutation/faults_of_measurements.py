@@ -9,6 +9,7 @@ _ERRORS = (
 )
 _IN_CELL = "wiring/test_noise_lies_in_its_cell.py"
 _VARIANCES = "wiring/test_variances_of_detections.py"
+_CARRIED = "wiring/test_what_fusion_carries.py"
 
 FAULTS = [
     *in_file(
@@ -152,5 +153,33 @@ FAULTS = [
         ("has-acted-for-good",
          "self._since, self._acts_at, self._has_acted = None, None, False",
          "self._since, self._acts_at = None, None"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/carried.py", _CARRIED,
+        ("carried-by-the-opposite-rate", "reach + other.range_rate_m_s[theirs[moved]]",
+         "reach - other.range_rate_m_s[theirs[moved]]"),
+        ("carried-without-its-rate", "* ticks[moved] / self._ticks_per_s", "* ticks[moved] * 0.0"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/fusion_block.py", _CARRIED,
+        ("rate-of-the-coarsest",
+         "for name in reversed(best_angles)\n            if offers[name].measures_range_rate",
+         "for name in best_angles\n            if offers[name].measures_range_rate"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/gated.py", _CARRIED,
+        ("target-of-the-worst-sensor", "for name in reversed(order):", "for name in order:"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/gate_match.py", _CARRIED,
+        ("nothing-measured-later", 'anchor_ticks + gate_ticks, side="right"',
+         'anchor_ticks, side="right"'),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/false_alarms.py", _CARRIED,
+        ("poses-of-other-entries", "poses(new.message)[:, false]",
+         "poses(new.message)[:, : len(false)]"),
+        ("false-alarms-made-when-they-come", "new.message.measured_ticks()[false]",
+         "np.repeat(new.tick, np.diff(new.message.offsets))[false]"),
     ),
 ]  # fmt: skip
