@@ -18,6 +18,14 @@ def test_the_ownship_turns_out_of_the_way():
     assert closest_m("crossing.toml") > 2 * EN_ROUTE_M
 
 
+def test_a_pilot_keeps_clear_later():
+    found = dsa_des.run(dsa_des.load_scene(CONFIGS / "crossing_pilot.toml"))
+    manoeuvres = found.tables["manoeuvres"].to_pylist()
+    assert manoeuvres[0]["time_s"] > 30.0
+    closest = found.info["summary"]["targets"]["crossing"]["closest_approach"]["range_m"]
+    assert closest > EN_ROUTE_M
+
+
 def test_seen_too_late_well_clear_is_lost():
     assert closest_m("crossing_seen_late.toml") < 0.5 * EN_ROUTE_M
 
