@@ -102,9 +102,10 @@ def _take(job: dict, stdout: int, stderr: int) -> None:
     if job["env"].get("PYTHONDONTWRITEBYTECODE"):
         sys.dont_write_bytecode = True
     theirs = [os.path.abspath(place) for place in before.split(os.pathsep) if place]
-    path = [place for place in sys.path if place not in theirs]
     asked = job["env"].get("PYTHONPATH", "")
-    path[:0] = [os.path.abspath(place) for place in asked.split(os.pathsep) if place]
+    mine = [os.path.abspath(place) for place in asked.split(os.pathsep) if place]
+    # What an editable installation adds to the path is not added where it stands there already.
+    path = [*mine, *(place for place in sys.path if place not in (*theirs, *mine))]
     if not safe:
         first = {"-m": os.getcwd(), "-c": ""}
         path.insert(0, first.get(words[0], os.path.dirname(os.path.abspath(words[0]))))
