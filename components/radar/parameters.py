@@ -92,9 +92,6 @@ class LinkBudgetParameters(SignalErrorParameters, RadarParameters, TimeBudgetPar
                 "set one of them"
             )
         self.check_pulses_once(self.pulses, self.integration_gain_db)
-        canceller = {"none": 1, "single_canceller": 2, "double_canceller": 3}
-        needed = canceller.get(self.moving_target_filter, self.filter_pulses)
-        self.check_filter_pulses(self.moving_target_filter, needed)
         look = self.look_energy
         if look is not None and self.calibrate is not None and self.stated_dwell_s is None:
             raise ValueError(

@@ -251,31 +251,6 @@ class TimeBudgetParameters(SensorParameters):
                 "most that"
             )
 
-    def check_filter_pulses(self, name: str, needed: int) -> None:
-        """Refuse Doppler processing of more pulses than a look has.
-
-        Parameters
-        ----------
-        name : str
-            Of the filter.
-        needed : int
-            Pulses that it takes.
-
-        Raises
-        ------
-        ValueError
-            If the look is known to have fewer.
-        """
-        if self.budget == "free":
-            return
-        look = self.look_energy
-        known = self.stated_pulses if look is None else look.pulses
-        if known is not None and known < needed:
-            raise ValueError(
-                f"moving_target_filter is {name!r}, which takes {needed} pulses, and a look has "
-                f"{known}: it must have at least as many"
-            )
-
 
 def _rounded_down(value: float) -> str:
     """Write a limit with four digits so that what is written keeps it."""

@@ -117,7 +117,7 @@ FAULTS = [
         _GROUP, "components/radar/false_alarm_effects.py",
         ("wiring/test_false_alarms_of_radars.py", "wiring/test_radar_detection_keys.py"),
         ("alarms-of-a-radar-that-is-off", "if block.p.false_alarms and not block.p.enabled:",
-         "if False:"),
+         "if False:", "a radar that is off sends nothing, alarms neither"),
         ("no-alarms", "return Verdict(block.p.false_alarms, f", "return Verdict(False, f"),
     ),
     *in_file(

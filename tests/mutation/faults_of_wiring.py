@@ -214,8 +214,6 @@ FAULTS = [
         ("scan-rate-never-checked", "if available_s * (1.0 + 1e-9) < least_s:", "if False:"),
         ("unambiguous-twice-as-far", "highest_hz = 1.0 / round_trip_s",
          "highest_hz = 2.0 / round_trip_s"),
-        ("filters-of-pulses-that-are-not-there", "known is not None and known < needed",
-         "known is not None and known < 0"),
         ("gain-of-pulses-that-are-not-there", "most_db = 10.0 * math", "most_db = 20.0 * math"),
     ),
     *in_file(
@@ -507,7 +505,8 @@ FAULTS = [
         _GROUP, "components/sensor/parameters.py",
         ("wiring/test_reach.py", "wiring/test_measured_angles.py"),
         ("always-switched-on", "self.range_km * 1000.0,\n            self.enabled,",
-         "self.range_km * 1000.0,\n            True,"),
+         "self.range_km * 1000.0,\n            True,",
+         "a sensor that is off sends nothing, whatever its reach"),
         ("elevation-is-azimuth", "math.radians(self.elevation_deg[1])",
          "math.radians(self.azimuth_deg[1])"),
     ),
