@@ -2,16 +2,16 @@
 
 import math
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from components.alert_configuration.conf_file import read_conf
+from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out, smaller
 from components.messages.alerts import AlertLevels
 from components.messages.steering import Manoeuvre, Manoeuvres
-from dsa_des.block.component import Component, NonNegativeRational, Parameters, ScenePath
+from dsa_des.block.component import Component, NonNegativeRational
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
@@ -21,15 +21,9 @@ _TURN_RATE_RAD_S = math.radians(3.0)
 _VERTICAL_RATE_MPS = 500.0 * 0.3048 / 60.0
 
 
-class TurnOutParameters(Parameters):
+class TurnOutParameters(ConfParameters):
     """Parameters of turning out of a band."""
 
-    conf: ScenePath = Field(
-        description="Volumes, times and rate of turn: a .conf file of DAIDALUS."
-    )
-    alerter: int = Field(
-        default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
-    )
     level: int = Field(default=2, ge=1, description="Turn when an alert is of this level or above.")
     manoeuvre: Literal["turn", "climb"] = Field(
         default="turn", description="Whether to change direction, or altitude."
@@ -43,12 +37,6 @@ class TurnOutParameters(Parameters):
     pause_s: NonNegativeRational = Field(
         default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
     )
-
-    @field_validator("conf", mode="after")
-    @classmethod
-    def _readable(cls, value: Any) -> Any:
-        read_conf(value)
-        return value
 
 
 class TurnOut(Component):
@@ -67,14 +55,7 @@ class TurnOut(Component):
 
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
-        self._configuration = read_conf(self.p.conf)
-        count = len(self._configuration.alerters)
-        if self.p.alerter > count:
-            raise ValueError(
-                f"alerter is {self.p.alerter}: it must be at most {count}, the number of alerters "
-                f"of {self.p.conf}"
-            )
-        self._alerter = self._configuration.alerters[self.p.alerter - 1]
+        self._configuration, self._alerter = self.p.read()
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         self._free_from = 0
 

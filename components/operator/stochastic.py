@@ -4,25 +4,21 @@ import math
 from typing import Any
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from components.alert_configuration.conf_file import read_conf
+from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out
 from components.messages.alerts import AlertLevels
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
-from dsa_des.block.component import Component, Parameters, ScenePath
+from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
 
-class StochasticParameters(Parameters):
+class StochasticParameters(ConfParameters):
     """Parameters of the operator."""
 
-    conf: ScenePath = Field(description="Volumes of the bands flown out of: a .conf of DAIDALUS.")
-    alerter: int = Field(
-        default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
-    )
     level: int = Field(default=2, ge=1, description="Act when an alert is of this level or above.")
     held_s: float = Field(default=4.0, ge=0, description="How long it must have been so, s.")
     deterministic: bool = Field(
@@ -48,12 +44,6 @@ class StochasticParameters(Parameters):
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
 
-    @field_validator("conf", mode="after")
-    @classmethod
-    def _readable(cls, value: Any) -> Any:
-        read_conf(value)
-        return value
-
 
 class Stochastic(Component):
     """Answers alerts after a pilot's delays, by turns and climbs of a pilot's size.
@@ -72,14 +62,7 @@ class Stochastic(Component):
 
     def setup(self) -> None:
         """Read the configuration; start without an alert."""
-        self._configuration = read_conf(self.p.conf)
-        count = len(self._configuration.alerters)
-        if self.p.alerter > count:
-            raise ValueError(
-                f"alerter is {self.p.alerter}: it must be at most {count}, the number of alerters "
-                f"of {self.p.conf}"
-            )
-        self._alerter = self._configuration.alerters[self.p.alerter - 1]
+        self._configuration, self._alerter = self.p.read()
         self._response, self._steering, self._pause = map(
             self.stream, ("response", "steering", "pause")
         )
