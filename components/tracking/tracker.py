@@ -95,6 +95,10 @@ class Tracker(Component):
                 offers |= producer.offer
         return offers
 
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return self._offers()
+
     def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
         offers = self._offers()
         told = [offers.get(name) for name in sensors]
