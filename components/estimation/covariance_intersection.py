@@ -108,8 +108,7 @@ def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatA
     low, high = np.zeros(count), np.ones(count)
     weight = np.full(count, 0.5)
     # A piece that tells nothing of some direction must not stand alone.
-    ends_low = (eigenvalues > 0.0).all(axis=0)
-    ends_low[ends_low] = slope(low)[0][ends_low] <= 0.0
+    ends_low = (eigenvalues > 0.0).all(axis=0) & (slope(low)[0] <= 0.0)
     ends_high = slope(high)[0] >= 0.0
     busy = ~(ends_low | ends_high)
     for _ in range(_STEPS):

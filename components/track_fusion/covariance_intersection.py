@@ -54,6 +54,11 @@ class IntersectionParameters(Parameters):
         description="Standard deviation of the rate at which a line of sight without a range "
         "turns, deg/s; by it directions of two instants are compared.",
     )  # fmt: skip
+    stay_factor: float = Field(
+        default=2.0, ge=1,
+        description="How many times as far as the gate a track may drift from the one that leads "
+        "its fused track before it leaves.",
+    )  # fmt: skip
     tentative: bool = Field(
         default=False, description="Whether tentative tracks take part; else only confirmed ones."
     )
@@ -139,6 +144,7 @@ class CovarianceIntersection(Component):
             self.p.gate_probability,
             ConstantVelocity(self.p.acceleration_intensity_m2_s3),
             math.radians(self.p.bearing_rate_deg_s),
+            self.p.stay_factor,
         )
         none = np.empty(0, dtype=np.int64)
         self._heads = _Heads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
@@ -279,9 +285,7 @@ class CovarianceIntersection(Component):
         when = heads.time_s[np.searchsorted(heads.replica, mine.replica)]
         found = fused_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(heads.replica, found.replica)
-        return told_after(
-            before, found, mine, heads.origin[:, of], heads.own_m[:, of], replica, at
-        )
+        return told_after(before, found, mine, heads.origin[:, of], heads.own_m[:, of], replica, at)
 
 
 def _later(heads: _Heads, new: LocalTracks) -> _Heads:

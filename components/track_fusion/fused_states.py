@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import product
+from components.estimation.batched import product, times
 from components.estimation.covariance_intersection import Rule, combined, inverse
-from components.estimation.batched import times
 from components.estimation.motion import ConstantVelocity
 from components.messages.state_tracks import COASTED, CONFIRMED, TENTATIVE
 from components.track_fusion.local_tracks import LocalTracks

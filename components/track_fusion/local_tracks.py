@@ -1,4 +1,4 @@
-"""The tracks of several trackers in one frame: what each tracker told last, and how that goes on."""
+"""The tracks of several trackers in one frame: what each told last, and how that goes on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -101,7 +101,7 @@ class LocalTracks:
             **{
                 f.name: np.empty(shapes.get(f.name, (0,)), types.get(f.name, np.float64))
                 for f in fields(cls)
-            }  # type: ignore[arg-type]
+            }
         )
 
     def key(self) -> IntArray:

@@ -34,11 +34,14 @@ class MatchRules:
         How targets move from the instant of one track to that of another.
     bearing_rate_rad_s : float
         Standard deviation of the rate at which a line of sight turns that has no range.
+    stay_factor : float
+        How many times as far as the gate a member may drift from its leader before it leaves.
     """
 
     gate_probability: float
     motion: ConstantVelocity
     bearing_rate_rad_s: float
+    stay_factor: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +76,16 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     )
 
 
-def in_gate(
+def gate_share(
     rules: MatchRules, leader: LocalTracks, other: LocalTracks, time_s: FloatArray
-) -> tuple[BoolArray, FloatArray]:
-    """Return which pairs lie in their gates, and their squared distances over the gate's.
+) -> FloatArray:
+    """Return the squared distances of pairs over those of their gates.
 
     Parameters
     ----------
     rules : MatchRules
     leader, other : LocalTracks
-        Of each pair; a leader has a range if the other one has.
+        Of each pair.
     time_s : (pairs,)
         The instant at which they are compared.
     """
@@ -110,7 +113,7 @@ def in_gate(
         share[where] = found
     if none.any():
         share[none] = _between_bearings(rules, leader.take(none), other.take(none)) / two
-    return share <= 1.0, share
+    return share
 
 
 def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
@@ -152,7 +155,7 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
 
 
 def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
-    """Return tracks, of which those no longer belong that have left their leader's gate.
+    """Return tracks, of which those no longer belong that are too far from their leader.
 
     Parameters
     ----------
@@ -169,17 +172,21 @@ def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -
     pair = np.flatnonzero(lead != member)
     if len(pair) == 0:
         return tracks
-    inside, _ = in_gate(
+    share = gate_share(
         rules, tracks.take(lead[pair]), tracks.take(member[pair]), time_s[member[pair]]
     )
     system = tracks.system.copy()
-    system[member[pair[~inside]]] = 0
+    system[member[pair[share > rules.stay_factor**2]]] = 0
     return replace(tracks, system=system)
 
 
 def matched(
-    rules: MatchRules, tracks: LocalTracks, time_s: FloatArray, trackers: int,
-    next_number: IntArray, replica: IntArray,
+    rules: MatchRules,
+    tracks: LocalTracks,
+    time_s: FloatArray,
+    trackers: int,
+    next_number: IntArray,
+    replica: IntArray,
 ) -> tuple[LocalTracks, IntArray]:
     """Return tracks that all belong to a fused one, and the next number of each replica.
 
@@ -252,10 +259,8 @@ def _join(
     who, which = who[older], which[older]
     if len(who) == 0:
         return
-    inside, share = in_gate(
-        rules, tracks.take(lead[which]), tracks.take(free[who]), time_s[free[who]]
-    )
+    share = gate_share(rules, tracks.take(lead[which]), tracks.take(free[who]), time_s[free[who]])
+    inside = share <= 1.0
     who, which, share = who[inside], which[inside], share[inside]
     won = global_nearest(which, who, share, 1.0)
     system[free[who[won]]] = tracks.system[lead[which[won]]]
-

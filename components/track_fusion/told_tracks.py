@@ -1,7 +1,6 @@
 """Fused tracks as they are told: what was told last, and the message of it."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
