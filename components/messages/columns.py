@@ -61,6 +61,13 @@ _POSE: Mapping[str, Column] = {
     "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
     "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
 }
+_OWN_VELOCITY: Mapping[str, Column] = {
+    "own_velocity_north_m_s": (
+        "m/s", _OWN_NED, "ownship's velocity over ground, north; null without a range rate"
+    ),
+    "own_velocity_east_m_s": ("m/s", _OWN_NED, "the same, east"),
+    "own_velocity_down_m_s": ("m/s", _OWN_NED, "the same, down"),
+}  # fmt: skip
 #: Of what was put together or is held, the pose stands where navigation errs.
 _ERRING_POSE = {
     name: (unit, frame, f"{meaning}; there is such a column where navigation errs")
@@ -102,6 +109,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
         **_POSE,
         **_ERRORS,
+        **_OWN_VELOCITY,
     },
     "fused": {
         "target": ("", "", "name of the target"),

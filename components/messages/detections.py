@@ -54,6 +54,13 @@ POSE = {
     "own_roll_rad": "float64",
 }
 
+#: The ownship's velocity over ground, north, east and down of its own place: columns of
+#: ``detections``, and what `Detections.own_velocity` holds.
+OWN_VELOCITY = {
+    "own_velocity_north_m_s": "float64",
+    "own_velocity_east_m_s": "float64",
+    "own_velocity_down_m_s": "float64",
+}
 
 #: What a block that takes fused detections requests if the ownship's pose is nothing to it.
 WITHOUT_POSE = "without pose"
@@ -83,6 +90,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    folds_range_rate : bool
+        Whether range rates beyond what is unambiguous are told as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
     """
@@ -95,6 +104,7 @@ class SensorOffer:
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
+    folds_range_rate: bool = False
 
 
 def _target_names(message: Any) -> Text:
@@ -161,6 +171,8 @@ class Detections(Message):
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
+    own_velocity : dict of (entries,), or None
+        How the ownship moved at each entry (`OWN_VELOCITY`), where a sensor measures range rates.
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
@@ -203,6 +215,9 @@ class Detections(Message):
     elevation_variance_rad2: FloatArray = _measured()
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
+    own_velocity: dict[str, FloatArray] | None = per_entry(
+        columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
+    )
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
@@ -262,6 +277,9 @@ class FusedDetections(Message):
     range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
     range_rate_variance_m2_s2 : (entries,)
         As the sensors that gave the values stated them; NaN where they did not.
+    own_velocity : dict of (entries,), or None
+        How the ownship moved (`OWN_VELOCITY`) when the range rate was
+        measured; NaN where none was, None from a fusion of sensors that measure none.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
@@ -297,6 +315,7 @@ class FusedDetections(Message):
     elevation_variance_rad2: FloatArray = _measured()
     range_variance_m2: FloatArray = _measured()
     range_rate_variance_m2_s2: FloatArray = _measured()
+    own_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: Looks | None = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
