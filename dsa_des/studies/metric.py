@@ -73,7 +73,7 @@ class RatioOf:
     cluster: str | None = None
     only: tuple[str, str] | None = None
 
-    def columns(self) -> tuple[str, ...]:
+    def reads(self) -> tuple[str, ...]:
         """Return the names of all columns it reads."""
         names = (self.below, self.above, self.weight, self.cluster, self.only and self.only[0])
         return tuple(name for name in names if name)

@@ -139,7 +139,7 @@ class StudyRecord(StudyHead):
         for result in self.results:
             if (result.kind == "ratio") != (result.ratio is not None):
                 raise ValueError("a ratio, and nothing else, says of which columns it is")
-            if result.ratio is not None and not set(RatioOf(**vars(result.ratio)).columns()) <= {
+            if result.ratio is not None and not set(RatioOf(**vars(result.ratio)).reads()) <= {
                 *columns
             }:
                 raise ValueError("a ratio names no column")
