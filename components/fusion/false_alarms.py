@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from components.fusion.fusion_block import poses
-from components.messages.detections import MEASURED, POSE, FusedDetections, mask_type
+from components.messages.contributors import mask_type
+from components.messages.detections import MEASURED, POSE
 from components.messages.false_detections import FALSE_TARGET
+from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Arrivals
 

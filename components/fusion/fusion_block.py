@@ -4,15 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from components.messages.detections import (
-    POSE,
-    WITHOUT_POSE,
-    Detections,
-    FusedDetections,
-    FusedWithPose,
-    SensorOffer,
-    mask_type,
-)
+from components.messages.contributors import mask_type
+from components.messages.detections import POSE, Detections, SensorOffer
+from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.effects import navigation_errs
 from components.sensor.marks import FUSION
 from dsa_des.arrays.types import FloatArray, IntArray

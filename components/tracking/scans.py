@@ -7,7 +7,8 @@ from typing import Self
 import numpy as np
 
 from components.estimation.measurement import Kind
-from components.messages.detections import POSE, FusedDetections
+from components.messages.detections import POSE
+from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from components.estimation.frame import place_in_frame
 from components.estimation.motion import ConstantVelocity
-from components.messages.detections import FusedDetections, SensorOffer
+from components.messages.detections import SensorOffer
+from components.messages.fused import FusedDetections
 from components.messages.reach import Reach
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from components.messages.detections import EXTRAS, Detections, FusedDetections, Tracks
+from components.messages.detections import EXTRAS, Detections
+from components.messages.fused import FusedDetections
 from components.messages.steering import Manoeuvres
+from components.messages.tracks import Tracks
 from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
 # As files of earlier versions have them; whoever reads one by position must not be surprised.
