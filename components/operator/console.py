@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -47,7 +47,7 @@ class Console(Component):
         "decisions": Output(Decisions, "What the operator decided."),
         "manoeuvres": Output(Manoeuvres, "What the ownship is told to fly."),
     }
-    Parameters = ConsoleParameters
+    Parameters: ClassVar[Any] = ConsoleParameters
 
     def setup(self) -> None:
         """Start without an alert."""

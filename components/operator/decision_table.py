@@ -74,7 +74,8 @@ def read_decisions(path: Path) -> list[tuple[float, Decision]]:
         rows = _of_parquet(path) if path.suffix == ".parquet" else _of_csv(path)
     except InputFileError as error:
         raise ValueError(f"{path}: {error}") from None
-    found, problems = [], []
+    found: list[tuple[float, Decision]] = []
+    problems: list[str] = []
     for where, row in rows:
         try:
             read = _Row.model_validate(row)

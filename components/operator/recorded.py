@@ -52,5 +52,6 @@ class Recorded(Console):
 
     def warnings(self) -> list[str]:
         """Say what comes too late to be decided in this run."""
-        late = int((self._ticks >= self.context.duration_s * self.context.ticks_per_s).sum())
+        end = float(self.context.duration_s * self.context.ticks_per_s)
+        late = int(np.count_nonzero(self._ticks >= end))
         return [f"decisions: {late} of {len(self._ticks)} come after the end"] if late else []
