@@ -41,7 +41,7 @@ class Decisions(Message):
 
     Parameters
     ----------
-    kind : (rows,) of int
+    decision : (rows,) of int
         Place in `KINDS`.
     target : (rows,) of int
         Place in `targets`; -1 for none.
@@ -60,7 +60,7 @@ class Decisions(Message):
     described = DESCRIBED
     row_table = "decisions"
 
-    kind: IntArray = per_row(column="text", name="decision", value=lambda m: Text(m.kind, KINDS))
+    decision: IntArray = per_row(column="text", value=lambda m: Text(m.decision, KINDS))
     target: IntArray = per_row(column="text", value=lambda m: Text(m.target, m.targets))
     turn_rad: FloatArray = per_row(column="float64")
     climb_m: FloatArray = per_row(column="float64")
