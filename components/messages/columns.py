@@ -213,6 +213,26 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "climb_m": ("m", "", "commanded change of altitude, positive upward"),
         "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
     },
+    "decisions": {
+        "decision": (
+            "",
+            "",
+            "shown, looked, verified, rejected, turn or climb: an alert was on the operator's "
+            "screen, was looked at, was judged, or the ownship was told to manoeuvre",
+        ),
+        "target": ("", "", "name of the target it is about; null for none"),
+        "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
+        "climb_m": ("m", "", "commanded change of altitude, positive upward"),
+        "level": ("", "", "alert level of the target as the operator had it, 0 without an alert"),
+        "alert_s": ("s", "", "when that alert came to the operator; null without an alert"),
+        "response_s": ("s", "", "time from then to the decision; null without an alert"),
+        "wall_time_s": (
+            "s",
+            "",
+            "seconds since 1970-01-01T00:00Z by the wall clock when the decision came from a "
+            "person; null where none did",
+        ),
+    },
     "processing": {
         "processor": ("", "", "shared processor"),
         "entered_s": ("s", "", "when the message came to the processor"),
