@@ -15,8 +15,9 @@ from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
 from components.messages.alerts import MOST_LEVELS, AlertLevels
-from components.messages.detections import WITHOUT_POSE, FusedDetections, Tracks
+from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.targets import TrafficStates
+from components.messages.tracks import Tracks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, ScenePath
 from dsa_des.block.message import offsets_of

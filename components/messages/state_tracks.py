@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.messages.columns import COVARIANCE, DESCRIBED
-from components.messages.detections import combination_text
+from components.messages.contributors import combination_text
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message, Text, per_entry, static
 

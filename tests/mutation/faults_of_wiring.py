@@ -292,7 +292,7 @@ FAULTS = [
          "confidence=snr_db"),
     ),
     *in_file(
-        _GROUP, "components/sensor/sensor.py", "wiring/test_false_alarms_of_radars.py",
+        _GROUP, "components/sensor/measuring.py", "wiring/test_false_alarms_of_radars.py",
         ("alarms-off-the-grid", "return self._in_body(*self._on_grid(where))",
          "return self._in_body(where, self._on_grid(where)[1])"),
     ),
