@@ -99,6 +99,10 @@ class Tracker(Component):
                 offers |= producer.offer
         return offers
 
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return self._offers()
+
     def left_out(self) -> list[str]:
         """Say whose range rates are not used, and why."""
         offers = self._offers()
