@@ -18,6 +18,9 @@ def encounters() -> None:
 @click.option("--mitigated", required=True, metavar="COLUMN", help="Event with avoidance, 0 or 1.")
 @click.option("--weight", metavar="COLUMN", help="Weight of each encounter [default: all 1].")
 @click.option(
+    "--cluster", metavar="COLUMN", help="Rows with the same value hang together [default: none]."
+)
+@click.option(
     "--by", metavar="COLUMN[,...]", help="Also a ratio for each class that these columns name."
 )
 @click.option(

@@ -78,6 +78,8 @@ class Sensor(Measuring):
         super().__init__(name, parameters, context)
         #: What a look at nothing gave; while there is still nothing, it is not repeated.
         self._idle: Look | None = None
+        #: How long the timeline of one replica is, where many run in lock step; else 0.
+        self.span_ticks = 0
 
     def request(self, port: str) -> Any:
         """Ask the block that feeds us for the targets in our reach."""
@@ -157,6 +159,7 @@ class Sensor(Measuring):
         held = wake.held("targets")
         if held is None:
             return None
+        self.span_ticks = wake.span_ticks
         targets, rows = self.seen(*held)
         cells, reason = self.cells(targets, rows, wake)
         rows = cells.message_rows

@@ -64,6 +64,11 @@ class TrackerParameters(Parameters):
         description="Range that is assumed, to 45 %, of what is seen without one, m; by default "
         "half of the farthest reach of the sensors.",
     )  # fmt: skip
+    use_range_rate: bool = Field(
+        default=True,
+        description="Whether range rates are used where a sensor states them with a variance; not "
+        "those that fold, or that are exact.",
+    )
     delete_misses: int = Field(
         default=10, ge=1, description="Expected looks in vain in a row that end a confirmed track."
     )

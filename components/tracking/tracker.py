@@ -96,6 +96,33 @@ class Tracker(Component):
                 offers |= producer.offer
         return offers
 
+    def offer(self, port: str) -> Any:
+        """Hand on what the sensors say of themselves, by name."""
+        return self._offers()
+
+    def left_out(self) -> list[str]:
+        """Say whose range rates are not used, and why."""
+        offers = self._offers()
+        return [
+            f"range rates of {name}: {why}"
+            for name, offer in sorted(offers.items())
+            if isinstance(offer, SensorOffer)
+            and offer.measures_range_rate
+            and (why := self._why_no_rates(name, offers))
+        ]
+
+    def _why_no_rates(self, name: str, offers: dict[str, Any]) -> str:
+        offer = offers.get(name)
+        if not self.p.use_range_rate:
+            return "use_range_rate is false"
+        if not isinstance(offer, SensorOffer) or not offer.measures_range_rate:
+            return "it measures none"
+        if offer.folds_range_rate:
+            return "they fold, and are ambiguous"
+        if offer.range_rate_variance_m2_s2 == 0.0:
+            return "they are exact, and a tracker weighs measurements by their variances"
+        return ""
+
     def _rules(self, sensors: tuple[str, ...]) -> TrackerRules:
         offers = self._offers()
         told = [offers.get(name) for name in sensors]
@@ -122,7 +149,9 @@ class Tracker(Component):
             delete_after_ticks=int(self.p.delete_after_s * self.context.ticks_per_s),
             log_density=log_densities(fields, self.p.false_alarms_per_scan),
             fields=fields,
-            use_range_rate=False,
+            rates_of=sum(
+                1 << i for i, name in enumerate(sensors) if not self._why_no_rates(name, offers)
+            ),
             ticks_per_s=self.context.ticks_per_s,
         )
 
@@ -154,8 +183,9 @@ class Tracker(Component):
         else:
             plan, left_out = straight_plan(scans, of, heads.tick)
         self._late += left_out
-        places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose))
-        codes = scans.kinds(self.rules.use_range_rate)
+        moves = scans.velocity if self.rules.rates_of else None
+        places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose), moves)
+        codes = scans.kinds(self.rules.rates_of)
         reported: list[Reported] = []
         for works in _turns(plan.of):
             looks, mine = plan.look[works], plan.of[works]

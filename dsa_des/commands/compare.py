@@ -234,9 +234,9 @@ def _compare(
             f"{names[0]} has the seed {one.record.seed} and {names[1]} {other.record.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    kinds = {result.name: result.kind for result in other.results}
+    kinds = {result.name: result.kind for result in other.results if result.is_number}
     own, known = ({result.name for result in side.results} for side in (one, other))
-    metrics = [name for name in _shown(one, only) if name in known]
+    metrics = [name for name in _shown(one, only) if name in kinds]
     heads = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
              "unpaired interval", "narrower"]  # fmt: skip
     lines: list[list[str]] = []

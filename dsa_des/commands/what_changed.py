@@ -98,7 +98,7 @@ def say_what_changed(
     results : iterable of Result
         That both have.
     """
-    results = list(results)
+    results = [result for result in results if result.is_number]
     width: int = console(160).width
     say(f"What changed from {shortened(names[0])} to {shortened(names[1])}:")
     for where, pair in places[:_MOST_PLACES]:

@@ -30,7 +30,7 @@ _MOST_SCATTERS = 6
 _LONGEST_NAME = 200
 #: Letters of a figure's title.
 _LONGEST_TITLE = 200
-SUMMARY, DIFFERENCES = "summary.parquet", "differences.parquet"
+SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
 
 
 class Tables:
@@ -115,6 +115,38 @@ class Tables:
         self.folder.write_table(SUMMARY, _parquet(self._summary_columns()))
         if self.compared:
             self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
+        if self.ratios():
+            self.folder.write_table(RATIOS, _parquet(self._ratio_columns()))
+
+    def ratios(self) -> list[Line]:
+        """Return the lines that are ratios of events."""
+        return [line for line in self.lines if line.ratio is not None]
+
+    def _ratio_columns(self) -> dict[str, list[Any]]:
+        """Return all numbers of the ratios, with both kinds of interval."""
+        lines = self.ratios()
+        columns: dict[str, list[Any]] = {
+            name: [line.at[k] for line in lines] for k, name in enumerate(self.rows.axes)
+        }
+        columns["result"] = [line.result.name for line in lines]
+        told = [line.ratio for line in lines if line.ratio is not None]
+        for name in (
+            "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
+            "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
+            "mitigated_probability", "few", "reason",
+        ):  # fmt: skip
+            columns[name] = [getattr(one, name) for one in told]
+        for method in ("delta", "bootstrap"):
+            both = [{r.method: r for r in (line.ratio, line.other) if r is not None}
+                    for line in lines]  # fmt: skip
+            found = [known.get(method) for known in both]
+            columns |= {
+                f"{method}_error": [None if r is None else r.standard_error for r in found],
+                f"{method}_low": [None if r is None else r.interval[0] for r in found],
+                f"{method}_high": [None if r is None else r.interval[1] for r in found],
+            }
+        columns["missing"] = [line.missing for line in lines]
+        return columns
 
     def _summary_columns(self) -> dict[str, list[Any]]:
         columns: dict[str, list[Any]] = {
@@ -210,6 +242,8 @@ class Tables:
         metric = str(figure.metric)
         if figure.axis is not None and figure.axis not in self.rows.axes:
             return False
+        if any(result.name == metric and not result.is_number for result in self.results):
+            return False
         axis = figure.axis or next(iter(self.rows.axes), None)
         found: dict[Any, list[FloatArray]] = {}
         for at, rows in self.rows.each_place():
@@ -229,7 +263,8 @@ class Tables:
         """Return the results worth a closer look: those named, drawn, or else that differ."""
         drawn = [f.metric for f in self.record.figures if f.metric is not None]
         if only or drawn:
-            return list(dict.fromkeys(only or drawn))
+            numbers = {result.name for result in self.results if result.is_number}
+            return [name for name in dict.fromkeys(only or drawn) if name in numbers]
         differing = [c.result for c in self.compared if c.difference.paired.half_width > 0]
         return list(dict.fromkeys(r.name for r in differing if r.kind == NUMBER))[:_MOST_SCATTERS]
 

@@ -15,7 +15,7 @@ from dsa_des.block.mark import Mark, marks_of
 from dsa_des.record.version import __version__
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result, Told
+from dsa_des.studies.metric import RatioOf, Result, Told
 from dsa_des.studies.study import Study, run_command, set_text
 from dsa_des.studies.study_tables import json_safe
 
@@ -52,16 +52,27 @@ class DrawRecord(_Strict):
     numeric: bool
 
 
+class RatioRecord(_Strict):
+    """Columns of a ratio; see `RatioOf`."""
+
+    below: str
+    above: str
+    weight: str | None = None
+    cluster: str | None = None
+    only: tuple[str, str] | None = None
+
+
 class ResultRecord(_Strict):
     """A result of a metric; see `Result`."""
 
     name: str
-    kind: Literal["number", "event", "share"]
+    kind: Literal["number", "event", "share", "ratio", "class"]
     meaning: str
     cut_off: str | None = None
     told: tuple[str, str, str] | None = None
     block: str | None = None
     mark: tuple[Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")], _Marker] | None = None
+    ratio: RatioRecord | None = None
 
 
 class StopRecord(_Strict):
@@ -125,6 +136,13 @@ class StudyRecord(StudyHead):
         columns = self.schema_of_parts().names
         if len(set(columns)) < len(columns):
             raise ValueError("two columns have one name")
+        for result in self.results:
+            if (result.kind == "ratio") != (result.ratio is not None):
+                raise ValueError("a ratio, and nothing else, says of which columns it is")
+            if result.ratio is not None and not set(RatioOf(**vars(result.ratio)).reads()) <= {
+                *columns
+            }:
+                raise ValueError("a ratio names no column")
         if self.compare is not None and self.compare[0] not in axes:
             raise ValueError("compare names no axis")
         if any(len(a.values) != len(a.sets) or len(a.values) != len(a.swaps) for a in self.axes):
@@ -156,11 +174,11 @@ class StudyRecord(StudyHead):
 
     def results_list(self) -> list[Result]:
         """Return what the metrics gave."""
-        kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
         return [
             Result(
-                r.name, kinds[r.kind], r.meaning, r.cut_off,
+                r.name, r.kind, r.meaning, r.cut_off,
                 None if r.told is None else Told(*r.told), r.block, r.mark,
+                None if r.ratio is None else RatioOf(**vars(r.ratio)),
             )
             for r in self.results
         ]  # fmt: skip
@@ -257,7 +275,9 @@ def record_text(study: Study, digest: str) -> str:
             for draw in study.draws
         ],
         "results": [
-            vars(result) | {"told": None if result.told is None else astuple(result.told)}
+            vars(result)
+            | {"told": None if result.told is None else astuple(result.told)}
+            | {"ratio": None if result.ratio is None else vars(result.ratio)}
             for result in results_of(study)
         ],
         "sets": [(key, set_text(value)) for key, value in study.sets],

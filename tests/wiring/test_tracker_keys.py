@@ -284,6 +284,6 @@ def test_what_is_measured_exactly_is_refused_before_the_run(key, quantity):
         tracks(sensors={"radar": {**RADAR, key: 0.0}})
 
 
-def test_a_range_rate_is_no_part_of_a_track_and_may_be_exact():
+def test_a_range_rate_that_is_exact_is_no_part_of_a_track():
     with_rate = tracks(sensors={"radar": {**RADAR, "measures_range_rate": True}})
     assert with_rate == tracks()
