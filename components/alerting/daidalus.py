@@ -239,5 +239,8 @@ def _by_instant(
     """
     if np.array_equal(measured, tick[row]):
         return row, came, tick
-    pairs, line = np.unique(np.stack([row, measured], axis=1), axis=0, return_inverse=True)
-    return line.reshape(-1), came[pairs[:, 0]], pairs[:, 1]
+    # A row without entries has its line all the same, whatever other rows the wake brings.
+    silent = np.flatnonzero(np.bincount(row, minlength=len(tick)) == 0)
+    every = np.stack([np.concatenate([row, silent]), np.concatenate([measured, tick[silent]])])
+    pairs, line = np.unique(every, axis=1, return_inverse=True)
+    return line.reshape(-1)[: len(row)], came[pairs[0]], pairs[1]
