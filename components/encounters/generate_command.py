@@ -1,6 +1,7 @@
 """``dsa-des encounters generate``: sets of encounters from encounter models."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def generate_set(
 
 def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:
     """Return the densities of miss distances that a command line asks for."""
-    changes = {}
+    changes: dict[str, Any] = {}
     for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
         if given is None:
             continue
