@@ -17,8 +17,9 @@ from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
-from components.messages.detections import WITHOUT_POSE, FusedDetections, Tracks
+from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.targets import TrafficStates
+from components.messages.tracks import Tracks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, ScenePath
 from dsa_des.block.message import offsets_of
@@ -250,5 +251,8 @@ def _by_instant(
     """
     if np.array_equal(measured, tick[row]):
         return row, came, tick
-    pairs, line = np.unique(np.stack([row, measured], axis=1), axis=0, return_inverse=True)
-    return line.reshape(-1), came[pairs[:, 0]], pairs[:, 1]
+    # A row without entries has its line all the same, whatever other rows the wake brings.
+    silent = np.flatnonzero(np.bincount(row, minlength=len(tick)) == 0)
+    every = np.stack([np.concatenate([row, silent]), np.concatenate([measured, tick[silent]])])
+    pairs, line = np.unique(every, axis=1, return_inverse=True)
+    return line.reshape(-1)[: len(row)], came[pairs[0]], pairs[1]

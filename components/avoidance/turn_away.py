@@ -6,8 +6,8 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import Tracks
 from components.messages.steering import Manoeuvres
+from components.messages.tracks import Tracks
 from dsa_des.block.component import Component, NonNegativeRational, Parameters
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake

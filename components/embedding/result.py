@@ -7,7 +7,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from components.messages.detections import Detections, FusedDetections
+from components.messages.detections import Detections
+from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import Message
 

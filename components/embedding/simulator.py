@@ -12,7 +12,8 @@ from components.embedding.host_scene import load_for_host, planes_known_to, sour
 from components.embedding.planes import FixedPath, number_of, plane_of
 from components.embedding.result import EncounterResult, Sighting, sightings_of
 from components.embedding.states import checked_rows, traffic_states
-from components.messages.detections import Detections, FusedDetections
+from components.messages.detections import Detections
+from components.messages.fused import FusedDetections
 from dsa_des.embed import HostDriven, Step
 from dsa_des.errors import Problem, SceneError
 from dsa_des.scene.scene import Scene

@@ -18,6 +18,9 @@ def encounters() -> None:
 @click.option("--mitigated", required=True, metavar="COLUMN", help="Event with avoidance, 0 or 1.")
 @click.option("--weight", metavar="COLUMN", help="Weight of each encounter [default: all 1].")
 @click.option(
+    "--cluster", metavar="COLUMN", help="Rows with the same value hang together [default: none]."
+)
+@click.option(
     "--by", metavar="COLUMN[,...]", help="Also a ratio for each class that these columns name."
 )
 @click.option(
@@ -115,6 +118,20 @@ def sample(**options: Any) -> None:
     default=(0.0, 0.0),
     metavar="LAT LON",
     help="Where the ownship is at the closest approach, deg [default: 0 0].",
+)
+@click.option(
+    "--horizontal",
+    nargs=2,
+    metavar="EDGES SHARES",
+    help="How often which signed horizontal miss distances (ft) are drawn: -6000,0,6000 1,1. "
+    "Weights undo it; none lies outside the edges [default: to 3 nmi, more within 500 ft].",
+)
+@click.option(
+    "--vertical",
+    nargs=2,
+    metavar="EDGES CHANCES",
+    help="With what chance which vertical miss distances (ft) are accepted: -300,300 1 [default: "
+    "to 1500 ft, more within 100 ft].",
 )
 @click.option("--out", required=True, metavar="SET.parquet", help="The set.")
 @plain_errors

@@ -77,6 +77,10 @@ def set_of_pairs(
     )
 
 
+#: What `geometry_class` gives.
+GEOMETRIES = ("head-on", "overtaking", "crossing from the left", "crossing from the right")
+
+
 def geometry_class(course_deg: FloatArray) -> AnyArray:
     """Return how each intruder's course lies to the ownship's.
 

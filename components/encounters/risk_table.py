@@ -22,6 +22,7 @@ def show_risk(
     nominal: str,
     mitigated: str,
     weight: str | None,
+    cluster: str | None,
     by: str | None,
     edges: str | None,
     confidence: float,
@@ -46,16 +47,22 @@ def show_risk(
     w, wrong_w = np.ones(len(n)), dict[int, str]()
     if weight is not None:
         w, wrong_w = numbers(content, weight, "--weight", flag=False)
+    together = None
+    if cluster is not None:
+        together = np.array([str(cell) for cell in content.column(cluster, "--cluster")])
     labels, wrong_by = _labels(content, by, edges)
     kept = kept_rows(content, [wrong_n, wrong_m, wrong_w, wrong_by], skip_damaged)
     n, m, w, labels = n[kept], m[kept], w[kept], labels[kept]
+    together = None if together is None else together[kept]
     options: dict[str, Any] = {
         "confidence": confidence, "method": method, "resamples": resamples, "seed": seed,
     }  # fmt: skip
-    whole = risk_ratio(n, m, w, **options)
+    whole = risk_ratio(n, m, w, cluster=together, **options)
     if whole.reason:
         raise UsageError(f"{content.path}: there is no risk ratio: {whole.reason}")
-    classes = risk_ratios_by_class(n, m, w, labels, **options) if by is not None else {}
+    classes = {}
+    if by is not None:
+        classes = risk_ratios_by_class(n, m, w, labels, together, **options)
     skipped = int((~kept).sum())
     if as_json:
         found: dict[str, Any] = {"skipped": skipped, "confidence": confidence, **asdict(whole)}
@@ -115,9 +122,11 @@ def _edges(text: str) -> FloatArray:
 
 def _told(found: RiskRatio, confidence: float, skipped: int) -> list[str]:
     low, high = found.interval
+    alone = found.clusters == found.encounters
+    clusters = "" if alone else f" in {found.clusters} clusters"
     lines = [
-        f"{found.encounters} encounters, {found.nominal_events} with the event nominally, "
-        f"{found.mitigated_events} mitigated ({found.induced_events} of them induced)",
+        f"{found.encounters} encounters{clusters}, {found.nominal_events} with the event "
+        f"nominally, {found.mitigated_events} mitigated ({found.induced_events} of them induced)",
         f"probability nominal     {found.nominal_probability:.15g}",
         f"probability mitigated   {found.mitigated_probability:.15g}",
         f"risk ratio              {found.ratio:.15g}",

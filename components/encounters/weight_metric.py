@@ -12,13 +12,18 @@ from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Metric, Result
 
 
+def has_weights(scene: Scene) -> bool:
+    """Return whether the traffic of a scene is one encounter of many, each with its weight."""
+    return hasattr(traffic_block(scene).parameters, "encounter")
+
+
 class EncounterWeight(Metric):
     """Number and weight of the encounter of each run, for risk ratios over a study."""
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        block = traffic_block(scene)
-        if not hasattr(block.parameters, "encounter"):
+        if not has_weights(scene):
+            block = traffic_block(scene)
             raise ValueError(
                 f"the traffic of the scene, {block.name!r}, has no encounters with weights: it "
                 "needs traffic.encounters or traffic.encounter_model"

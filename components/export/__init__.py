@@ -1,1 +1,41 @@
-"""A run in other programs' formats."""
+"""A run's folder in the formats and objects of other programs."""
+
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from components.export.stone_soup_run import StoneSoupRun
+    from dsa_des.record.run_folder import Run
+
+
+def stone_soup(
+    run: "Run | str | os.PathLike[str]", *, origin: tuple[float, float, float] | None = None
+) -> "StoneSoupRun":
+    """Return a recorded run as Stone Soup's objects: detections, the ownship's poses and truth.
+
+    Parameters
+    ----------
+    run : path of a run's folder, or what `dsa_des.run` returns
+    origin : tuple, optional
+        Latitude and longitude (deg) and height above the ellipsoid (m) of the frame, in which x is
+        east, y north and z up; by default that of the run's tracks, or where the ownship was first.
+
+    Returns
+    -------
+    StoneSoupRun
+        ``detector`` for a tracker, ``platform``, ``truth``, ``ownship`` and ``origin``.
+
+    Raises
+    ------
+    ImportError
+        The extra ``stonesoup`` is not installed.
+    UsageError
+        It is no run's folder, or one whose detections have no errors or poses.
+    """
+    from components.stone_soup.library import needs_stone_soup
+
+    needs_stone_soup("components.export.stone_soup")
+    from components.export.recorded import tables_of
+    from components.export.stone_soup_run import recorded_run
+
+    return recorded_run(tables_of(run), origin)

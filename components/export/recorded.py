@@ -1,5 +1,6 @@
 """The tables of a run's folder, for those who write them otherwise."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +10,11 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
+from dsa_des.record.run_folder import Run
 
 _STATE = (
     "time_s", "lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
-    "velocity_down_m_s", "heading_rad",
+    "velocity_down_m_s", "heading_rad", "pitch_rad", "roll_rad",
 )  # fmt: skip
 OWNSHIP = "ownship"
 
@@ -37,7 +39,8 @@ class RecordedTables:
         -------
         dict
             ``time_s``, ``lat_deg``, ``lon_deg``, ``alt_m``, ``velocity_north_m_s``,
-            ``velocity_east_m_s``, ``velocity_down_m_s`` and ``heading_rad``, in order of time.
+            ``velocity_east_m_s``, ``velocity_down_m_s``, ``heading_rad``, ``pitch_rad`` and
+            ``roll_rad``, in order of time.
 
         Raises
         ------
@@ -63,6 +66,19 @@ class RecordedTables:
             if len(time_s):
                 found[name] = {key: values[mine][first] for key, values in columns.items()}
         return found
+
+
+def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
+    """Return the tables of a run: a folder's path, or what `dsa_des.run` returns.
+
+    Raises
+    ------
+    UsageError
+        It is no such folder, or a table cannot be read.
+    """
+    if isinstance(run, Run):
+        return RecordedTables(run.path or Path("the run"), run.tables)
+    return read_tables(os.fspath(run))
 
 
 def read_tables(run: str) -> RecordedTables:

@@ -11,8 +11,8 @@ from components.fusion.carried import Carrier
 from components.fusion.fusion_block import Fusion, poses
 from components.fusion.gate_match import nearest_in_gate
 from components.fusion.ladder import FUSION
-from components.messages.detections import FusedDetections
 from components.messages.false_detections import FALSE_TARGET
+from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake

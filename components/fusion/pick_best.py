@@ -10,7 +10,7 @@ from components.fusion.coincidence import latest_in_gate, same_instant
 from components.fusion.false_alarms import pass_false_alarms
 from components.fusion.fusion_block import Fusion
 from components.fusion.ladder import FUSION
-from components.messages.detections import FusedDetections
+from components.messages.fused import FusedDetections
 from components.messages.true_entries import true_entries
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray

@@ -61,6 +61,13 @@ _POSE: Mapping[str, Column] = {
     "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
     "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
 }
+_OWN_VELOCITY: Mapping[str, Column] = {
+    "own_velocity_north_m_s": (
+        "m/s", _OWN_NED, "ownship's velocity over ground, north; null without a range rate"
+    ),
+    "own_velocity_east_m_s": ("m/s", _OWN_NED, "the same, east"),
+    "own_velocity_down_m_s": ("m/s", _OWN_NED, "the same, down"),
+}  # fmt: skip
 #: Of what was put together or is held, the pose stands where navigation errs.
 _ERRING_POSE = {
     name: (unit, frame, f"{meaning}; there is such a column where navigation errs")
@@ -102,6 +109,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
         **_POSE,
         **_ERRORS,
+        **_OWN_VELOCITY,
     },
     "fused": {
         "target": ("", "", "name of the target"),
@@ -141,6 +149,10 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "updated_s": ("s", "", "when the last measurement in it was made"),
         "contributors": ("", "", "sensors that ever updated it, joined by +"),
         "updated_by": ("", "", "sensors of its last update, joined by +"),
+        **{
+            f"own_{axis}_m": ("m", _FRAME, f"where the ownship believed to be then, {axis}")
+            for axis in ("north", "east", "down")
+        },
         "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
         "origin_lon_deg": ("deg", _WGS84, "its longitude"),
         "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
@@ -204,6 +216,26 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "rate_rad_s": ("rad/s", "", "rate of that turn"),
         "climb_m": ("m", "", "commanded change of altitude, positive upward"),
         "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
+    },
+    "decisions": {
+        "decision": (
+            "",
+            "",
+            "shown, looked, verified, rejected, turn or climb: an alert was on the operator's "
+            "screen, was looked at, was judged, or the ownship was told to manoeuvre",
+        ),
+        "target": ("", "", "name of the target it is about; null for none"),
+        "turn_rad": ("rad", "", "commanded change of heading, positive to the right"),
+        "climb_m": ("m", "", "commanded change of altitude, positive upward"),
+        "level": ("", "", "alert level of the target as the operator had it, 0 without an alert"),
+        "alert_s": ("s", "", "when that alert came to the operator; null without an alert"),
+        "response_s": ("s", "", "time from then to the decision; null without an alert"),
+        "wall_time_s": (
+            "s",
+            "",
+            "seconds since 1970-01-01T00:00Z by the wall clock when the decision came from a "
+            "person; null where none did",
+        ),
     },
     "processing": {
         "processor": ("", "", "shared processor"),

@@ -1,12 +1,11 @@
-"""Messages of and after the sensors: detections, fused lines of sight, tracks.
+"""The message of sensors: detections, scan by scan, and what a sensor says of them beforehand.
 
-All messages hold rows (one per scan, see `dsa_des.block.message`). Angles are in radians; azimuth
-is clockwise and elevation upward.
+Rows are scans (see `dsa_des.block.message`). Angles are in radians; azimuth is clockwise and
+elevation upward.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +13,9 @@ from components.aircraft.aircraft import Roster
 from components.messages.columns import DESCRIBED
 from components.messages.constant_columns import not_measured
 from components.messages.every_look import look_columns
-from components.messages.looks import Looks
 from components.messages.reach import Reach
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.message import Columns, Message, Text, per_entry, per_entry_tick, per_row, static
-
-_BITS_OF_INT64 = 63
-_COUNTED_BITS = 12
-
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.message import Columns, Message, Text, per_entry, per_row, static
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.
 _SKIPPED = {
@@ -54,9 +48,13 @@ POSE = {
     "own_roll_rad": "float64",
 }
 
-
-#: What a block that takes fused detections requests if the ownship's pose is nothing to it.
-WITHOUT_POSE = "without pose"
+#: The ownship's velocity over ground, north, east and down of its own place: columns of
+#: ``detections``, and what `Detections.own_velocity` holds.
+OWN_VELOCITY = {
+    "own_velocity_north_m_s": "float64",
+    "own_velocity_east_m_s": "float64",
+    "own_velocity_down_m_s": "float64",
+}
 
 #: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
 MEASURED = (
@@ -83,6 +81,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    folds_range_rate : bool
+        Whether range rates beyond what is unambiguous are told as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
     """
@@ -95,21 +95,21 @@ class SensorOffer:
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
+    folds_range_rate: bool = False
 
 
-def _target_names(message: Any) -> Text:
+def target_names(message: Any) -> Text:
+    """Return the names of a message's targets, entry by entry."""
     return Text(message.target, message.roster.names)
 
 
-def _contributor_names(message: Any) -> Text:
-    return combination_text(message.contributors, message.sensors)
-
-
-def _measured() -> Any:
+def measured_column() -> Any:
+    """Declare one of the columns `MEASURED`."""
     return per_entry(column="float64", default=None, kw_only=True)
 
 
-def _fill_measured(message: Any) -> None:
+def fill_measured(message: Any) -> None:
+    """Let columns `MEASURED` that a message was not given be those of nothing measured."""
     for name in MEASURED:
         if getattr(message, name) is None:
             setattr(message, name, not_measured(len(message.target)))
@@ -161,6 +161,8 @@ class Detections(Message):
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
+    own_velocity : dict of (entries,), or None
+        How the ownship moved at each entry (`OWN_VELOCITY`), where a sensor measures range rates.
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
@@ -179,7 +181,7 @@ class Detections(Message):
         column="int64", name="detected", value=lambda message: np.diff(message.offsets)
     )
     skipped: dict[str, IntArray] = per_row(columns=_SKIPPED, value=lambda m: m.skipped_columns())
-    target: IntArray = per_entry(column="text", value=_target_names)
+    target: IntArray = per_entry(column="text", value=target_names)
     azimuth_rad: FloatArray = per_entry(column="float64")
     elevation_rad: FloatArray = per_entry(column="float64")
     range_m: FloatArray = per_entry(column="float64")
@@ -198,11 +200,14 @@ class Detections(Message):
     own_of_entries: dict[str, FloatArray] | None = per_entry(
         columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
     )
-    range_rate_m_s: FloatArray = _measured()
-    azimuth_variance_rad2: FloatArray = _measured()
-    elevation_variance_rad2: FloatArray = _measured()
-    range_variance_m2: FloatArray = _measured()
-    range_rate_variance_m2_s2: FloatArray = _measured()
+    range_rate_m_s: FloatArray = measured_column()
+    azimuth_variance_rad2: FloatArray = measured_column()
+    elevation_variance_rad2: FloatArray = measured_column()
+    range_variance_m2: FloatArray = measured_column()
+    range_rate_variance_m2_s2: FloatArray = measured_column()
+    own_velocity: dict[str, FloatArray] | None = per_entry(
+        columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
+    )
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
@@ -212,7 +217,7 @@ class Detections(Message):
         return tables if self.looks is None else {**tables, "looks": look_columns(self)}
 
     def __post_init__(self) -> None:
-        _fill_measured(self)
+        fill_measured(self)
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""
@@ -235,178 +240,3 @@ class Detections(Message):
         """Return the instant at which each entry was measured."""
         ticks = np.repeat(self.tick, np.diff(self.offsets))
         return ticks if self.ticks_after is None else ticks + self.ticks_after
-
-
-@dataclass(eq=False)
-class FusedDetections(Message):
-    """One line of sight per target and instant, put together from the sensors.
-
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-    target : (entries,) of int
-    azimuth_rad, elevation_rad : (entries,)
-        In the ownship's body axes.
-    range_m : (entries,)
-        NaN when no contributing sensor measures range.
-    contributors : (entries,) of int
-        Bit i is set when ``sensors[i]`` contributed; of the type `mask_type` gives.
-    angle_source, range_source : (entries,) of int
-        Index into `sensors`; -1 for none.
-    true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
-    measured_tick : (entries,) of int
-        When the angles were measured, whenever that came here: pose, variances of the angles and
-        everything true are of this instant. By default that of the row.
-    own_of_entries : dict of (entries,), or None
-        The ownship's pose as it believed it to be then, by column (`POSE`); None where nobody asks.
-    range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
-    range_rate_variance_m2_s2 : (entries,)
-        As the sensors that gave the values stated them; NaN where they did not.
-    looks : Looks or None
-        Which sensors looked when, also in vain; None from a fusion that does not say.
-    roster : Roster
-    sensors : tuple of str
-        Those with range first, each group by name.
-    """
-
-    described = DESCRIBED
-    entry_table = "fused"
-
-    offsets: IntArray
-    target: IntArray = per_entry(column="text", value=_target_names)
-    contributors: IntArray = per_entry(column="text", name="sensors", value=_contributor_names)
-    azimuth_rad: FloatArray = per_entry(column="float64")
-    elevation_rad: FloatArray = per_entry(column="float64")
-    range_m: FloatArray = per_entry(column="float64")
-    angle_source: IntArray = per_entry(
-        column="text", value=lambda message: Text(message.angle_source, message.sensors)
-    )
-    range_source: IntArray = per_entry(
-        column="text", value=lambda message: Text(message.range_source, message.sensors)
-    )
-    true_azimuth_rad: FloatArray = per_entry(column="float64")
-    true_elevation_rad: FloatArray = per_entry(column="float64")
-    true_range_m: FloatArray = per_entry(column="float64")
-    roster: Roster = static()
-    sensors: tuple[str, ...] = static()
-    measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
-    ticks_per_s: int = static(default=10**9, kw_only=True)
-    own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
-    range_rate_m_s: FloatArray = _measured()
-    azimuth_variance_rad2: FloatArray = _measured()
-    elevation_variance_rad2: FloatArray = _measured()
-    range_variance_m2: FloatArray = _measured()
-    range_rate_variance_m2_s2: FloatArray = _measured()
-    looks: Looks | None = per_row(default=None, kw_only=True)
-
-    def __post_init__(self) -> None:
-        _fill_measured(self)
-        if self.measured_tick is None:
-            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
-
-    def pose_columns(self) -> dict[str, FloatArray]:
-        """Return the ownship's believed pose at each entry, by column; empty where none is told."""
-        return self.own_of_entries or {}
-
-
-@dataclass(eq=False)
-class FusedWithPose(FusedDetections):
-    """The same where navigation errs: the ownship's believed pose is recorded beside each line."""
-
-    own_of_entries: dict[str, FloatArray] | None = per_entry(
-        columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
-    )
-
-
-@dataclass(eq=False)
-class Tracks(Message):
-    """What a tracker holds of each target, at each instant it was updated.
-
-    Parameters
-    ----------
-    offsets : (rows + 1,)
-    target : (entries,) of int
-    azimuth_rad, elevation_rad, range_m : (entries,)
-        Held measurement, ownship's body axes; range NaN when it had none.
-    age_s : (entries,)
-        Time since what is held was measured.
-    contributors : (entries,) of int
-        Sensors of the last update, as in `FusedDetections`.
-    roster : Roster
-    sensors : tuple of str
-    measured_tick : (entries,) of int
-        When it was measured. By default the row's tick.
-    updated : (entries,) of bool
-        Whether it came at this row's instant; others were held. By default what has no age.
-    """
-
-    described = DESCRIBED
-    entry_table = "tracks"
-
-    offsets: IntArray
-    target: IntArray = per_entry(column="text", value=_target_names)
-    azimuth_rad: FloatArray = per_entry(column="float64")
-    elevation_rad: FloatArray = per_entry(column="float64")
-    range_m: FloatArray = per_entry(column="float64")
-    age_s: FloatArray = per_entry(column="float64")
-    contributors: IntArray = per_entry(column="text", name="updated_by", value=_contributor_names)
-    roster: Roster = static()
-    sensors: tuple[str, ...] = static()
-    measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
-    ticks_per_s: int = static(default=10**9, kw_only=True)
-    updated: BoolArray = per_entry(default=None, kw_only=True)
-
-    def __post_init__(self) -> None:
-        if self.measured_tick is None:
-            self.measured_tick = np.repeat(self.tick, np.diff(self.offsets))
-        if self.updated is None:
-            self.updated = self.age_s <= 0.0
-
-    @classmethod
-    def initial(cls, values: Mapping[str, object]) -> Self:
-        """Return a message without tracks; the scene's table must be empty."""
-        if values:
-            raise ValueError("tracks before the first message can only be an empty table, {}")
-        none, zero = np.empty(0), np.empty(0, dtype=np.int64)
-        offsets = np.zeros(2, dtype=np.int64)
-        return cls(
-            np.zeros(1, dtype=np.int64), offsets, zero, none, none, none, none, zero,
-            Roster.of([]), (),
-        )  # fmt: skip
-
-
-@dataclass(eq=False)
-class TracksWithPose(Tracks):
-    """The same where navigation errs.
-
-    Parameters
-    ----------
-    own_of_entries : dict of (entries,)
-        The ownship's pose as it believed it to be when what is held was measured.
-    """
-
-    own_of_entries: dict[str, FloatArray] = per_entry(columns=POSE, kw_only=True)
-
-
-def mask_type(sensors: int) -> type:
-    """Return the NumPy type of masks with a bit for each sensor.
-
-    Beyond 63 sensors masks are Python's integers, which hold any number of bits.
-    """
-    return np.int64 if sensors <= _BITS_OF_INT64 else object
-
-
-def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
-    """Return the names behind bit masks, joined by ``+``."""
-    if len(sensors) <= _COUNTED_BITS:  # counting was measured to be the fastest
-        used = np.bincount(contributors, minlength=1)
-        masks = np.flatnonzero(used)
-        codes = (np.cumsum(used > 0) - 1).take(contributors)
-    else:
-        masks, codes = np.unique(contributors, return_inverse=True)
-    names = tuple("+".join(_names_in(int(mask), sensors)) for mask in masks)
-    return Text(codes, names)
-
-
-def _names_in(mask: int, sensors: tuple[str, ...]) -> list[str]:
-    return [name for i, name in enumerate(sensors) if mask >> i & 1]

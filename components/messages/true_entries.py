@@ -5,7 +5,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from components.messages.detections import Detections, FusedDetections
+from components.messages.detections import Detections
+from components.messages.fused import FusedDetections
 from dsa_des.block.message import PER_ENTRY, offsets_of
 
 AnyDetections = TypeVar("AnyDetections", Detections, FusedDetections)

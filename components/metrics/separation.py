@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight
+from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from components.traffic.censored import end_of_look, present_together_s
 from components.traffic.sample_times import (
@@ -128,6 +128,30 @@ class RelativeFlight:
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""
         return present_together_s(self._source.own, [self._target], self.end_s)
+
+    def ways_m(self, time_s: float, base_s: float) -> list[tuple[float, float]]:
+        """Return how far north and east ownship and target move around a time, m.
+
+        Parameters
+        ----------
+        time_s : float
+            When both are there.
+        base_s : float
+            So long before and after it, as far as both are there; the frame is that of the
+            ownship's level plane then.
+        """
+        first, last = (float(limit[0]) for limit in self.present_s())
+        ends = np.clip([time_s - base_s, time_s + base_s], first, min(last, self.end_s))
+        here = self._source.own.at(np.array([time_s, time_s]))
+        found = []
+        for flight in (self._source.own, self._target):
+            at = flight.at(ends)
+            north, east, _ = line_of_sight_ned(
+                here.lat_deg, here.lon_deg, here.alt_m, at.lat_deg, at.lon_deg, at.alt_m,
+                validate=False,
+            )  # fmt: skip
+            found.append((float(north[1] - north[0]), float(east[1] - east[0])))
+        return found
 
     def pieces(self) -> Iterator[Separation]:
         """Give the distances, about `MOST_AT_ONCE` at a time."""

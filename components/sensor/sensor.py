@@ -13,45 +13,38 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages.constant_columns import constant_column
 from components.messages.detections import Detections, SensorOffer
 from components.messages.every_look import EveryLook, looks_of
-from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
+from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
 from components.sensor.believed_pose import believed_pose
+from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule
-from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
+from components.sensor.grid import AZIMUTH, ELEVATION
 from components.sensor.look import Cells, Look
 from components.sensor.measurement_errors import MeasurementErrors, constant_variances
-from components.sensor.mounting import BodyAxes, Mounting
+from components.sensor.measuring import Measuring
+from components.sensor.mounting import Mounting
 from components.sensor.parameters import SensorParameters
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Component
+from components.sensor.skip_counts import counted
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
-
-# Up to so many targets, counting row by row is mostly the overhead of rows.
-_FEW_COLUMNS = 8
-
 
 #: Effects that every sensor has, after its own.
 SENSOR_EFFECTS: tuple[Effect, ...] = (
     Mounting(),
     MeasurementErrors(),
     DeclarationRule(),
+    DeclarationByPlace(),
     NavigationReport(),
 )
 
-_BODY_AXES = BodyAxes()
 
-#: Values by quantity, and variances by column, in the sensor's axes.
-Measured = tuple[dict[str, FloatArray], dict[str, FloatArray]]
-
-
-class Sensor(Component):
+class Sensor(Measuring):
     """A block that looks at the targets at its own scan instants and reports detections.
 
     Effects that act on the ``report`` are called with the detections, the targets and the
@@ -67,10 +60,9 @@ class Sensor(Component):
     also_records = (EveryLook,)
     windowed = True
     rewindable = True
-    #: Whether detections carry a range.
-    measures_range = False
     hooks: ClassVar[Mapping[str, str]] = {
         "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "strength": "(cells, found, look) -> look: as strong as its detections came out",
         "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
         "declaration": "(cells, look) -> look: which detections declare their target",
         "report": "(detections, targets, rows) -> detections: what is sent",
@@ -84,14 +76,10 @@ class Sensor(Component):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        #: As the scene states it, and as it is used: work that can give nothing may be left out.
-        self.stated_reach: Reach = parameters.reach()
-        self.reach = self.stated_reach
-        self.azimuth_step_rad = math.radians(parameters.azimuth_resolution_deg)
-        self.elevation_step_rad = math.radians(parameters.elevation_resolution_deg)
-        self.range_step_m = float(getattr(parameters, "range_resolution_m", 0.0))
         #: What a look at nothing gave; while there is still nothing, it is not repeated.
         self._idle: Look | None = None
+        #: How long the timeline of one replica is, where many run in lock step; else 0.
+        self.span_ticks = 0
 
     def request(self, port: str) -> Any:
         """Ask the block that feeds us for the targets in our reach."""
@@ -122,12 +110,6 @@ class Sensor(Component):
         )
 
     @cached_property
-    def axes(self) -> BodyAxes:
-        """The sensor's axes; known once the scene's effects are."""
-        mounted = self.built("axes")
-        return mounted[0] if mounted else _BODY_AXES
-
-    @cached_property
     def _reach_from_body(self) -> Reach:
         return self.axes.reach(self.reach)
 
@@ -152,8 +134,8 @@ class Sensor(Component):
         return self.built("declaration")
 
     @cached_property
-    def _erring(self) -> list[Any]:
-        return self.built("measurement")
+    def _strengths(self) -> list[Any]:
+        return self.built("strength")
 
     @cached_property
     def _reporting(self) -> list[Any]:
@@ -177,6 +159,7 @@ class Sensor(Component):
         held = wake.held("targets")
         if held is None:
             return None
+        self.span_ticks = wake.span_ticks
         targets, rows = self.seen(*held)
         cells, reason = self.cells(targets, rows, wake)
         rows = cells.message_rows
@@ -187,8 +170,11 @@ class Sensor(Component):
                 look = judge(cells, look)
             self._idle = None if len(cells) else look
         found = look.detected.nonzero()[0]
+        decided = look
+        for measures in self._strengths:
+            look = measures(cells, found, look)
         culled = None if targets.culled is None else targets.culled[rows]
-        evaluated, skipped = _counted(
+        evaluated, skipped = counted(
             reason, len(targets.roster), culled, targets.hidden is not None
         )
         if len(wake) == 1:
@@ -219,7 +205,7 @@ class Sensor(Component):
             extras={name: values[found] for name, values in look.extras.items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
-            looks=looks_of(cells, look, len(wake)) if self._says_looks else None,
+            looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
@@ -244,7 +230,8 @@ class Sensor(Component):
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""
-        declarations = self.context.effects.get("declaration")
+        rule = "declaration" if self.p.declares_by == "target" else "declaration by place"
+        declarations = self.context.effects.get(rule)
         if declarations is None or self.p.declare_m is None:
             return {}
         return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}
@@ -270,142 +257,3 @@ class Sensor(Component):
             part.hidden,
         )
         return rows, reason
-
-    def measure(
-        self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight in the sensor's axes to its grid and field of view (§3.5.1).
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : arrays
-            Range is NaN when the sensor measures none.
-        """
-        return self.grid.round(azimuth_rad, elevation_rad, range_m)
-
-    def range_rate(self, cells: Cells, found: IntArray) -> FloatArray | None:
-        """Return the true range rates of some cells, m/s; None where they are not measured."""
-        return None
-
-    def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return what signals add to the variances, by quantity, in the sensor's axes.
-
-        Parameters
-        ----------
-        signal : mapping of (n,)
-            As in `Look.signal`.
-        """
-        raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
-
-    @property
-    def steps(self) -> dict[str, float]:
-        """Grid step of each quantity that is measured: rad, m and m/s."""
-        steps = {"azimuth": self.azimuth_step_rad, "elevation": self.elevation_step_rad}
-        return {**steps, "range": self.range_step_m} if self.measures_range else steps
-
-    @cached_property
-    def grid(self) -> SensorGrid:
-        """The grid of reports in the sensor's axes."""
-        return SensorGrid(self.reach.azimuth_rad, self.reach.elevation_rad, self.steps)
-
-    def _measured(
-        self,
-        cells: Cells,
-        found: IntArray,
-        look: Look,
-        azimuth_rad: FloatArray,
-        elevation_rad: FloatArray,
-        range_m: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return what is measured of lines of sight in body axes, and columns beside."""
-        azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
-        true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
-        if (rate := self.range_rate(cells, found)) is not None:
-            true["range_rate"] = rate
-        if self._erring:
-            return self._in_body(*self._erring[0](cells, found, look, true))
-        return self._in_body(*self._on_grid(true))
-
-    def report_noise(
-        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
-    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return how something that is not there is reported, as if it were.
-
-        Parameters
-        ----------
-        where : mapping of (n,)
-            By quantity, in the sensor's axes.
-        signal : mapping of (n,)
-            As in `Look.signal`.
-
-        Returns
-        -------
-        azimuth_rad, elevation_rad, range_m : (n,) arrays
-            In body axes.
-        measured : dict of (n,) arrays
-            The other measured columns of `Detections`.
-        """
-        if self._erring:
-            return self._in_body(*self._erring[0].of_noise(where, signal))
-        return self._in_body(*self._on_grid(where))
-
-    def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:
-        """Return values on the grid, and their variances: step²/12."""
-        azimuth, elevation, range_m = self.measure(
-            true["azimuth"], true["elevation"], true["range"]
-        )
-        values = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
-        if "range_rate" in true:
-            values["range_rate"] = self.grid.round_rate(true["range_rate"])
-        count = len(azimuth)
-        of_grid = self.grid.variances.items()
-        return values, {name: constant_column(value, count) for name, value in of_grid}
-
-    def _in_body(
-        self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
-    ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return angles in body axes, ranges, and columns beside, of values in the sensor's."""
-        angles = values["azimuth"], values["elevation"]
-        of_angles = self.axes.variances_in_body(*angles, variances[AZIMUTH], variances[ELEVATION])
-        beside = {**variances, AZIMUTH: of_angles[0], ELEVATION: of_angles[1]}
-        if "range_rate" in values:
-            beside["range_rate_m_s"] = values["range_rate"]
-        return *self.axes.to_body(*angles), values["range"], beside
-
-
-def _per_row(mask: BoolArray) -> IntArray:
-    """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
-    if mask.shape[1] > _FEW_COLUMNS:
-        return mask.sum(axis=1)
-    total = np.zeros(len(mask), dtype=np.int64)
-    for column in mask.T:
-        total += column
-    return total
-
-
-def _counted(
-    reason: ReasonArray, on_roster: int, culled: IntArray | None, hides: bool
-) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return how many targets were evaluated at each scan, and skipped by reason.
-
-    Only where something `hides` targets are hidden ones looked for. Which of the culled ones the
-    arrays hold, as absent, depends on the window that they came in: what is counted does not.
-    """
-    if len(reason) == 1:  # one pass instead of one for each reason
-        count = np.bincount(reason[0], minlength=len(SKIP_REASONS) + 1)
-        of = {code: count[code : code + 1] for code in (EVALUATE, *SKIP_REASONS.values())}
-    else:
-        of = {
-            code: _per_row(reason == code)
-            for code in (EVALUATE, *SKIP_REASONS.values())
-            if hides or code != HIDDEN
-        }
-        of.setdefault(HIDDEN, np.zeros(len(reason), dtype=np.int64))
-    skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
-    left_out = on_roster - reason.shape[1]
-    if culled is None:
-        culled = np.zeros(len(reason), dtype=np.int64) + left_out
-    else:
-        skipped["absent"] = skipped["absent"] + (left_out - culled)
-    skipped[CULLED] = culled
-    return of[EVALUATE], skipped

@@ -5,14 +5,9 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import (
-    POSE,
-    WITHOUT_POSE,
-    FusedDetections,
-    FusedWithPose,
-    Tracks,
-    TracksWithPose,
-)
+from components.messages.detections import POSE
+from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
+from components.messages.tracks import Tracks, TracksWithPose
 from components.messages.true_entries import true_entries
 from components.navigation.effects import navigation_errs
 from components.sensor.marks import TRACKER

@@ -13,8 +13,9 @@ from components.traffic.attitude_from_path import MEDIAN_AZIMUTH_ERROR_DEG
 from components.traffic.csv_file import read_csv
 from components.traffic.daa_file import read_daa
 from components.traffic.fleet import SampledFleet
+from components.traffic.flight_protocols import Trajectory
 from components.traffic.sample_times import OwnTimes, SampleTimes, SharedTimes
-from components.traffic.source import SourceParameters, TrafficSource, Trajectory, roster_of
+from components.traffic.source import SourceParameters, TrafficSource, roster_of
 from components.traffic.suspicious import suspicions
 from components.traffic.traffic_file import TrafficFile
 from components.traffic.wind import scene_wind

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Aircraft, Roster
 from components.geometry.enu import enu_to_geodetic
 from components.traffic.fleet import ScriptedFleet
+from components.traffic.flight_protocols import Trajectory
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.sample_times import (
     RegularTimes,
@@ -21,7 +22,7 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.scripted import Ownship, flight_arguments
-from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.straight_flights import Starts, flights_of
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray

@@ -12,6 +12,7 @@ from components.aircraft.aircraft import Aircraft, Roster
 from components.geometry.enu import enu_to_geodetic
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
+from components.traffic.flight_protocols import Trajectory
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.sample_times import (
     RegularTimes,
@@ -19,7 +20,7 @@ from components.traffic.sample_times import (
     regular_count,
     regular_times_s,
 )
-from components.traffic.source import SourceParameters, TrafficSource, Trajectory
+from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.straight_flights import Starts, flights_of
 from components.traffic.wind import Wind, ground_speed_mps
 from components.traffic.wind_effect import CrabAngles

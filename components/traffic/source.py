@@ -4,18 +4,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import KnownTraffic
-from components.geometry.state import TrajectoryState
-from components.messages.known_flights import Flights, KnownFlights
 from components.messages.reach import FarthestLook, farthest_look
-from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
 from components.messages.true_states import TrueStates
 from components.traffic.censored import censored_approaches, present_together_s
@@ -27,21 +23,20 @@ from components.traffic.closest_approach import (
 from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.flight_limits import max_speeds_mps
+from components.traffic.flight_protocols import Trajectory
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
-from components.traffic.steered_flight import SteeredFlight
+from components.traffic.steered_ownship import SteeredOwnship
 from components.traffic.terrain_check import check_above_terrain, check_on_raster
-from components.traffic.true_flights import TrueFlights, truth_is_recorded
+from components.traffic.true_flights import truth_is_recorded
 from components.traffic.wind import Wind, scene_wind
-from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Parameters, PositiveRational
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Parameters, PositiveRational
 from dsa_des.block.message import Message
-from dsa_des.block.ports import Input, Output
+from dsa_des.block.ports import Output
 from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
-
-_TOLD = Manoeuvre._fields
 
 
 class SourceParameters(Parameters):
@@ -54,33 +49,7 @@ class SourceParameters(Parameters):
     )
 
 
-class Trajectory(Protocol):
-    """The flight of one aircraft."""
-
-    name: str
-
-    @property
-    def max_speed_mps(self) -> float:
-        """Largest speed along its path."""
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return its state at some times."""
-
-
-class Fleet(Protocol):
-    """The flights of many aircraft."""
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return their states, shape (times, aircraft)."""
-
-    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of aircraft (n,), each at a time (n,) of its own."""
-
-    def subset(self, columns: IntArray) -> "Fleet":
-        """Return the flights of some of them, given by their indices, ascending."""
-
-
-class TrafficSource(Component):
+class TrafficSource(SteeredOwnship):
     """Publishes where the ownship and its targets are.
 
     When manoeuvres are wired to it, its ownship flies them from the time they come.
@@ -89,14 +58,6 @@ class TrafficSource(Component):
     samples.
     """
 
-    inputs = {
-        "manoeuvres": Input(
-            Manoeuvres,
-            "queued",
-            "Turns and climbs that the ownship is told to fly.",
-            required=False,
-        )
-    }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
     Parameters: ClassVar[Any] = SourceParameters
     windowed = True
@@ -104,8 +65,6 @@ class TrafficSource(Component):
     clocked = "demand"
     hooks = {"attitude": "turns the attitudes that follow from paths, of_own and of_targets"}
 
-    own: Trajectory
-    fleet: Fleet
     targets: Sequence[Trajectory]
     roster: Roster
     also_records = (TrueStates,)
@@ -142,10 +101,6 @@ class TrafficSource(Component):
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
 
-    def serves_replicas(self) -> bool:
-        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
-        return super().serves_replicas() and not self.context.producers
-
     def setup(self) -> None:
         """Learn how far sensors look; what stays beyond it is not moved."""
         terrain = self.context.sections.get("terrain")
@@ -159,20 +114,14 @@ class TrafficSource(Component):
                 float(self.context.duration_s),
             )
         self._all_columns = np.arange(len(self.roster))
-        self._crabbing: list[Any] = self.built("attitude")
-        self._culling: Culling | None = None
+        self._crabbing = self.built("attitude")
         self._steered_culling: SteeredCulling | None = None
         look = farthest_look(c.request for c in self.context.consumers)
         self._flights_asked_for = look.lasts_s > 0.0
         if not self.context.simulate_everything and self.clock_of(self.p) is None:
             self._cull(look)
-        if self.context.producers:
-            self.own = SteeredFlight(self.own)
-        self._flights_now: Flights = partial(self.flights, self.own)
         self._says_truth = truth_is_recorded(self.context, len(self.roster))
-        self._truth_now = self._true_flights()
-        #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
-        self._told: list[tuple[int, Manoeuvre]] = []
+        self._be_steered()
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where it is known how far sensors look."""
@@ -251,93 +200,6 @@ class TrafficSource(Component):
     def records(self) -> list[type[Message]]:
         """Return what is recorded: the truth where a scene is small, or asks for it."""
         return [TrafficStates, TrueStates] if self._truth_now is not None else [TrafficStates]
-
-    def own_at(self, time_s: FloatArray) -> TrajectoryState:
-        """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
-        return self._own_in_wind(self.own.at(time_s), time_s)
-
-    def _own_in_wind(self, own: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
-        for crabbing in self._crabbing:
-            own = crabbing.of_own(self.own, own, time_s)
-        return own
-
-    def flights(
-        self,
-        own: Trajectory,
-        columns: IntArray,
-        time_s: FloatArray,
-        ahead_s: FloatArray | float = 0.0,
-    ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return the states of the ownship and of some targets, each at a time of its own.
-
-        Parameters
-        ----------
-        own : Trajectory
-            The ownship's flight, as far as it is known.
-        columns : (targets,) of int
-        time_s : (rows, targets)
-            With an ``update_rate_hz``, the last publication up to then counts.
-        ahead_s : (rows, targets)
-            They are wanted so much later than that.
-
-        Returns
-        -------
-        own, others : TrajectoryState
-            Arrays (rows, targets).
-        """
-        if self.p.update_rate_hz is not None:
-            rate = float(self.p.update_rate_hz)
-            time_s = np.floor(time_s * rate) / rate
-        time_s = time_s + ahead_s
-        columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
-        others = self.fleet.each(columns_each, times)
-        if self._culling is not None:
-            near = self._culling.intervals.holds(columns_each, times)
-            others = replace(others, present=others.present & near)
-        seen, others = own.at(time_s), others.reshaped(time_s.shape)
-        for crabbing in self._crabbing:
-            seen = crabbing.of_own(own, seen, time_s)
-            others = crabbing.of_targets(columns, others, time_s)
-        return seen, others
-
-    def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
-        """Steer the ownship at the times at which manoeuvres have come.
-
-        Returns
-        -------
-        flights, truth : KnownFlights or None
-            The flights as they are known at each row, where a block asks for them and where the
-            truth is recorded: a row knows the manoeuvres that have come by its own instant,
-            whatever came later in this wake.
-        """
-        for new in wake.arrivals("manoeuvres"):
-            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
-            self._told = [*self._told, *zip(new.tick.tolist(), manoeuvres, strict=True)]
-        last = int(wake.ticks[-1])
-        # What comes after the last row is for the next wake: what is flown at the end of a run
-        # must not depend on how far a window reached beyond it.
-        told = [one for one in self._told if one[0] <= last]
-        self._told = self._told[len(told) :]
-        known, true = [self._flights_now], [self._truth_now]
-        for tick, manoeuvre in told:
-            assert isinstance(self.own, SteeredFlight)
-            self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
-            known.append(partial(self.flights, self.own))
-            true.append(self._true_flights())
-        self._flights_now, self._truth_now = known[-1], true[-1]
-        if not self._flights_asked_for and self._truth_now is None:
-            return None, None
-        # A manoeuvre has come before anything runs at its instant.
-        came = np.array([tick for tick, _ in told], dtype=np.int64)
-        of_row = np.searchsorted(came, wake.ticks, side="right")
-        return (
-            KnownFlights(known, of_row) if self._flights_asked_for else None,
-            None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
-        )
-
-    def _true_flights(self) -> TrueFlights | None:
-        """Return all flights as they are known now, if the truth is recorded."""
-        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return the times at which the source itself knows this target and the ownship, s."""

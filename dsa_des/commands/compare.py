@@ -29,9 +29,10 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.identity import record_of
+from dsa_des.studies.labels import short
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import interval_text, short, times
+from dsa_des.studies.printing import interval_text, times
 from dsa_des.studies.record import StudyRecord, results_of
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study
@@ -234,9 +235,9 @@ def _compare(
             f"{names[0]} has the seed {one.record.seed} and {names[1]} {other.record.seed}: their "
             "draws are not the same, so they cannot be paired"
         )
-    kinds = {result.name: result.kind for result in other.results}
+    kinds = {result.name: result.kind for result in other.results if result.is_number}
     own, known = ({result.name for result in side.results} for side in (one, other))
-    metrics = [name for name in _shown(one, only) if name in known]
+    metrics = [name for name in _shown(one, only) if name in kinds]
     heads = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
              "unpaired interval", "narrower"]  # fmt: skip
     lines: list[list[str]] = []

@@ -15,7 +15,7 @@ from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.folder_names import latest_folder
-from dsa_des.studies.metric import Result
+from dsa_des.studies.metric import CLASS, Result
 from dsa_des.studies.output import Tables
 from dsa_des.studies.printing import show
 from dsa_des.studies.record import StudyRecord
@@ -252,7 +252,7 @@ def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:
     UsageError
         If one of `only` is none of them.
     """
-    every = [result.name for result in results]
+    every = [result.name for result in results if result.kind != CLASS]
     for name in only:
         if name not in every:
             raise UsageError(f"--metric {name}: there is no such result{did_you_mean(name, every)}")

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.studies.labels import unit_of
+from dsa_des.studies.labels import short, unit_of
 from dsa_des.studies.metric import EVENT, Result
 from dsa_des.studies.output import Tables
-from dsa_des.studies.printing import short
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 
@@ -98,7 +97,7 @@ def say_what_changed(
     results : iterable of Result
         That both have.
     """
-    results = list(results)
+    results = [result for result in results if result.is_number]
     width: int = console(160).width
     say(f"What changed from {shortened(names[0])} to {shortened(names[1])}:")
     for where, pair in places[:_MOST_PLACES]:

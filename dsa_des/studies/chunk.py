@@ -17,7 +17,7 @@ from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
 from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import SHARE, TRIALS, Group, Metric, Result, wanted_by
+from dsa_des.studies.metric import CLASS, RATIO, SHARE, TRIALS, Group, Metric, Result, wanted_by
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Chunk, Study, set_text
 
@@ -68,7 +68,9 @@ def columns_of(
     ]
     cut_off: set[str] = set()
     for result in results:
-        fields.append((result.name, pa.float64()))
+        if result.kind == RATIO:
+            continue
+        fields.append((result.name, pa.string() if result.kind == CLASS else pa.float64()))
         if result.kind == SHARE:
             fields.append((result.name + TRIALS, pa.float64()))
         if result.cut_off is not None and result.cut_off not in cut_off:

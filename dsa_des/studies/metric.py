@@ -27,8 +27,9 @@ METRICS = "dsa_des.metrics"
 
 _T = TypeVar("_T")
 
-#: Kinds of results: a number with a mean; an event that happens or not; a share of trials.
-NUMBER, EVENT, SHARE = "number", "event", "share"
+#: Kinds of results: a number with a mean; an event that happens or not; a share of trials; the
+#: ratio of two events over all units of a cell; the name of a class.
+NUMBER, EVENT, SHARE, RATIO, CLASS = "number", "event", "share", "ratio", "class"
 #: What is put behind the name of a share for the column of its trials.
 TRIALS = ".trials"
 
@@ -51,6 +52,34 @@ class Told:
 
 
 @dataclass(frozen=True)
+class RatioOf:
+    """Which columns a ratio is made of.
+
+    Parameters
+    ----------
+    below, above : str
+        Events under and over the line (nominal and mitigated), of the same units.
+    weight : str, optional
+        A number: how often a unit happens.
+    cluster : str, optional
+        A number that runs share which hang together; they count as one unit.
+    only : (column, class), optional
+        Of which runs: those of this class.
+    """
+
+    below: str
+    above: str
+    weight: str | None = None
+    cluster: str | None = None
+    only: tuple[str, str] | None = None
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the names of all columns it reads."""
+        names = (self.below, self.above, self.weight, self.cluster, self.only and self.only[0])
+        return tuple(name for name in names if name)
+
+
+@dataclass(frozen=True)
 class Result:
     """One column of a study's results.
 
@@ -58,9 +87,10 @@ class Result:
     ----------
     name : str
         With its unit, for example ``declaration_time_s.radar``.
-    kind : {"number", "event", "share"}
+    kind : {"number", "event", "share", "ratio", "class"}
         A number may be NaN (no value in this run); an event is 0 or 1; a share has a second
-        column ``NAME.trials``, and is NaN without trials.
+        column ``NAME.trials``, and is NaN without trials. A class is a text or None, and stands in
+        no summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
     meaning : str
     cut_off : str, optional
         Name of a further column, a text: where the run's start or end cut this value off (``at the
@@ -80,6 +110,12 @@ class Result:
     told: Told | None = None
     block: str | None = None
     mark: tuple[str, str] | None = None
+    ratio: RatioOf | None = None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether each run has a number of its own for it."""
+        return self.kind not in (RATIO, CLASS)
 
 
 class Group:
@@ -193,7 +229,7 @@ class Metric:
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return result name → values, shape (replicas,); NaN where a run has no value.
 
-        Columns that `Result.cut_off` names hold texts, or None.
+        Columns that `Result.cut_off` names, and classes, hold texts, or None. Ratios have none.
         """
         raise NotImplementedError
 

@@ -11,13 +11,16 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
+from dsa_des.studies.cheapest import Answer, answers, one_sided
 from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
-from dsa_des.studies.labels import value_label
+from dsa_des.studies.labels import short, value_label
+from dsa_des.studies.map_figure import draw_map
 from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
+from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
@@ -30,7 +33,8 @@ _MOST_SCATTERS = 6
 _LONGEST_NAME = 200
 #: Letters of a figure's title.
 _LONGEST_TITLE = 200
-SUMMARY, DIFFERENCES = "summary.parquet", "differences.parquet"
+SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
+REQUIREMENTS = "requirements.parquet"
 
 
 class Tables:
@@ -56,6 +60,11 @@ class Tables:
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval, expected
         )
+        wanted = [Requirement(**vars(item)) for item in record.requirements]
+        #: What each requirement comes to, at every place of the other axes.
+        self.answers: list[Answer] = [
+            found for one in wanted for found in answers(one, self.rows.axes, self.lines)
+        ]
         self.compared: list[Compared] = []
         #: The axis along which values are compared, and with which.
         self.baseline: tuple[str, Any] | None = None
@@ -115,6 +124,40 @@ class Tables:
         self.folder.write_table(SUMMARY, _parquet(self._summary_columns()))
         if self.compared:
             self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
+        if self.ratios():
+            self.folder.write_table(RATIOS, _parquet(self._ratio_columns()))
+        if self.answers:
+            self.folder.write_table(REQUIREMENTS, _parquet(self._answer_columns()))
+
+    def ratios(self) -> list[Line]:
+        """Return the lines that are ratios of events."""
+        return [line for line in self.lines if line.ratio is not None]
+
+    def _ratio_columns(self) -> dict[str, list[Any]]:
+        """Return all numbers of the ratios, with both kinds of interval."""
+        lines = self.ratios()
+        columns: dict[str, list[Any]] = {
+            name: [line.at[k] for line in lines] for k, name in enumerate(self.rows.axes)
+        }
+        columns["result"] = [line.result.name for line in lines]
+        told = [line.ratio for line in lines if line.ratio is not None]
+        for name in (
+            "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
+            "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
+            "mitigated_probability", "few", "reason",
+        ):  # fmt: skip
+            columns[name] = [getattr(one, name) for one in told]
+        for method in ("delta", "bootstrap"):
+            both = [{r.method: r for r in (line.ratio, line.other) if r is not None}
+                    for line in lines]  # fmt: skip
+            found = [known.get(method) for known in both]
+            columns |= {
+                f"{method}_error": [None if r is None else r.standard_error for r in found],
+                f"{method}_low": [None if r is None else r.interval[0] for r in found],
+                f"{method}_high": [None if r is None else r.interval[1] for r in found],
+            }
+        columns["missing"] = [line.missing for line in lines]
+        return columns
 
     def _summary_columns(self) -> dict[str, list[Any]]:
         columns: dict[str, list[Any]] = {
@@ -133,6 +176,29 @@ class Tables:
             "expected": [line.expected for line in self.lines],
         }
         return columns
+
+    def others_said(self, answer: Answer) -> str:
+        """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
+        names = [name for name in self.rows.axes if name != answer.requirement.axis]
+        return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
+
+    def _answer_columns(self) -> dict[str, list[Any]]:
+        found = self.answers
+        return {
+            "requirement": [item.requirement.said() for item in found],
+            "axis": [item.requirement.axis for item in found],
+            "others": [self.others_said(item) for item in found],
+            "cheapest": [None if item.value is None else short(item.value) for item in found],
+            "confidence": [one_sided(self.record.confidence)] * len(found),
+            "cheapest_by_estimate": [
+                None if item.estimated is None else short(item.estimated) for item in found
+            ],
+            "value": [item.line.estimate.value for item in found],
+            "low": [item.line.estimate.low for item in found],
+            "high": [item.line.estimate.high for item in found],
+            "few": [item.line.estimate.few for item in found],
+            "uneven": [item.uneven for item in found],
+        }
 
     def _difference_columns(self) -> dict[str, list[Any]]:
         assert self.baseline is not None
@@ -190,12 +256,15 @@ class Tables:
         metric = str(figure.metric)
         title = _shortened(self.record.title if figure.title is None else figure.title)
         axis = figure.axis or places.axes[0]
-        if figure.kind == "heat":
+        if figure.kind in ("heat", "map"):
             x = figure.x or places.axes[0]
             y = figure.y or next((a for a in places.axes if a != x), x)
             if x == y:
                 return False
-            draw_heat(target, places, metric, x, y, title)
+            if figure.kind == "heat":
+                draw_heat(target, places, metric, x, y, title)
+            else:
+                draw_map(target, places, metric, x, y, figure.limits, title, self.record.confidence)
         elif figure.kind == "polar":
             draw_polar(target, places, metric, axis, title)
         else:
@@ -209,6 +278,8 @@ class Tables:
         """Draw how a result is spread over the runs, one series per value of an axis."""
         metric = str(figure.metric)
         if figure.axis is not None and figure.axis not in self.rows.axes:
+            return False
+        if any(result.name == metric and not result.is_number for result in self.results):
             return False
         axis = figure.axis or next(iter(self.rows.axes), None)
         found: dict[Any, list[FloatArray]] = {}
@@ -229,7 +300,8 @@ class Tables:
         """Return the results worth a closer look: those named, drawn, or else that differ."""
         drawn = [f.metric for f in self.record.figures if f.metric is not None]
         if only or drawn:
-            return list(dict.fromkeys(only or drawn))
+            numbers = {result.name for result in self.results if result.is_number}
+            return [name for name in dict.fromkeys(only or drawn) if name in numbers]
         differing = [c.result for c in self.compared if c.difference.paired.half_width > 0]
         return list(dict.fromkeys(r.name for r in differing if r.kind == NUMBER))[:_MOST_SCATTERS]
 

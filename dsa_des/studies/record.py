@@ -15,7 +15,7 @@ from dsa_des.block.mark import Mark, marks_of
 from dsa_des.record.version import __version__
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Result, Told
+from dsa_des.studies.metric import RatioOf, Result, Told
 from dsa_des.studies.study import Study, run_command, set_text
 from dsa_des.studies.study_tables import json_safe
 
@@ -52,16 +52,27 @@ class DrawRecord(_Strict):
     numeric: bool
 
 
+class RatioRecord(_Strict):
+    """Columns of a ratio; see `RatioOf`."""
+
+    below: str
+    above: str
+    weight: str | None = None
+    cluster: str | None = None
+    only: tuple[str, str] | None = None
+
+
 class ResultRecord(_Strict):
     """A result of a metric; see `Result`."""
 
     name: str
-    kind: Literal["number", "event", "share"]
+    kind: Literal["number", "event", "share", "ratio", "class"]
     meaning: str
     cut_off: str | None = None
     told: tuple[str, str, str] | None = None
     block: str | None = None
     mark: tuple[Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")], _Marker] | None = None
+    ratio: RatioRecord | None = None
 
 
 class StopRecord(_Strict):
@@ -74,15 +85,26 @@ class StopRecord(_Strict):
 class FigureRecord(_Strict):
     """A figure; see `read_figures`."""
 
-    kind: Literal["axis", "heat", "polar", "histogram", "cdf", "run"]
+    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "run"]
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
     lines: str | None = None
     x: str | None = None
     y: str | None = None
+    limits: list[float] = []
     cell: _Whole = 0
     replica: _Whole = 0
+
+
+class RequirementRecord(_Strict):
+    """A limit on a result; see `Requirement`."""
+
+    metric: str
+    axis: str
+    limit: float
+    below: bool = True
+    cheap_last: bool = False
 
 
 class StudyHead(_Strict):
@@ -118,6 +140,7 @@ class StudyRecord(StudyHead):
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)]
     interval: Literal["t", "bootstrap"]
     figures: list[FigureRecord]
+    requirements: list[RequirementRecord] = []
 
     @model_validator(mode="after")
     def _consistent(self) -> "StudyRecord":
@@ -125,6 +148,13 @@ class StudyRecord(StudyHead):
         columns = self.schema_of_parts().names
         if len(set(columns)) < len(columns):
             raise ValueError("two columns have one name")
+        for result in self.results:
+            if (result.kind == "ratio") != (result.ratio is not None):
+                raise ValueError("a ratio, and nothing else, says of which columns it is")
+            if result.ratio is not None and not set(RatioOf(**vars(result.ratio)).reads()) <= {
+                *columns
+            }:
+                raise ValueError("a ratio names no column")
         if self.compare is not None and self.compare[0] not in axes:
             raise ValueError("compare names no axis")
         if any(len(a.values) != len(a.sets) or len(a.values) != len(a.swaps) for a in self.axes):
@@ -133,10 +163,14 @@ class StudyRecord(StudyHead):
             for name in (figure.axis, figure.lines, figure.x, figure.y):
                 if name is not None and name not in axes:
                     raise ValueError("a figure names no axis")
+            if figure.kind == "map" and len(axes) < 2:
+                raise ValueError("a map needs two axes")
             if figure.kind == "polar" and figure.axis and not axes[figure.axis].numeric:
                 raise ValueError("a polar figure needs numbers")
             if figure.kind != "run" and figure.metric is None:
                 raise ValueError("a figure needs a metric")
+        if any(item.axis not in axes for item in self.requirements):
+            raise ValueError("a requirement names no axis")
         return self
 
     def schema_of_parts(self) -> "pa.Schema":
@@ -156,11 +190,11 @@ class StudyRecord(StudyHead):
 
     def results_list(self) -> list[Result]:
         """Return what the metrics gave."""
-        kinds = {"number": NUMBER, "event": EVENT, "share": SHARE}
         return [
             Result(
-                r.name, kinds[r.kind], r.meaning, r.cut_off,
+                r.name, r.kind, r.meaning, r.cut_off,
                 None if r.told is None else Told(*r.told), r.block, r.mark,
+                None if r.ratio is None else RatioOf(**vars(r.ratio)),
             )
             for r in self.results
         ]  # fmt: skip
@@ -257,7 +291,9 @@ def record_text(study: Study, digest: str) -> str:
             for draw in study.draws
         ],
         "results": [
-            vars(result) | {"told": None if result.told is None else astuple(result.told)}
+            vars(result)
+            | {"told": None if result.told is None else astuple(result.told)}
+            | {"ratio": None if result.ratio is None else vars(result.ratio)}
             for result in results_of(study)
         ],
         "sets": [(key, set_text(value)) for key, value in study.sets],
@@ -267,9 +303,10 @@ def record_text(study: Study, digest: str) -> str:
         "confidence": study.confidence,
         "interval": study.interval,
         "figures": [
-            {key: item if isinstance(item, int) else str(item) for key, item in figure.items()}
+            {k: v if isinstance(v, int | list) else str(v) for k, v in figure.items()}
             for figure in study.figures
         ],
+        "requirements": [vars(requirement) for requirement in study.requirements],
         "version": __version__,
         "tables": study.tables,
     }

@@ -145,6 +145,17 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     return Estimate(value, low, high, count, count < FEW)
 
 
+def symmetric(value: float, error: float, count: int, few: bool, confidence: float) -> Estimate:
+    """Return an estimate whose interval is that of the normal distribution."""
+    half = _z(confidence) * error
+    return Estimate(value, value - half, value + half, count, few)
+
+
+def normal_error(estimate: Estimate, confidence: float) -> float:
+    """Return the standard error whose normal interval is as wide as an estimate's."""
+    return estimate.half_width / _z(confidence)
+
+
 def standard_error(values: FloatArray) -> float:
     """Return the standard error of a mean."""
     count = len(values)

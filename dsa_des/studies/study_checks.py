@@ -11,7 +11,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.metric import EVENT, TRIALS, Metric, Result
+from dsa_des.studies.metric import CLASS, NUMBER, SHARE, TRIALS, Metric, Result
 from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -111,18 +111,25 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
 
 def _check_names(study: Study, results: Mapping[str, Result], add: Callable[..., None]) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
-    names = [name for name in results if not name.endswith(TRIALS)]
+    names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.kind != CLASS]
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
+    for number, wanted in enumerate(study.requirements):
+        if wanted.metric not in names:
+            message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
+            add(("requirements", number, "metric"), message, wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure["kind"] != "run" and figure["metric"] not in names:
             message = "no metric of the study gives it"
             message += did_you_mean(str(figure["metric"]), names)
             add(("figures", number, "metric"), message, str(figure["metric"]))
-        elif figure["kind"] in ("histogram", "cdf") and results[figure["metric"]].kind == EVENT:
-            numbers = [name for name in names if results[name].kind != EVENT]
-            message = f"is an event, 0 or 1: a {figure['kind']} shows how numbers are spread"
+        elif figure["kind"] in ("histogram", "cdf") and (
+            results[figure["metric"]].kind not in (NUMBER, SHARE)
+        ):
+            numbers = [name for name in names if results[name].kind in (NUMBER, SHARE)]
+            what = {"event": "an event, 0 or 1"}.get(results[figure["metric"]].kind, "a ratio")
+            message = f"is {what}: a {figure['kind']} shows how numbers are spread"
             message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""
             add(("figures", number, "metric"), message, str(figure["metric"]))
 

@@ -13,11 +13,23 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.studies.chunk import CRASHED
-from dsa_des.studies.metric import EVENT, SHARE, TRIALS, Result
-from dsa_des.studies.statistics import Estimate, EstimatedDifference, difference, mean, share
+from dsa_des.studies.metric import CLASS, EVENT, RATIO, SHARE, TRIALS, Result
+from dsa_des.studies.ratio import PairedRatio, influences, paired_ratio
+from dsa_des.studies.statistics import (
+    Estimate,
+    EstimatedDifference,
+    difference,
+    mean,
+    normal_error,
+    share,
+    symmetric,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+#: Sets that are drawn for a bootstrap interval of a ratio.
+_RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -32,6 +44,9 @@ class Line:
     #: Runs of this place, and (where, how many) of those whose value the run cut off.
     runs: int = 0
     cut_off: tuple[tuple[str, int], ...] = ()
+    #: Of a ratio: all its numbers, by the study's own kind of interval and by the other.
+    ratio: PairedRatio | None = None
+    other: PairedRatio | None = None
 
 
 class Rows:
@@ -102,6 +117,9 @@ class Rows:
         self, result: Result, rows: IntArray, confidence: float, method: str
     ) -> tuple[Estimate, int]:
         """Return the estimate of a result over some rows, and how many rows have no value."""
+        if result.kind == RATIO:
+            ratio, missing = self.ratio(result, rows, confidence, method)
+            return estimate_of(ratio), missing
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
@@ -116,12 +134,98 @@ class Rows:
         tried = np.bincount(place, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
+    def ratio(
+        self, result: Result, rows: IntArray, confidence: float, method: str
+    ) -> tuple[PairedRatio, int]:
+        """Return the ratio of some rows, and how many of them have no value for it.
+
+        Runs of the same encounter, and of the same unit, hang together.
+        """
+        found, used, missing = self._paired(result, rows)
+        below, above, weight, cluster = found
+        method = "bootstrap" if method == "bootstrap" else "delta"
+        together = cluster if len(np.unique(cluster)) < len(used) else None
+        ratio = paired_ratio(
+            below, above, weight, cluster=together, confidence=confidence, method=method,
+            resamples=_RESAMPLES,
+        )  # fmt: skip
+        return ratio, missing
+
+    def _paired(
+        self, result: Result, rows: IntArray
+    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray, AnyArray], IntArray, int]:
+        """Return the columns of a ratio over the rows that have all of them, and those rows."""
+        of = result.ratio
+        assert of is not None
+        if of.only is not None:
+            rows = rows[self.column(of.only[0])[rows] == of.only[1]]
+        below, above = (self.column(name)[rows].astype(float) for name in (of.below, of.above))
+        weight = np.ones(len(rows))
+        if of.weight is not None:
+            weight = self.column(of.weight)[rows].astype(float)
+        units = self.units[rows]
+        cluster = units if of.cluster is None else self.column(of.cluster)[rows]
+        known = ~(np.isnan(below) | np.isnan(above) | np.isnan(weight))
+        if of.cluster is not None:
+            known &= ~np.isnan(cluster.astype(float))
+            if self.over:  # one encounter's number means another in another file
+                _, number = np.unique(cluster, return_inverse=True)
+                cluster = units * (int(number.max(initial=0)) + 1) + number
+        columns = below[known], above[known], weight[known], cluster[known]
+        return columns, rows[known], int((~known).sum())
+
+    def ratio_difference(
+        self, result: Result, first: IntArray, second: IntArray, confidence: float
+    ) -> EstimatedDifference:
+        """Return how a ratio differs between two conditions on the same runs, by their influences.
+
+        What each run adds to the error of either ratio is subtracted run by run, so what they
+        share falls out; the interval is that of the normal distribution.
+        """
+        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
+        runs = runs + self.column("replica")
+        sides = [self._paired(result, rows) for rows in (first, second)]
+        one, two = (runs[side[1]] for side in sides)
+        _, here, there = np.intersect1d(one, two, return_indices=True)
+        parts, ratios, cluster = [], [], sides[0][0][3][here]
+        for (columns, _, _), common in zip(sides, (here, there), strict=True):
+            below, above, weight = (column[common] for column in columns[:3])
+            ratio = paired_ratio(below, above, weight, cluster=cluster, confidence=confidence)
+            ratios.append(ratio)
+            if not ratio.reason:
+                parts.append(influences(below, above, weight, ratio.ratio))
+        alone = [len(side[1]) - len(here) for side in sides]
+        if len(parts) < 2:
+            none = Estimate(np.nan, np.nan, np.nan, 0, True)
+            return EstimatedDifference(none, none, *alone)
+        _, place = np.unique(cluster, return_inverse=True)
+        each = np.array([np.bincount(place, weights=part) for part in parts])
+        value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
+        # A ratio whose runs all agree has no such error; its interval tells another.
+        unseen = sum(
+            normal_error(estimate_of(ratio), confidence) ** 2
+            for ratio, part in zip(ratios, each, strict=True)
+            if np.abs(part).max() < 1e-12
+        )
+        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + unseen))
+        apart = float(np.sqrt((each**2).sum() + unseen))
+        return EstimatedDifference(
+            symmetric(value, joint, each.shape[1], few, confidence),
+            symmetric(value, apart, each.shape[1], few, confidence),
+            *alone,
+        )
+
     def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
         """Return where the run cut a result off in some rows, and in how many, sorted."""
         if result.cut_off is None:
             return ()
         said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]
         return tuple(sorted(Counter(said).items()))
+
+
+def estimate_of(ratio: PairedRatio) -> Estimate:
+    """Return a ratio as the summary's other lines are."""
+    return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)
 
 
 def _plain(value: Any) -> Any:
@@ -145,10 +249,24 @@ def summarise(
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
-            estimate, missing = rows.estimate(result, chosen, confidence, method)
+            if result.kind == CLASS:
+                continue
+            ratio = other = None
+            if result.kind == RATIO:
+                ratio, missing = rows.ratio(result, chosen, confidence, method)
+                estimate = estimate_of(ratio)
+                # Drawing sets again takes a while; of classes it is done only where it is asked.
+                if method == "bootstrap":
+                    other, _ = rows.ratio(result, chosen, confidence, "delta")
+                elif result.ratio is not None and result.ratio.only is None:
+                    other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
+            else:
+                estimate, missing = rows.estimate(result, chosen, confidence, method)
             known = expected.get((result.name, at))
             cut_off = rows.cut_off(result, chosen)
-            lines.append(Line(at, result, estimate, missing, known, len(chosen), cut_off))
+            lines.append(
+                Line(at, result, estimate, missing, known, len(chosen), cut_off, ratio, other)
+            )
     return lines
 
 
@@ -178,9 +296,14 @@ def compare_axis(
         if at[place] == baseline or base not in by_place:
             continue
         for result in results:
-            first, second = paired(rows, result.name, by_place[base], chosen)[1:]
+            if result.kind == CLASS:
+                continue
             others = (*at[:place], *at[place + 1 :])
-            change = difference(first, second, confidence, method, kind=result.kind)
+            if result.kind == RATIO:
+                change = rows.ratio_difference(result, by_place[base], chosen, confidence)
+            else:
+                first, second = paired(rows, result.name, by_place[base], chosen)[1:]
+                change = difference(first, second, confidence, method, kind=result.kind)
             found.append(Compared(others, at[place], baseline, result, change))
     return found
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.messages.detections import combination_text, mask_type
+from components.messages.contributors import combination_text, mask_type
 from dsa_des.block.message import Text
 
 HEAD = """

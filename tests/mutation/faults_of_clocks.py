@@ -150,7 +150,7 @@ FAULTS = [
          "start = targets.tick"),
     ),
     *in_file(
-        _GROUP, "components/traffic/source.py",
+        _GROUP, "components/traffic/steered_ownship.py",
         ("radar/test_beam_sweep_steered.py::"
          "test_a_scan_follows_the_flight_that_is_known_when_it_begins",
          "wiring/test_beams_on_mounted_radars.py", "wiring/test_turning_away.py"),

@@ -24,7 +24,7 @@ FAULTS = [
         ("cameras-measure-range", "if self._range_step is None:", "if False:"),
     ),
     *in_file(
-        _GROUP, "components/sensor/sensor.py",
+        _GROUP, "components/sensor/skip_counts.py",
         ("wiring/test_reach.py", "test_culling.py", "sensor_effects/test_lost_targets.py"),
         ("culled-are-absent", "skipped[CULLED] = culled", "skipped[CULLED] = 0 * culled"),
         ("evaluated-is-all-there", "return of[EVALUATE], skipped",
@@ -40,9 +40,16 @@ FAULTS = [
         (_NOISE, _TRACKED, "wiring/test_radars_together.py"),
         ("detected-is-an-offset", "value=lambda message: np.diff(message.offsets)",
          "value=lambda message: message.offsets[1:]"),
+    ),
+    *in_file(
+        _GROUP, "components/messages/fused.py", (_TRACKED, "wiring/test_radars_together.py"),
         ("range-source-is-angle-source",
          "value=lambda message: Text(message.range_source, message.sensors)",
          "value=lambda message: Text(message.angle_source, message.sensors)"),
+    ),
+    *in_file(
+        _GROUP, "components/messages/contributors.py",
+        (_TRACKED, "wiring/test_radars_together.py"),
         ("sensors-by-number-reversed",
          "[name for i, name in enumerate(sensors) if mask >> i & 1]",
          "[name for i, name in enumerate(reversed(sensors)) if mask >> i & 1]"),

@@ -179,6 +179,10 @@ FAULTS = [
          "wiring/test_navigation_keys.py"),
         ("judges-not-called", "for judge in self._judgements:", "for judge in ():"),
         ("reports-not-called", "for report in self._reporting:", "for report in ():"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/measuring.py",
+        ("wiring/test_measured_angles.py", "sensor_effects/test_sensor_mounting.py"),
         ("measured-in-body-axes", "azimuth, elevation = self.axes(azimuth_rad, elevation_rad)",
          "azimuth, elevation = azimuth_rad, elevation_rad"),
         ("reported-in-sensor-axes", "return *self.axes.to_body(*angles), ", "return *angles, "),

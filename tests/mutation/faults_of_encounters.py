@@ -37,9 +37,9 @@ FAULTS = [
         ("range-of-the-start-as-height", "< rules.start_vertical_ft)", "< rules.start_range_ft)"),
     ),
     *in_file(
-        _GROUP, "components/metrics/risk.py", _RISK,
-        ("denominator-taken-as-known", "residual = w * (m - ratio * n)",
-         "residual = w * (m - above / total)"),
+        _GROUP, "dsa_des/studies/ratio.py", _RISK,
+        ("denominator-taken-as-known", "residual = y - ratio * x",
+         "residual = y - above / total * each"),
         ("ratio-without-weights", "ratio = above / below", "ratio = math.fsum(m) / math.fsum(n)"),
     ),
 ]  # fmt: skip

@@ -15,7 +15,7 @@ FAULTS = [
         ("field-of-view-in-degrees", "math.radians(self.azimuth_deg[0])", "self.azimuth_deg[0]"),
     ),
     *in_file(
-        _GROUP, "components/sensor/sensor.py", "wiring/test_measured_angles.py",
+        _GROUP, "components/sensor/measuring.py", "wiring/test_measured_angles.py",
         ("azimuth-grid-in-degrees", "math.radians(parameters.azimuth_resolution_deg)",
          "parameters.azimuth_resolution_deg"),
     ),

@@ -71,8 +71,7 @@ FAULTS = [
         _GROUP, "components/optical/projection.py",
         (_CAMERA, "wiring/test_camera_signature.py"),
         ("projection-always-visible",
-         'self._contrast = "contrast_ir" if parameters.band == "ir" else "contrast"',
-         'self._contrast = "contrast"'),
+         'return "contrast_ir" if self.p.band == "ir" else "contrast"', 'return "contrast"'),
         ("projection-length-of-front-twice", 'cells.roster.column(f"{band}.side_m2")',
          'cells.roster.column(f"{band}.front_m2")'),
     ),
@@ -292,7 +291,7 @@ FAULTS = [
          "confidence=snr_db"),
     ),
     *in_file(
-        _GROUP, "components/sensor/sensor.py", "wiring/test_false_alarms_of_radars.py",
+        _GROUP, "components/sensor/measuring.py", "wiring/test_false_alarms_of_radars.py",
         ("alarms-off-the-grid", "return self._in_body(*self._on_grid(where))",
          "return self._in_body(where, self._on_grid(where)[1])"),
     ),

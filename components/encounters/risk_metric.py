@@ -1,0 +1,119 @@
+"""Risk ratios over the runs of a study (``risk_ratio``): of all encounters, and class by class.
+
+One run of a closed loop gives both flags of an encounter, without and with the manoeuvres that the
+ownship was told (`components.metrics.mitigated`); beside them stand the encounter's weight and the
+class of its geometry. The ratios themselves are taken over all runs of a cell.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from components.encounters.pair_sets import GEOMETRIES, geometry_class
+from components.encounters.weight_metric import EncounterWeight, has_weights
+from components.metrics.encounter import read_flights
+from components.metrics.mitigated import Mitigated, RiskParameters
+from components.metrics.separation import RelativeFlight, closest
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import CLASS, RATIO, Group, RatioOf, Result
+
+#: Sides from which an intruder closes in, by bearing from the ownship's course.
+BEARINGS = ("ahead", "right", "behind", "left")
+_CLASSES = {"geometry": GEOMETRIES, "bearing": BEARINGS}
+_EVENTS = ("nmac", "well_clear_lost")
+# Courses are taken over this time to both sides of the closest approach.
+_BASE_S = 0.5
+
+
+class RiskRatioParameters(RiskParameters):
+    """What counts as an event, and of which classes of geometry there are ratios."""
+
+    by: tuple[Literal["geometry", "bearing"], ...] = Field(
+        default=("geometry",),
+        description="Also a ratio for each class: by `geometry` (head-on, overtaking, crossing "
+        "from the left or right) or by the `bearing` from which the intruder closes in (ahead, "
+        "right, behind, left: sectors of 90°), as without manoeuvres.",
+    )
+
+
+class RiskRatios(Mitigated):
+    """Risk ratios of NMAC and of loss of well clear, with the flags that they are made of."""
+
+    Parameters = RiskRatioParameters
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        self._weight = EncounterWeight((), scene) if has_weights(scene) else None
+
+    def results(self) -> list[Result]:
+        """Return flags, encounter and weight, classes, and the ratios of all and of each class."""
+        found = super().results()
+        weight = cluster = None
+        if self._weight is not None:
+            found += self._weight.results()
+            weight, cluster = "encounter_weight", "encounter"
+        for by in self.p.by:
+            found.append(Result(f"encounter_{by}", CLASS, f"class of its {by}"))
+        for name in _EVENTS:
+            flags = f"{name}_nominal", f"{name}_mitigated"
+            said = "share of the risk that is left"
+            of = RatioOf(*flags, weight, cluster)
+            found.append(Result(f"{name}_risk_ratio", RATIO, said, ratio=of))
+            found += [
+                Result(
+                    f"{name}_risk_ratio.{kind.replace(' ', '_')}", RATIO, f"{said}, {kind}",
+                    ratio=RatioOf(*flags, weight, cluster, (f"encounter_{by}", kind)),
+                )
+                for by in self.p.by for kind in _CLASSES[by]
+            ]  # fmt: skip
+        return found
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all but the ratios for every replica."""
+        found = dict(super().measure(group))
+        if self._weight is not None:
+            found |= self._weight.measure(group)
+        if self.p.by:
+            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg, 2)
+            for by in self.p.by:
+                named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
+                column: AnyArray = named.astype(object)
+                column[np.isnan(course_deg)] = None
+                found[f"encounter_{by}"] = column
+        return found
+
+
+def side_of(bearing_deg: FloatArray) -> AnyArray:
+    """Return in which sector of 90° each bearing lies: ahead, right, behind or left."""
+    sector = np.floor((np.nan_to_num(bearing_deg) + 45.0) % 360.0 / 90.0).astype(int)
+    found: AnyArray = np.array(BEARINGS)[sector]
+    return found
+
+
+def meeting_deg(flights: list[RelativeFlight]) -> tuple[float, float]:
+    """Return how the nearest intruder meets the ownship at the closest approach, degrees.
+
+    Returns
+    -------
+    course : float
+        The intruder's less the ownship's.
+    bearing : float
+        From where the intruder closes in, clockwise from the ownship's course: opposite to its
+        velocity relative to the ownship. NaN, both, where they never are there together.
+    """
+    best = math.inf, math.nan
+    nearest: RelativeFlight | None = None
+    for flight in flights:
+        distance_m, time_s, _ = closest(flight)
+        if distance_m < best[0]:
+            best, nearest = (distance_m, time_s), flight
+    if nearest is None:
+        return math.nan, math.nan
+    own, other = nearest.ways_m(best[1], _BASE_S)
+    course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
+    closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
+    return (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0

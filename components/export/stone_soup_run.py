@@ -1,0 +1,267 @@
+"""A recorded run as Stone Soup's objects (`components.export.stone_soup`)."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from stonesoup.buffered_generator import BufferedGenerator
+from stonesoup.movable import MovingMovable
+from stonesoup.platform.base import MovingPlatform
+from stonesoup.reader import DetectionReader
+from stonesoup.types.array import StateVector
+from stonesoup.types.detection import Detection
+from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
+
+from components.estimation.frame import place_in_frame
+from components.export.recorded import OWNSHIP, RecordedTables
+from components.geometry.ellipsoid import north_east_up
+from components.geometry.normals import local_axes
+from components.stone_soup.objects import (
+    POSITION,
+    VELOCITY,
+    Poses,
+    detections,
+    instant,
+    state_vectors,
+)
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
+
+_MEASURED = ("azimuth_rad", "elevation_rad", "range_m")
+_VARIANCES = ("azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2")
+_POSE = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+_VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
+
+#: Latitude and longitude (deg) and height above the ellipsoid (m).
+Origin = tuple[float, float, float]
+
+
+class RecordedDetector(DetectionReader):
+    """Gives look after look: its instant, and what was detected in it, if anything."""
+
+    looks: "list[tuple[datetime, set[Detection]]]"
+
+    @BufferedGenerator.generator_method
+    def detections_gen(self) -> Iterator[tuple[datetime, set[Detection]]]:
+        """Give every look of every sensor, in the order of their instants."""
+        yield from self.looks
+
+
+class RecordedMovement(MovingMovable):
+    """Where the ownship believed to be, and how it believed to be turned."""
+
+    @property
+    def orientation(self) -> StateVector:
+        """Return roll, pitch and yaw at the last state, in Stone Soup's sense."""
+        return self.states[-1].metadata["orientation"]
+
+
+@dataclass(frozen=True)
+class StoneSoupRun:
+    """A recorded run as Stone Soup's objects.
+
+    All states are ``[x, vx, y, vy, z, vz]``: x east, y north, z up at `origin`, axes parallel to
+    themselves, metres and seconds. Instants count from 1 January 2000.
+
+    Parameters
+    ----------
+    detector : RecordedDetector
+        Every look in order, for a tracker's ``detector``: instant and set of `Detection`. Each
+        detection has its own measurement model, with the pose that was believed then, and the
+        variances of its errors; its ``metadata`` names ``sensor`` and ``scan``, and no target.
+    platform : MovingPlatform
+        The ownship with the poses believed at its detections; the ``metadata`` of a state holds its
+        ``orientation``. Its velocity is the true one, NaN where no truth is recorded.
+    truth : set of GroundTruthPath
+        The targets' true flights; ``id`` is a target's name.
+    ownship : GroundTruthPath or None
+        The ownship's true flight.
+    origin : tuple
+        Latitude and longitude (deg) and height (m) of the frame, WGS 84.
+    """
+
+    detector: RecordedDetector
+    platform: MovingPlatform
+    truth: "set[GroundTruthPath]"
+    ownship: "GroundTruthPath | None"
+    origin: Origin
+
+
+def recorded_run(run: RecordedTables, origin: Origin | None = None) -> StoneSoupRun:
+    """Return a run's detections, poses and truth.
+
+    Parameters
+    ----------
+    run : RecordedTables
+    origin : tuple, optional
+        Latitude and longitude (deg) and height (m) of the frame; by default that of the run's
+        tracks, or where the ownship was first.
+
+    Raises
+    ------
+    UsageError
+        The run has no detections, no poses, or detections without an error.
+    """
+    flights = run.flights() if "truth" in run.tables else {}
+    columns = _detections(run)
+    pose = _poses(run, columns, flights)
+    origin = origin or _origin(run, pose)
+    lat, lon, alt = (np.full(pose.shape[1], value) for value in origin)
+    place = place_in_frame(
+        (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5])
+    )
+    paths = {name: _path(name, flight, origin) for name, flight in flights.items()}
+    own = paths.pop(OWNSHIP, None)
+    detector = RecordedDetector()
+    detector.looks = list(_looks(run, columns, Poses(place)))
+    return StoneSoupRun(
+        detector,
+        _platform(columns["time_s"], place, flights.get(OWNSHIP), origin),
+        set(paths.values()),
+        own,
+        origin,
+    )
+
+
+def _detections(run: RecordedTables) -> dict[str, Any]:
+    """Return columns of the detections in order of their instants, and what each look is."""
+    table = run.tables.get("detections")
+    if table is None or table.num_rows == 0:
+        raise UsageError(f"{run.folder}: has no detections")
+    names = (*_MEASURED, *_VARIANCES, *(f"own_{name}" for name in _POSE), "illuminated_s", "time_s")
+    columns: dict[str, Any] = {
+        name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=float) for name in names
+    }
+    for name in ("tick", "scan"):
+        columns[name] = np.asarray(table[name].to_numpy(zero_copy_only=False))
+    columns["block"] = np.array(table["block"].to_pylist(), dtype=object)
+    # A sweeping beam measures when it meets the target, after its scan has begun.
+    lit = columns["illuminated_s"]
+    columns["time_s"] = np.where(np.isfinite(lit), lit, columns["time_s"])
+    for name, value in zip(_VARIANCES, _MEASURED, strict=True):
+        bad = np.isfinite(columns[value]) & ~(columns[name] > 0.0)
+        if bad.any():
+            sensor = columns["block"][np.argmax(bad)]
+            raise UsageError(
+                f"{run.folder}: {sensor} states no error of its {value} ({name} is not above 0): "
+                "a tracker weighs measurements by it; give it a grid, or errors = 'stated'"
+            )
+    return columns
+
+
+def _poses(
+    run: RecordedTables, columns: Mapping[str, Any], flights: Mapping[str, Any]
+) -> FloatArray:
+    """Return the ownship's pose at each detection, (6, n): as believed, or the true one."""
+    pose = np.stack([columns[f"own_{name}"] for name in _POSE])
+    unknown = np.isnan(pose).any(axis=0)
+    if not unknown.any():
+        return pose
+    own = flights.get(OWNSHIP)
+    if own is None:
+        raise UsageError(
+            f"{run.folder}: its detections have no pose of the ownship and there is no "
+            "truth.parquet: record one with fusion = fusion.pass_through or truth = true under "
+            "[record]"
+        )
+    time_s = columns["time_s"][unknown]
+    place = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
+    if (own["time_s"][place] != time_s).any():
+        raise UsageError(
+            f"{run.folder}: its detections have no pose of the ownship, and truth.parquet has none "
+            "at their instants: record them with fusion = fusion.pass_through"
+        )
+    pose[:, unknown] = [own[name][place] for name in _POSE]
+    return pose
+
+
+def _origin(run: RecordedTables, pose: FloatArray) -> Origin:
+    tracks = run.tables.get("state_tracks")
+    if tracks is not None and tracks.num_rows:
+        lat, lon, alt = (float(tracks[name][0].as_py()) for name in _ORIGIN)
+    else:
+        lat, lon, alt = pose[:3, 0].tolist()
+    return lat, lon, alt
+
+
+def _looks(
+    run: RecordedTables, columns: Mapping[str, Any], poses: Poses
+) -> Iterator[tuple[datetime, set[Detection]]]:
+    """Give looks by their instants; those of one instant with ranges first, then by name."""
+    block, time_s = columns["block"], columns["time_s"]
+    ranged = set(block[np.isfinite(columns["range_m"])])
+    found: dict[tuple[float, bool, str], list[int]] = {}
+    for i, (name, when) in enumerate(zip(block.tolist(), time_s.tolist(), strict=True)):
+        found.setdefault((when, name not in ranged, name), []).append(i)
+    sweeping = set(block[np.isfinite(columns["illuminated_s"])])
+    if "scans" in run.tables:
+        scans = run.tables["scans"]
+        rows = zip(scans["block"].to_pylist(), scans["time_s"].to_pylist(), strict=True)
+        for name, when in rows:
+            if name not in sweeping:  # a scan of a sweeping beam has no one instant
+                found.setdefault((when, name not in ranged, name), [])
+    values = np.stack([columns[name] for name in _MEASURED])
+    variances = np.stack([columns[name] for name in _VARIANCES])
+    for (when, _, name), rows_of in sorted(found.items()):
+        says = [{"sensor": name, "scan": int(columns["scan"][i])} for i in rows_of]
+        at = instant(when)
+        yield at, detections(poses, rows_of, at, values[:, rows_of], variances[:, rows_of], says)
+
+
+def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> GroundTruthPath:
+    place = [np.ascontiguousarray(flight[key]) for key in _POSE[:3]]
+    here = [np.full(len(place[0]), value) for value in origin]
+    north, east, up = north_east_up(*here, *place)
+    states = state_vectors(np.stack([north, east, -up]), _velocity(flight, place, here))
+    return GroundTruthPath(
+        [
+            GroundTruthState(state, timestamp=instant(time_s), metadata={"name": name})
+            for state, time_s in zip(states, flight["time_s"].tolist(), strict=True)
+        ],
+        id=name,
+    )
+
+
+def _velocity(
+    flight: Mapping[str, FloatArray], place: list[FloatArray], here: list[FloatArray]
+) -> FloatArray:
+    """Return velocities along the frame's axes, of those along the aircraft's own horizon."""
+    east, north, up = local_axes(place[0], place[1])
+    along_east, along_north, along_up = local_axes(here[0], here[1])
+    earth = [
+        flight[_VELOCITY[0]] * n + flight[_VELOCITY[1]] * e - flight[_VELOCITY[2]] * u
+        for n, e, u in zip(north, east, up, strict=True)
+    ]
+    n, e, u = (
+        sum(v * axis for v, axis in zip(earth, axes, strict=True))
+        for axes in (along_north, along_east, along_up)
+    )
+    return np.stack([n, e, -u])
+
+
+def _platform(
+    time_s: FloatArray, place: Any, own: Mapping[str, FloatArray] | None, origin: Origin
+) -> MovingPlatform:
+    when, first = np.unique(time_s, return_index=True)
+    velocity = np.full((3, len(when)), np.nan)
+    if own is not None:
+        at = [np.ascontiguousarray(own[key]) for key in _POSE[:3]]
+        known = _velocity(own, at, [np.full(len(at[0]), value) for value in origin])
+        velocity = np.stack([np.interp(when, own["time_s"], part) for part in known])
+    states = state_vectors(place.position_m[:, first], velocity)
+    poses = Poses(place.take(first))
+    movement = RecordedMovement(
+        states=[
+            GroundTruthState(
+                state, timestamp=instant(at_s), metadata={"orientation": poses.orientation(i)}
+            )
+            for i, (state, at_s) in enumerate(zip(states, when.tolist(), strict=True))
+        ],
+        position_mapping=POSITION,
+        velocity_mapping=VELOCITY,
+        transition_model=None,
+    )
+    return MovingPlatform(movement_controller=movement, id=OWNSHIP)

@@ -1,0 +1,71 @@
+"""The message of an operator's console: what a person, or a record of one, decided."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from components.messages.columns import DESCRIBED
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.message import Message, Text, per_row, static
+
+#: What may be decided, in the order of their numbers: an alert was on screen, was looked at, was
+#: judged; the ownship is told to turn, or to climb or descend.
+KINDS = ("shown", "looked", "verified", "rejected", "turn", "climb")
+SHOWN, LOOKED, VERIFIED, REJECTED, TURN, CLIMB = range(6)
+
+
+class Decision(NamedTuple):
+    """One decision of an operator.
+
+    Parameters
+    ----------
+    kind : int
+        Place in `KINDS`.
+    target : str
+        Name of the target it is about; empty for none.
+    turn_rad, climb_m : float
+        Of a turn, positive to the right, and of a climb, positive upward; else 0.
+    wall_time_s : float
+        Seconds since 1970 by the wall clock, NaN where no person decided.
+    """
+
+    kind: int
+    target: str = ""
+    turn_rad: float = 0.0
+    climb_m: float = 0.0
+    wall_time_s: float = float("nan")
+
+
+@dataclass(eq=False)
+class Decisions(Message):
+    """What an operator decided, each at the instant at which it came to the simulation.
+
+    Parameters
+    ----------
+    decision : (rows,) of int
+        Place in `KINDS`.
+    target : (rows,) of int
+        Place in `targets`; -1 for none.
+    turn_rad, climb_m : (rows,)
+        0 for what is not such a manoeuvre.
+    level : (rows,) of int
+        Alert level of the target, as it had come to the operator.
+    alert_s, response_s : (rows,)
+        When that alert came, and how long ago; NaN without one.
+    wall_time_s : (rows,)
+        By the wall clock, of a person's decision; it says nothing of the run, and a replay repeats
+        it.
+    targets : tuple of str
+    """
+
+    described = DESCRIBED
+    row_table = "decisions"
+
+    decision: IntArray = per_row(column="text", value=lambda m: Text(m.decision, KINDS))
+    target: IntArray = per_row(column="text", value=lambda m: Text(m.target, m.targets))
+    turn_rad: FloatArray = per_row(column="float64")
+    climb_m: FloatArray = per_row(column="float64")
+    level: IntArray = per_row(column="int64")
+    alert_s: FloatArray = per_row(column="float64")
+    response_s: FloatArray = per_row(column="float64")
+    wall_time_s: FloatArray = per_row(column="float64")
+    targets: tuple[str, ...] = static()

@@ -1,0 +1,146 @@
+"""Detections, states and instants as Stone Soup's objects; importing this imports Stone Soup.
+
+The frame has x east, y north and z up at an origin, and axes that stay parallel to themselves. A
+state is ``[x, vx, y, vy, z, vz]``. A measurement is ``[elevation, bearing]``, then the range where
+there is one, in the axes nose, left wing, roof: the elevation is ours, the bearing is
+counter-clockwise and so our azimuth with the other sign.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from stonesoup.models.measurement.nonlinear import (
+    CartesianToElevationBearing,
+    CartesianToElevationBearingRange,
+)
+from stonesoup.types.angle import Bearing, Elevation
+from stonesoup.types.array import StateVector
+from stonesoup.types.detection import Detection
+
+from components.estimation.frame import Place
+from components.stone_soup.rotation import rotation_offsets
+from dsa_des.arrays.types import FloatArray
+
+#: A run has no date: its second 0 is put here.
+START = datetime(2000, 1, 1)
+#: Where position and velocity stand in a state.
+POSITION, VELOCITY = (0, 2, 4), (1, 3, 5)
+
+
+def instant(time_s: float) -> datetime:
+    """Return an instant of a run, to the microsecond that such objects can hold."""
+    return START + timedelta(microseconds=round(1e6 * time_s))
+
+
+def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> list[StateVector]:
+    """Return states of positions and velocities, each (3, n) along north, east, down."""
+    found = np.empty((6, position_ned_m.shape[1]))
+    for part, ned in ((POSITION, position_ned_m), (VELOCITY, velocity_ned_m_s)):
+        found[list(part)] = ned[1], ned[0], -ned[2]
+    return [StateVector(column) for column in found.T]
+
+
+class Poses:
+    """Where sensors are and how they are turned, as measurement models take it.
+
+    Parameters
+    ----------
+    place : Place
+        Of n sensors in the frame north, east, down.
+    mapping : sequence of int
+        Where x, y and z stand in a state.
+    state_size : int
+        How many components a state has.
+    """
+
+    def __init__(
+        self, place: Place, mapping: Sequence[int] = POSITION, state_size: int = 6
+    ) -> None:
+        self._mapping, self._size = tuple(mapping), state_size
+        north, east, down = place.position_m
+        self._offset = np.stack([east, north, -down])
+        self._angles = rotation_offsets(place.to_body)
+
+    def position(self, i: int) -> StateVector:
+        """Return the position of sensor i along east, north, up, m."""
+        return StateVector(self._offset[:, i])
+
+    def orientation(self, i: int) -> StateVector:
+        """Return roll, pitch and yaw of sensor i (`components.stone_soup.rotation`)."""
+        return StateVector(self._angles[:, i])
+
+    def model(self, i: int, variances: FloatArray) -> Any:
+        """Return what sensor i would measure of a state, and how well.
+
+        Parameters
+        ----------
+        i : int
+        variances : (2,) or (3,)
+            Of elevation, azimuth and, where it is measured, range.
+        """
+        kind = (
+            CartesianToElevationBearingRange if len(variances) == 3 else CartesianToElevationBearing
+        )
+        return kind(
+            ndim_state=self._size,
+            mapping=self._mapping,
+            noise_covar=np.diag(variances),
+            translation_offset=self.position(i),
+            rotation_offset=self.orientation(i),
+        )
+
+
+class NumberedDetection(Detection):
+    """A detection whose place in a set follows from a number and not from where it lies in memory.
+
+    Trackers walk through sets of detections, and what comes of a tie, or of a sum, must not differ
+    from one run to the next.
+    """
+
+    number: int = 0
+
+    def __hash__(self) -> int:
+        return self.number
+
+
+def detections(
+    poses: Poses,
+    which: "list[int]",
+    when: datetime,
+    measured: FloatArray,
+    variance: FloatArray,
+    metadata: "list[dict[str, Any]]",
+) -> set[Detection]:
+    """Return detections of one look.
+
+    Parameters
+    ----------
+    poses : Poses
+    which : list of int
+        Index of each detection's pose.
+    when : datetime
+    measured, variance : (3, n)
+        Azimuth, elevation and range, as our sensors give them; NaN where there is no range.
+    metadata : list of dict
+        What each carries besides.
+    """
+    found = set()
+    for k, i in enumerate(which):
+        azimuth, elevation, range_m = measured[:, k].tolist()
+        ranged = range_m == range_m
+        vector: list[Any] = [Elevation(elevation), Bearing(-azimuth)]
+        rows = [1, 0]
+        if ranged:
+            vector.append(range_m)
+            rows.append(2)
+        one = NumberedDetection(
+            StateVector(vector),
+            timestamp=when,
+            measurement_model=poses.model(i, variance[rows, k]),
+            metadata=metadata[k],
+        )
+        one.number = k
+        found.add(one)
+    return found

@@ -1,0 +1,145 @@
+"""The flights of a traffic source as they are known: its ownship flies what it is told to."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+
+from components.geometry.state import TrajectoryState
+from components.messages.known_flights import Flights, KnownFlights
+from components.messages.steering import Manoeuvre, Manoeuvres
+from components.traffic.culling import Culling
+from components.traffic.flight_protocols import Fleet, Trajectory
+from components.traffic.steered_flight import SteeredFlight
+from components.traffic.true_flights import TrueFlights
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ports import Input
+from dsa_des.block.wake import Wake
+
+_TOLD = Manoeuvre._fields
+
+
+class SteeredOwnship(Component):
+    """A block whose ownship flies manoeuvres from the time they come.
+
+    Subclasses set `own` and `fleet` in `setup`, and then call `_be_steered`.
+    """
+
+    inputs = {
+        "manoeuvres": Input(
+            Manoeuvres,
+            "queued",
+            "Turns and climbs that the ownship is told to fly.",
+            required=False,
+        )
+    }
+
+    own: Trajectory
+    fleet: Fleet
+    _crabbing: list[Any]
+    _culling: Culling | None = None
+    #: Whether blocks ask for flights at other instants, and whether the truth is recorded.
+    _flights_asked_for = False
+    _says_truth = False
+
+    def serves_replicas(self) -> bool:
+        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        return super().serves_replicas() and not self.context.producers
+
+    def _be_steered(self) -> None:
+        """Let manoeuvres be flown from now on, where they can come."""
+        if self.context.producers:
+            self.own = SteeredFlight(self.own)
+        self._flights_now: Flights = partial(self.flights, self.own)
+        self._truth_now = self._true_flights()
+        #: Manoeuvres and their ticks that have come, and are not flown by any row yet.
+        self._told: list[tuple[int, Manoeuvre]] = []
+
+    def own_at(self, time_s: FloatArray) -> TrajectoryState:
+        """Return the ownship's state, as it is known now, at some times (any shape), in wind."""
+        return self._own_in_wind(self.own.at(time_s), time_s)
+
+    def _own_in_wind(self, own: TrajectoryState, time_s: FloatArray) -> TrajectoryState:
+        for crabbing in self._crabbing:
+            own = crabbing.of_own(self.own, own, time_s)
+        return own
+
+    def flights(
+        self,
+        own: Trajectory,
+        columns: IntArray,
+        time_s: FloatArray,
+        ahead_s: FloatArray | float = 0.0,
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the states of the ownship and of some targets, each at a time of its own.
+
+        Parameters
+        ----------
+        own : Trajectory
+            The ownship's flight, as far as it is known.
+        columns : (targets,) of int
+        time_s : (rows, targets)
+            With an ``update_rate_hz``, the last publication up to then counts.
+        ahead_s : (rows, targets)
+            They are wanted so much later than that.
+
+        Returns
+        -------
+        own, others : TrajectoryState
+            Arrays (rows, targets).
+        """
+        if self.p.update_rate_hz is not None:
+            rate = float(self.p.update_rate_hz)
+            time_s = np.floor(time_s * rate) / rate
+        time_s = time_s + ahead_s
+        columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
+        others = self.fleet.each(columns_each, times)
+        if self._culling is not None:
+            near = self._culling.intervals.holds(columns_each, times)
+            others = replace(others, present=others.present & near)
+        seen, others = own.at(time_s), others.reshaped(time_s.shape)
+        for crabbing in self._crabbing:
+            seen = crabbing.of_own(own, seen, time_s)
+            others = crabbing.of_targets(columns, others, time_s)
+        return seen, others
+
+    def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
+        """Steer the ownship at the times at which manoeuvres have come.
+
+        Returns
+        -------
+        flights, truth : KnownFlights or None
+            The flights as they are known at each row, where a block asks for them and where the
+            truth is recorded: a row knows the manoeuvres that have come by its own instant,
+            whatever came later in this wake.
+        """
+        for new in wake.arrivals("manoeuvres"):
+            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
+            self._told = [*self._told, *zip(new.tick.tolist(), manoeuvres, strict=True)]
+        last = int(wake.ticks[-1])
+        # What comes after the last row is for the next wake: what is flown at the end of a run
+        # must not depend on how far a window reached beyond it.
+        told = [one for one in self._told if one[0] <= last]
+        self._told = self._told[len(told) :]
+        known, true = [self._flights_now], [self._truth_now]
+        for tick, manoeuvre in told:
+            assert isinstance(self.own, SteeredFlight)
+            self.own = self.own.steered(tick / self.context.ticks_per_s, manoeuvre)
+            known.append(partial(self.flights, self.own))
+            true.append(self._true_flights())
+        self._flights_now, self._truth_now = known[-1], true[-1]
+        if not self._flights_asked_for and self._truth_now is None:
+            return None, None
+        # A manoeuvre has come before anything runs at its instant.
+        came = np.array([tick for tick, _ in told], dtype=np.int64)
+        of_row = np.searchsorted(came, wake.ticks, side="right")
+        return (
+            KnownFlights(known, of_row) if self._flights_asked_for else None,
+            None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
+        )
+
+    def _true_flights(self) -> TrueFlights | None:
+        """Return all flights as they are known now, if the truth is recorded."""
+        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None

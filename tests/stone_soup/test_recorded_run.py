@@ -1,0 +1,162 @@
+"""A recorded run as Stone Soup's objects: its own models see the truth where we measured it."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+import pymap3d
+import pytest
+
+pytest.importorskip("stonesoup", reason="needs the extra stonesoup")
+
+import crooked
+from wired import chain, run
+
+from components.estimation.frame import place_in_frame
+from components.export import stone_soup
+from components.stone_soup.rotation import rotation_offsets
+from dsa_des.errors import UsageError
+
+START = datetime(2000, 1, 1)
+FINE = {"errors": "stated", "quantised": False, "azimuth_error_deg": 1e-5,
+        "elevation_error_deg": 2e-5}  # fmt: skip
+RADAR = {"type": "radar.range_boundary", "scan_rate_hz": 2, "range_km": 20.0, **FINE,
+         "range_error_m": 0.01}  # fmt: skip
+CAMERA = {"type": "optical.range_boundary", "scan_rate_hz": 3, "range_km": 2.5, **FINE}
+
+
+def scene(**sections):
+    return chain(
+        {"radar": RADAR, "camera": CAMERA}, duration_s=2,
+        fusion={"type": "fusion.pass_through"}, **sections,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return stone_soup(run(scene()))
+
+
+def enu(flight, time_s, origin):
+    """Where a crooked flight is by pymap3d."""
+    return np.array(pymap3d.ecef2enu(*crooked.position(flight, time_s), *origin))
+
+
+def test_detections_are_those_of_the_true_places(recorded):
+    """The measurement model of each, asked for the target by pymap3d, gives what was measured."""
+    worst, sizes = 0.0, set()
+    for when, found in recorded.detector:
+        time_s = (when - START).total_seconds()
+        for detection in found:
+            spread = np.sqrt(np.diag(detection.measurement_model.noise_covar))
+            apart = []
+            for target in crooked.TARGETS:
+                state = np.zeros((6, 1))
+                state[[0, 2, 4], 0] = enu(target, time_s, recorded.origin)
+                seen = detection.measurement_model.function(_State(state), noise=False)
+                apart.append([float(v) for v in ((detection.state_vector - seen)[:, 0] / spread)])
+            worst = max(worst, min(np.abs(one).max() for one in apart))
+            sizes.add((detection.metadata["sensor"], len(spread)))
+            assert set(detection.metadata) == {"sensor", "scan"}
+            assert detection.timestamp == when
+    assert sizes == {("radar", 3), ("camera", 2)}
+    assert 0.5 < worst < 5.0
+
+
+class _State:
+    def __init__(self, vector):
+        from stonesoup.types.array import StateVector
+
+        self.state_vector = StateVector(vector[:, 0])
+
+
+def test_variances_are_those_of_elevation_azimuth_and_range(recorded):
+    radar = {np.diag(d.measurement_model.noise_covar).tobytes(): d
+             for _, found in recorded.detector for d in found
+             if d.metadata["sensor"] == "radar"}  # fmt: skip
+    (one,) = radar.values()
+    known = [np.radians(2e-5) ** 2, np.radians(1e-5) ** 2, 0.01**2]
+    np.testing.assert_allclose(np.diag(one.measurement_model.noise_covar), known, rtol=1e-9)
+
+
+def test_looks_come_in_order_with_those_in_vain(recorded):
+    looks = [(when, [d.metadata["sensor"] for d in found]) for when, found in recorded.detector]
+    assert [when for when, _ in looks] == sorted(when for when, _ in looks)
+    # Radar at 0, 0.5, ... and camera at 0, 1/3, ...: ten looks, the radar's first at 0 and 1 s.
+    assert len(looks) == 4 + 6
+    assert looks[0][1] == ["radar"] * 2 and looks[1][1] == ["camera"]
+    assert looks[1][0] == START and looks[2][0] == START + timedelta(microseconds=333_333)
+
+
+def test_truth_and_platform_are_where_they_are(recorded):
+    assert {path.id for path in recorded.truth} == {"rolling", "diving"}
+    for path in recorded.truth:
+        flight = next(t for t in crooked.TARGETS if t["name"] == path.id)
+        for time_s in (0.0, 1.5):
+            at = path[START + timedelta(seconds=time_s)].state_vector[:, 0]
+            near = [enu(flight, time_s + h, recorded.origin) for h in (0.0, 0.01)]
+            np.testing.assert_allclose(at[[0, 2, 4]], near[0], atol=0.02)
+            np.testing.assert_allclose(at[[1, 3, 5]], (near[1] - near[0]) / 0.01, atol=0.05)
+    place = recorded.platform[START + timedelta(seconds=1)]
+    np.testing.assert_allclose(
+        place.state_vector[[0, 2, 4], 0], enu(crooked.OWNSHIP, 1.0, recorded.origin), atol=0.02
+    )
+    own = recorded.ownship[START + timedelta(seconds=1)].state_vector
+    np.testing.assert_allclose(np.array(place.state_vector), np.array(own), atol=1e-6)
+    roll, pitch, yaw = np.degrees(np.array(place.metadata["orientation"], dtype=float))[:, 0]
+    assert (roll, pitch) == pytest.approx((-27.0, 8.0), abs=1e-3)
+    assert yaw % 360.0 == pytest.approx((90.0 - 222.0) % 360.0, abs=1e-3)
+    assert recorded.origin == pytest.approx((-41.3, -179.9997, 2400.0))
+
+
+@pytest.mark.parametrize("pitch_deg", [8.0, 90.0, -90.0])
+def test_angles_stand_for_the_same_rotation(pitch_deg):
+    from stonesoup.functions import build_rotation_matrix
+
+    origin, here = (-41.0, 179.8, 0.0), (-41.3, -179.9997, 2400.0)
+    columns = [np.array([v]) for v in (*origin, *here, *np.radians([222.0, pitch_deg, -27.0]))]
+    place = place_in_frame(tuple(columns[:3]), tuple(columns[3:6]), tuple(columns[6:]))
+    got = build_rotation_matrix(rotation_offsets(place.to_body))
+    to_ned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
+    known = np.diag([1, -1, -1]) @ place.to_body[:, :, 0] @ to_ned
+    np.testing.assert_allclose(got, known, atol=2e-9)
+
+
+def without_poses(one):
+    """A run of a stranger's sensor, which tells no pose."""
+    import pyarrow as pa
+
+    table = one["detections"]
+    for place, name in enumerate(table.column_names):
+        if name.startswith("own_"):
+            table = table.set_column(place, name, pa.nulls(len(table), pa.float64()))
+    return replace(one, tables={**one.tables, "detections": table})
+
+
+def test_what_has_no_errors_or_poses_is_refused(tmp_path):
+    exact = scene()
+    exact["blocks"]["camera"] = {**CAMERA, "azimuth_error_deg": 0.0}
+    with pytest.raises(UsageError, match="camera states no error of its azimuth_rad"):
+        stone_soup(run(exact))
+    unknown = without_poses(run(chain({"radar": RADAR}, duration_s=1, record={"truth": False})))
+    with pytest.raises(UsageError, match=r"no pose of the ownship and there is no truth\.parquet"):
+        stone_soup(unknown)
+    with pytest.raises(UsageError, match="there is no such folder"):
+        stone_soup(tmp_path / "nothing")
+    empty = run(chain({"radar": {**RADAR, "range_km": 0.1}}, duration_s=1))
+    with pytest.raises(UsageError, match="has no detections"):
+        stone_soup(empty)
+
+
+def test_poses_are_the_true_ones_where_none_is_told():
+    one = run(chain({"radar": RADAR}, duration_s=1))
+    known, guessed = stone_soup(one), stone_soup(without_poses(one))
+    for (_, told), (_, taken) in zip(known.detector, guessed.detector, strict=True):
+        for a, b in zip(sorted(told, key=hash), sorted(taken, key=hash), strict=True):
+            assert (
+                a.measurement_model.rotation_offset == b.measurement_model.rotation_offset
+            ).all()
+            np.testing.assert_allclose(
+                np.array(a.measurement_model.translation_offset, dtype=float),
+                np.array(b.measurement_model.translation_offset, dtype=float), atol=1e-6,
+            )  # fmt: skip
