@@ -1,6 +1,6 @@
 """Alert levels over time and targets: times to violation, what is due, and the memory's pass."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
