@@ -43,6 +43,7 @@ def place_in_frame(
     origin_deg_m: tuple[FloatArray, FloatArray, FloatArray],
     position_deg_m: tuple[FloatArray, FloatArray, FloatArray],
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
+    velocity_m_s: FloatArray | None = None,
 ) -> Place:
     """Return where poses are in frames.
 
@@ -54,6 +55,8 @@ def place_in_frame(
         The same of the aircraft that bears the sensor.
     attitude_rad : three arrays (n,)
         Its heading, pitch and roll, in the north, east, down of its own place.
+    velocity_m_s : (3, n), optional
+        Its velocity over ground there.
 
     Returns
     -------
@@ -61,16 +64,21 @@ def place_in_frame(
     """
     lat, lon, alt = position_deg_m
     north, east, up = north_east_up(*origin_deg_m, lat, lon, alt)
-    there, here = _ned_axes(lat, lon), _ned_axes(origin_deg_m[0], origin_deg_m[1])
+    there, here = ned_axes(lat, lon), ned_axes(origin_deg_m[0], origin_deg_m[1])
     turned = np.empty((3, 3, np.size(lat)))
     for j in range(3):
         # Axis j of the frame, along the axes of the aircraft's own horizon.
         n, e, d = (_dot(axis, here[j]) for axis in there)
         turned[:, j] = np.stack(ned_to_body_unchecked(n, e, d, *attitude_rad))
-    return Place(np.stack([north, east, -up]), turned)
+    moves = None
+    if velocity_m_s is not None:
+        # Along the axes of the frame, whose components in the Earth's axes are `here`.
+        in_space = sum(v * axis for v, axis in zip(velocity_m_s, there, strict=True))
+        moves = np.stack([_dot(in_space, axis) for axis in here])
+    return Place(np.stack([north, east, -up]), turned, moves)
 
 
-def _ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
+def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
     """Return north, east and down of places, in Earth-centred axes, each (3, n)."""
     east, north, up = (np.stack(axis) for axis in local_axes(lat_deg, lon_deg))
     return [north, east, -up]

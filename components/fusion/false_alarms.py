@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.fusion_block import poses
+from components.fusion.fusion_block import poses, velocities
 from components.messages.contributors import mask_type
-from components.messages.detections import MEASURED, POSE
+from components.messages.detections import MEASURED, OWN_VELOCITY, POSE
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import IntArray
@@ -48,6 +48,8 @@ def pass_false_alarms(
         )
     }  # fmt: skip
     own = [np.stack(list(fused.pose_columns().values()))] if fused.pose_columns() else None
+    known = fused.own_velocity
+    moves = None if known is None else [np.stack(list(known.values()))]
     for index, name in enumerate(fused.sensors):
         if name not in arrivals:
             continue
@@ -65,6 +67,8 @@ def pass_false_alarms(
         columns["measured_tick"].append(new.message.measured_ticks()[false])
         if own is not None:
             own.append(poses(new.message)[:, false])
+        if moves is not None:
+            moves.append(velocities(new.message)[:, false])
         for column, value in (
             ("target", FALSE_TARGET),
             ("contributors", 1 << index),
@@ -83,4 +87,7 @@ def pass_false_alarms(
     if own is not None:
         pose = np.concatenate(own, axis=1)[:, order]
         values["own_of_entries"] = dict(zip(POSE, pose, strict=True))
+    if moves is not None:
+        velocity = np.concatenate(moves, axis=1)[:, order]
+        values["own_velocity"] = dict(zip(OWN_VELOCITY, velocity, strict=True))
     return replace(fused, offsets=offsets, **values)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.messages.contributors import mask_type
-from components.messages.detections import POSE, Detections, SensorOffer
+from components.messages.detections import OWN_VELOCITY, POSE, Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.effects import navigation_errs
 from components.sensor.marks import FUSION
@@ -131,6 +131,7 @@ class Fusion(Component):
         values: dict[str, Any] = dict(zip(names, np.full((len(names), count), np.nan), strict=True))
         measured_tick = np.zeros(count, dtype=np.int64)
         pose = np.full((len(POSE), count), np.nan) if self._with_pose else None
+        moves = np.full((3, count), np.nan) if self._with_pose and self.by_range_rate else None
         found = {name: (entry >= 0).nonzero()[0] for name, entry in entries.items()}
         for index in self.by_angles:
             name = self.sensors[index]
@@ -151,6 +152,9 @@ class Fusion(Component):
             name = self.sensors[index]
             if name in found and len(found[name]):
                 _copy(values, _RATES, found[name], arrivals[name], entries[name])
+                if moves is not None:
+                    chosen = entries[name][found[name]]
+                    moves[:, found[name]] = velocities(arrivals[name].message)[:, chosen]
         message = FusedWithPose if self._navigation_errs else FusedDetections
         return message(
             tick=ticks,
@@ -164,6 +168,7 @@ class Fusion(Component):
             measured_tick=measured_tick,
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
+            own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
             **values,
         )
 
@@ -174,6 +179,13 @@ def poses(message: Detections) -> FloatArray:
     if columns:
         return np.stack(list(columns.values()))
     return np.full((len(POSE), len(message.target)), np.nan)
+
+
+def velocities(message: Detections) -> FloatArray:
+    """Return the ownship's velocity at each entry, (3, entries); NaN where none is told."""
+    if message.own_velocity is None:
+        return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)
+    return np.stack(list(message.own_velocity.values()))
 
 
 def _copy(

@@ -166,7 +166,7 @@ class Transform(Component):
     def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where the ownship is then."""
         seen = self._as_seen(own, other, own.present & other.present)
-        return {**seen, "own": {name: getattr(own, name) for name in _PLACE}}
+        return {**seen, "own": {name: getattr(own, name) for name in (*_PLACE, "present")}}
 
     def _believed(self, states: TrafficStates) -> dict[str, FloatArray]:
         """Return what the ownship believes of itself."""

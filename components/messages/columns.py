@@ -61,6 +61,13 @@ _POSE: Mapping[str, Column] = {
     "own_pitch_rad": ("rad", _TURNED, "its pitch, nose up"),
     "own_roll_rad": ("rad", _TURNED, "its roll, right wing down"),
 }
+_OWN_VELOCITY: Mapping[str, Column] = {
+    "own_velocity_north_m_s": (
+        "m/s", _OWN_NED, "ownship's velocity over ground, north; null without a range rate"
+    ),
+    "own_velocity_east_m_s": ("m/s", _OWN_NED, "the same, east"),
+    "own_velocity_down_m_s": ("m/s", _OWN_NED, "the same, down"),
+}  # fmt: skip
 #: Of what was put together or is held, the pose stands where navigation errs.
 _ERRING_POSE = {
     name: (unit, frame, f"{meaning}; there is such a column where navigation errs")
@@ -102,6 +109,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
         **_POSE,
         **_ERRORS,
+        **_OWN_VELOCITY,
     },
     "fused": {
         "target": ("", "", "name of the target"),
@@ -141,6 +149,12 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "updated_s": ("s", "", "when the last measurement in it was made"),
         "contributors": ("", "", "sensors that ever updated it, joined by +"),
         "updated_by": ("", "", "sensors of its last update, joined by +"),
+        **{
+            f"own_{axis}_m": ("m", _FRAME, f"where the ownship believed to be then, {axis}")
+            for axis in ("north", "east", "down")
+        },
+        "nis": ("", "", "normalised innovation squared of this look; null where it did not update"),
+        "nis_freedom": ("", "", "how many measured quantities that is of; 0 without one"),
         "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
         "origin_lon_deg": ("deg", _WGS84, "its longitude"),
         "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),

@@ -48,6 +48,13 @@ POSE = {
     "own_roll_rad": "float64",
 }
 
+#: The ownship's velocity over ground, north, east and down of its own place: columns of
+#: ``detections``, and what `Detections.own_velocity` holds.
+OWN_VELOCITY = {
+    "own_velocity_north_m_s": "float64",
+    "own_velocity_east_m_s": "float64",
+    "own_velocity_down_m_s": "float64",
+}
 
 #: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
 MEASURED = (
@@ -74,6 +81,8 @@ class SensorOffer:
         where it differs from detection to detection.
     range_variance_m2, range_rate_variance_m2_s2 : float or None
         None where it differs, or is not measured.
+    folds_range_rate : bool
+        Whether range rates beyond what is unambiguous are told as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
     """
@@ -86,6 +95,7 @@ class SensorOffer:
     range_variance_m2: float | None = None
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
+    folds_range_rate: bool = False
 
 
 def target_names(message: Any) -> Text:
@@ -151,6 +161,8 @@ class Detections(Message):
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
+    own_velocity : dict of (entries,), or None
+        How the ownship moved at each entry (`OWN_VELOCITY`), where a sensor measures range rates.
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
@@ -193,6 +205,9 @@ class Detections(Message):
     elevation_variance_rad2: FloatArray = measured_column()
     range_variance_m2: FloatArray = measured_column()
     range_rate_variance_m2_s2: FloatArray = measured_column()
+    own_velocity: dict[str, FloatArray] | None = per_entry(
+        columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
+    )
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 

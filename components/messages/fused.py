@@ -44,6 +44,9 @@ class FusedDetections(Message):
     range_rate_m_s, azimuth_variance_rad2, elevation_variance_rad2, range_variance_m2, \
     range_rate_variance_m2_s2 : (entries,)
         As the sensors that gave the values stated them; NaN where they did not.
+    own_velocity : dict of (entries,), or None
+        How the ownship moved (`OWN_VELOCITY`) when the range rate was measured; NaN where none
+        was, None from a fusion of sensors that measure none.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
     roster : Roster
@@ -79,6 +82,7 @@ class FusedDetections(Message):
     elevation_variance_rad2: FloatArray = measured_column()
     range_variance_m2: FloatArray = measured_column()
     range_rate_variance_m2_s2: FloatArray = measured_column()
+    own_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: Looks | None = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

@@ -58,11 +58,19 @@ class StateTracks(Message):
         start of the run.
     contributors, updated_by : (entries,) of int
         Sensors that ever updated it, and those of its last update, as in `FusedDetections`.
+    own_north_m, own_east_m, own_down_m : (entries,)
+        Where in the frame the ownship believed to be at that look.
     origin_lat_deg, origin_lon_deg, origin_alt_m : (entries,)
         Origin of the frame (WGS 84): where the ownship believed to be at its first look.
     extras : dict of (entries,)
         What some models have besides: `EXTRAS`.
     sensors : tuple of str
+    nis : (entries,)
+        Normalised innovation squared of the look that the state speaks of: how far the detection
+        that updated the track lay from what was expected, by the covariance of both. NaN where it
+        did not, or where several detections were weighed; by default.
+    nis_freedom : (entries,) of int
+        How many quantities it is of: angles 2, with range 3, with range rate 4; 0 without one.
     """
 
     described = DESCRIBED
@@ -94,6 +102,9 @@ class StateTracks(Message):
     updated_by: IntArray = per_entry(
         column="text", value=lambda m: combination_text(m.updated_by, m.sensors)
     )
+    own_north_m: FloatArray = per_entry(column="float64")
+    own_east_m: FloatArray = per_entry(column="float64")
+    own_down_m: FloatArray = per_entry(column="float64")
     origin_lat_deg: FloatArray = per_entry(column="float64")
     origin_lon_deg: FloatArray = per_entry(column="float64")
     origin_alt_m: FloatArray = per_entry(column="float64")
@@ -102,6 +113,13 @@ class StateTracks(Message):
     )
     extras: dict[str, FloatArray] = per_entry(columns=EXTRAS)
     sensors: tuple[str, ...] = static()
+    nis: FloatArray = per_entry(column="float64", default=None, kw_only=True)
+    nis_freedom: IntArray = per_entry(column="int64", default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.nis is None:
+            self.nis = np.full(len(self.track), np.nan)
+            self.nis_freedom = np.zeros(len(self.track), dtype=np.int64)
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:
@@ -125,5 +143,6 @@ class StateTracks(Message):
 _NUMBERS = (
     "existence", "north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s",
     "azimuth_rad", "elevation_rad", "azimuth_variance_rad2", "elevation_variance_rad2",
-    "age_s", "state_s", "updated_s", "origin_lat_deg", "origin_lon_deg", "origin_alt_m",
+    "age_s", "state_s", "updated_s", "own_north_m", "own_east_m", "own_down_m",
+    "origin_lat_deg", "origin_lon_deg", "origin_alt_m",
 )  # fmt: skip

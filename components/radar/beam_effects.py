@@ -145,7 +145,8 @@ class Sweep:
             for time_s in (start_s, start_s + offset_s)
         )
         moved = {}
-        for (column, belief), name in zip(believed.items(), before, strict=True):
+        names = [name for name in before if name != "present"]
+        for (column, belief), name in zip(believed.items(), names, strict=True):
             known, now = before[name][:, 0], then[name][:, 0]
             moved[column] = np.where(belief == known, now, belief + (now - known))
         return moved

@@ -11,6 +11,7 @@ from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
 from components.radar.moving_target_filter import folded_range_rate
+from components.radar.own_velocity import OwnVelocity
 from components.radar.range_rate import LASTS_S, RangeRate
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
@@ -19,7 +20,7 @@ from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect
 
-_RANGE_RATE = RangeRate()
+_RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 CellFactor = Callable[[Cells], FloatArray]
 #: Of noise that looks like an aircraft: the range rate of two fast ones that meet.
 FASTEST_M_S = 500.0
@@ -40,12 +41,15 @@ class Radar(Sensor):
         "resolution cell, 0 of the others",
     }
 
-    effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE,)
+    effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if _RANGE_RATE not in cls.effects:  # its key is one of every radar
-            cls.effects = (_RANGE_RATE, *cls.effects)
+        # Their key is one of every radar. The velocity is of what the reports before it say:
+        # false alarms, and when a sweeping beam met whom.
+        both = (_RANGE_RATE, _OWN_VELOCITY)
+        others = tuple(effect for effect in cls.effects if effect not in both)
+        cls.effects = (_RANGE_RATE, *others, _OWN_VELOCITY)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -75,6 +79,11 @@ class Radar(Sensor):
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)
         return replace(farthest_look([reach]), lasts_s=lasts_s + self._sweep.period_s)
+
+    def offer(self, port: str) -> Any:
+        """Say beside what every sensor says whether range rates fold."""
+        folds = bool(getattr(self.p, "range_rate_folds", False))
+        return replace(super().offer(port), folds_range_rate=folds)
 
     def exact_because(self) -> str:
         """A rate divides the change of an error over hundredths of a second by these."""

@@ -121,12 +121,17 @@ def state_tracks(
         updated_s=(store.plain("updated_tick") - begin) / per_s,
         contributors=store.plain("contributors"),
         updated_by=store.plain("updated_by"),
+        own_north_m=places.position_m[0, look],
+        own_east_m=places.position_m[1, look],
+        own_down_m=places.position_m[2, look],
         origin_lat_deg=origin[0, look],
         origin_lon_deg=origin[1, look],
         origin_alt_m=origin[2, look],
         covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
         extras={} if models == 1 else store.extras(models, known),
         sensors=sensors,
+        nis=store.plain("nis"),
+        nis_freedom=store.plain("freedom"),
         **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
     )  # fmt: skip
 

@@ -36,7 +36,8 @@ class TrackerRules:
         Logarithm of the false alarms in a scan per unit of measured volume, by kind and sensor.
     fields : tuple of Reach or None
         Where each sensor looks; None is everywhere.
-    use_range_rate : bool
+    rates_of : int
+        Mask of the sensors whose range rates are used.
     ticks_per_s : int
     """
 
@@ -55,5 +56,5 @@ class TrackerRules:
     delete_after_ticks: int
     log_density: Any
     fields: tuple[Reach | None, ...]
-    use_range_rate: bool
+    rates_of: int
     ticks_per_s: int

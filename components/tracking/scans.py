@@ -35,6 +35,9 @@ class Scans:
         Whether what is not among its detections was missed.
     pose : (6, looks)
         Of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll (rad).
+    velocity : (3, looks)
+        Of the ownship over ground (north, east, down of its own place, m/s); NaN where a look
+        measured no range rate.
     offsets : (looks + 1,)
         Detections ``offsets[i]:offsets[i + 1]`` belong to look i.
     measured, variance : (4, detections)
@@ -47,6 +50,7 @@ class Scans:
     sensors: IntArray
     tells_misses: BoolArray
     pose: FloatArray
+    velocity: FloatArray
     offsets: IntArray
     measured: FloatArray
     variance: FloatArray
@@ -55,11 +59,20 @@ class Scans:
     def __len__(self) -> int:
         return len(self.row)
 
-    def kinds(self, use_range_rate: bool) -> IntArray:
-        """Return the kind of each detection: 1 with a range, 2 more with a range rate."""
+    def kinds(self, rates_of: int) -> IntArray:
+        """Return the kind of each detection: 1 with a range, 2 more with a range rate.
+
+        Parameters
+        ----------
+        rates_of : int
+            Mask of the sensors whose range rates are used. One that is exact is not, as it would
+            have no weight, nor one that does not come with the ownship's velocity.
+        """
         code = (~np.isnan(self.measured[2])).astype(np.int64)
-        if use_range_rate:
-            code += 2 * ~np.isnan(self.measured[3])
+        if rates_of and not np.isnan(self.velocity).all():
+            moves = np.repeat(~np.isnan(self.velocity).any(axis=0), np.diff(self.offsets))
+            used = moves & (self.variance[3] > 0.0) & ~np.isnan(self.measured[3])
+            code += 2 * (used & (self.contributors & ~rates_of == 0))
         return code
 
     def take(self, looks: IntArray) -> Self:
@@ -69,16 +82,16 @@ class Scans:
         which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
         return type(self)(
             self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
-            self.pose[:, looks], offsets, self.measured[:, which], self.variance[:, which],
-            self.contributors[which],
+            self.pose[:, looks], self.velocity[:, looks], offsets, self.measured[:, which],
+            self.variance[:, which], self.contributors[which],
         )  # fmt: skip
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the looks of all parts, one after the other."""
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
-        names = ("row", "tick", "sensors", "tells_misses", "pose", "measured", "variance",
-                 "contributors")  # fmt: skip
+        names = ("row", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
+                 "variance", "contributors")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
         return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
 
@@ -148,11 +161,22 @@ def scans_of(fused: FusedDetections) -> Scans:
         sensors=union,
         tells_misses=whole,
         pose=place[:, begins],
+        velocity=_velocities(fused, of_entry, count),
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
         measured=measured[:, entries],
         variance=variance[:, entries],
         contributors=mask[entries],
     )
+
+
+def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
+    """Return the ownship's velocity at each look, as the first of its entries tells it."""
+    velocity = np.full((3, count), np.nan)
+    if fused.own_velocity is not None:
+        told = np.stack(list(fused.own_velocity.values()))
+        known = np.flatnonzero(~np.isnan(told).any(axis=0))[::-1]
+        velocity[:, look[known]] = told[:, known]
+    return velocity
 
 
 def when_made(scans: Scans, ahead: Scans | None, wake: Wake) -> tuple[Scans, Scans | None]:
@@ -192,7 +216,7 @@ def _refuse(
             "a report does not say where the ownship believed to be (own_lat_deg, own_lon_deg, "
             "own_alt_m, own_heading_rad, own_pitch_rad, own_roll_rad): a tracker needs its pose"
         )
-    # Trackers do not use range rates: a variance of theirs is never divided by.
+    # A range rate that is exact is not used.
     bad = (~np.isnan(measured) & ~(variance > 0.0))[:3]
     if bad.any():
         what, entry = (int(values[0]) for values in bad.nonzero())

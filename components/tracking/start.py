@@ -4,12 +4,13 @@ import numpy as np
 
 from components.estimation.batched import product, product_transposed
 from components.estimation.frame import Place
-from components.estimation.measurement import position_of
+from components.estimation.kalman import innovation, updated
+from components.estimation.measurement import linearised, position_of
 from components.messages.state_tracks import TENTATIVE
 from components.tracking.gated_pairs import named
 from components.tracking.life import NEVER
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import Scans
+from components.tracking.scans import Scans, kind_of
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -37,7 +38,8 @@ def started(
     variance[2] = np.where(ranged, variance[2], deviation**2)
     # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
     measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
-    position, jacobian = position_of(measured, places.take(looks[of]))
+    place = places.take(looks[of])
+    position, jacobian = position_of(measured, place)
     spread = np.zeros((6, 6, count))
     spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
@@ -50,6 +52,7 @@ def started(
         unknown = rules.start_turn_rad_s if size == 7 else rules.start_acceleration_m_s2
         for i in range(6, size):
             covariance[i, i] = unknown**2
+        _tell_rates(scans, place, codes, detection, state, covariance)
         states.append(state)
         covariances.append(covariance)
     counts = np.bincount(of, minlength=len(looks))
@@ -71,6 +74,8 @@ def started(
             "contributors": mask,
             "updated_by": mask,
             "ranged": ranged,
+            "nis": np.nan * ones,
+            "freedom": 0 * whole,
             "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
             "weights": np.full((len(sizes), count), 1.0 / len(sizes)),
             **named(states, covariances),
@@ -80,6 +85,27 @@ def started(
         born.status, born.history, born.looks, born.misses, born.score, rules.start_score
     )
     return born.with_columns(status=status), next_number + counts
+
+
+def _tell_rates(
+    scans: Scans,
+    place: Place,
+    codes: IntArray,
+    detection: IntArray,
+    state: FloatArray,
+    covariance: FloatArray,
+) -> None:
+    """Let new tracks know their measured range rates, in place."""
+    which = np.flatnonzero(codes[detection] >= 2)
+    if len(which) == 0:
+        return
+    kind, _ = kind_of(2)
+    known, slope = linearised(kind, state[:, which], place.take(which))
+    rate, variance = scans.measured[3:, detection[which]], scans.variance[3:, detection[which]]
+    found = innovation(known[2:], slope[2:], covariance[:, :, which], variance)
+    state[:, which], covariance[:, :, which] = updated(
+        state[:, which], covariance[:, :, which], found, rate - known[2:]
+    )
 
 
 def _diagonal(variance: FloatArray) -> FloatArray:

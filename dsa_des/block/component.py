@@ -209,6 +209,10 @@ class Component:
     #: draws by scan number only, or keeps replicas apart by `Wake.replica`. A class says so of its
     #: own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
+    #: Whether it keeps what it remembers of each replica apart, so that replicas may go side by
+    #: side: a wake is then a stretch of time of all of them, and the next one comes back to each
+    #: (`Wake.side_by_side`). True also of what remembers nothing. A class says it of its own code.
+    side_by_side: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
@@ -230,6 +234,7 @@ class Component:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
+        cls.side_by_side = vars(cls).get("side_by_side", False)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -341,6 +346,14 @@ class Component:
         """Return whether this block, with the effects built, may serve replicas in lock step."""
         return type(self).lockstep and all(
             effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
+        )
+
+    def keeps_replicas_apart(self) -> bool:
+        """Return whether this block, with the effects built, may serve replicas side by side."""
+        return type(self).side_by_side and all(
+            effect.side_by_side
+            for effect in type(self).effects
+            if effect.name in self.context.effects
         )
 
     def stream(self, purpose: str) -> Stream:

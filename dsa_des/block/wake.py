@@ -48,6 +48,8 @@ class Wake:
     span_ticks : int
         When replicas run in lock step: ticks from the start of one to the start of the next
         (`dsa_des.time.timeline`); 0 otherwise.
+    side_by_side : bool
+        Whether rows of every replica may come again; else those of one that has passed never do.
     """
 
     def __init__(
@@ -59,6 +61,8 @@ class Wake:
         arrived: Mapping[str, list[Arrivals]],
         demand: Callable[[], Mapping[str, IntArray]] | None = None,
         span_ticks: int = 0,
+        *,
+        side_by_side: bool = False,
     ) -> None:
         self.ticks = ticks
         self.scans = scans
@@ -67,6 +71,7 @@ class Wake:
         self._arrived = arrived
         self._demand = demand
         self.span_ticks = span_ticks
+        self.side_by_side = side_by_side
 
     def __len__(self) -> int:
         return len(self.ticks)

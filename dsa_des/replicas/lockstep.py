@@ -10,25 +10,34 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.record.recording import Recorder
+from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
+from dsa_des.replicas.lookahead import Edge, lookahead_ticks, opened_loops
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.replicas.watched_parameters import WatchedParameters
-from dsa_des.replicas.windows import ReplicaWindows
+from dsa_des.replicas.windows import ReplicaWindows, SideBySideWindows
+from dsa_des.running.channel import Channel
 from dsa_des.running.effect_plan import plan, unspent
+from dsa_des.running.grain import Grain
 from dsa_des.running.rewind import Rewinder
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
-from dsa_des.running.windows import Windows
+from dsa_des.running.timing_effects import may_be_late
+from dsa_des.running.windows import Window, Windows
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import ReplicaTime
 
 __all__ = ["NotInLockStep", "Replicas", "lock_step"]
 
+# Side by side, windows that hold fewer rows than this of each replica cost more than runs apart.
+_MOST_WINDOWS_PER_SCAN = 10.0
 _OF_THE_CLOCK = frozenset(ClockedParameters.model_fields)
 #: Takes a replica's number and what its blocks report (`Component.report`).
 TakeReport = Callable[[int, dict[str, Any]], None]
@@ -84,7 +93,11 @@ class Replicas(Timeline):
         #: By block, which of its parameters are not the same in all replicas.
         self._differing: dict[str, set[str]] = {}
         self._watched: dict[str, WatchedParameters] = {}
+        self._clocks: list[ReplicaClock] = []
         _check_alike(self._scenes)
+        #: Wires at which feedback loops are opened: a window is no longer than their delay.
+        self._opened = opened_loops(self.scene)
+        self._delays: dict[Edge, int] = {}
         self.streams = ReplicaStreams([scene.seed for scene in self._scenes])
 
     def parameters(self, name: str) -> Any:
@@ -99,7 +112,9 @@ class Replicas(Timeline):
 
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Lay runs end to end, and split the blocks that cannot serve all of them."""
-        self.time = ReplicaTime.end_to_end(len(self._scenes), self._run_ticks(duration_s))
+        self.time = ReplicaTime.of_replicas(
+            len(self._scenes), self._run_ticks(duration_s), side_by_side=bool(self._opened)
+        )
         if not self.time.fits:
             raise NotInLockStep(
                 f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
@@ -110,7 +125,10 @@ class Replicas(Timeline):
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
                 make = self._maker(name, component)
-                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finished)
+                self.split[name] = SplitBlock(
+                    tuple(component.outputs), make, self._finished,
+                    side_by_side=self.time.side_by_side,
+                )  # fmt: skip
             elif name in self._watched:
                 reason = f"block {name} reads parameters of its clock, which differ"
                 self._watched[name].refuse(NotInLockStep(reason))
@@ -118,6 +136,8 @@ class Replicas(Timeline):
     def _shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
+            return False
+        if self.time.side_by_side and not component.keeps_replicas_apart():
             return False
         if name in self._watched:
             return not self._watched[name].read
@@ -205,7 +225,9 @@ class Replicas(Timeline):
         for scene, spec in zip(self._scenes, specs, strict=True):
             draw = Streams(scene.seed).scan_normals(name, "clock jitter")
             clocks.append(ScanClock(spec, scene.ticks_per_s, draw))
-        return ReplicaClock(clocks, self.time)
+        clock = ReplicaClock(clocks, self.time)
+        self._clocks.append(clock)
+        return clock
 
     def runner(self, component: Component) -> Any:
         """Return the block, or its instances."""
@@ -215,7 +237,40 @@ class Replicas(Timeline):
         self, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder | None
     ) -> Windows:
         """Return windows that hold many whole replicas, or parts of one."""
-        return ReplicaWindows(self.time, longest_ticks, cuts)
+        if not self.time.side_by_side:
+            return ReplicaWindows(self.time, longest_ticks, cuts)
+        lookahead = lookahead_ticks(self._delays, self._opened)
+        scans = sum(self.time.run_ticks / clock.period for clock in self._clocks)
+        if self.time.run_ticks > lookahead * (_MOST_WINDOWS_PER_SCAN * scans + 1000):
+            said = f"{lookahead / self.scene.ticks_per_s:.2g} s"
+            raise NotInLockStep(f"a feedback loop comes back after {said}: scans are farther apart")
+        return SideBySideWindows(self.time, longest_ticks, cuts, lookahead)
+
+    def grain(self, window: int | None, check_rewinding: bool) -> Grain:
+        """Return the grain: in loops, all blocks run in windows that nothing comes back in."""
+        if not self._opened:
+            return super().grain(window, check_rewinding)
+        return Grain(set(self.scene.blocks), False, self._opened, {})
+
+    def channel(self, wire: Wire, delay_ticks: int) -> Channel:
+        """Return the receiving end of a wire in all replicas."""
+        edge = wire.source, wire.target
+        self._delays[edge] = min(delay_ticks, self._delays.get(edge, delay_ticks))
+        faults = None
+        if may_be_late(wire, everything=False):
+            arguments = self._fault_arguments(wire)
+            faults = ReplicaWireFaults(*arguments, span_ticks=self.time.span_ticks)
+        return ReplicaChannel(wire.source, delay_ticks, faults, self.time)
+
+    def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
+        """Return the window where replicas go side by side."""
+        if self.time.side_by_side:
+            return window.start, window.end
+        return super().stretch(ticks, window)
+
+    def final_before(self, tick: int) -> int:
+        """Return 0 where replicas go side by side: rows are put in order at the end."""
+        return 0 if self.time.side_by_side else tick
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Let instances report; a shared block has seen the rows of all and speaks for none."""
@@ -227,14 +282,11 @@ class Replicas(Timeline):
 def _check_alike(scenes: Sequence[Scene]) -> None:
     """Refuse scenes that differ in more than seeds and parameters of blocks."""
     first = scenes[0]
-    if first.look_ahead_blocks() != set(first.blocks):
-        late = sorted(set(first.blocks) - first.look_ahead_blocks())
+    late = sorted(n for n, cls in first.classes.items() if not cls.windowed or cls.process)
+    if late:
         raise NotInLockStep(f"blocks that run scan by scan: {', '.join(late)}")
     if first.processors:
         raise NotInLockStep("shared processors order messages of one run")
-    for wire in first.wires:
-        if wire.jitter_s or wire.drop_probability or isinstance(wire.holds, dict):
-            raise NotInLockStep(f"wire {wire} loses, jitters or holds messages")
     for scene in scenes[1:]:
         same = (
             scene.wires == first.wires

@@ -13,7 +13,6 @@ from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Message
 from dsa_des.running.wire_faults import WireFaults
-from dsa_des.time.timeline import ReplicaTime
 
 
 class Channel:
@@ -27,8 +26,6 @@ class Channel:
         Time on the wire.
     faults : WireFaults, optional
         Loss and lateness of single rows; late rows may be overtaken.
-    time : ReplicaTime, optional
-        With many replicas on it, no row arrives in another one than its own.
     """
 
     def __init__(
@@ -36,12 +33,10 @@ class Channel:
         source: str,
         delay_ticks: int = 0,
         faults: WireFaults | None = None,
-        time: ReplicaTime | None = None,
     ) -> None:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
-        self._span_ticks, self._run_ticks = (time.span_ticks, time.run_ticks) if time else (0, 0)
         self._waiting: deque[tuple[IntArray, Message]] = deque()
         self._last: tuple[IntArray, Message] | None = None
         #: First arrival of every message pushed since `state` or `set_state`.
@@ -84,13 +79,6 @@ class Channel:
             order = np.argsort(arrivals, kind="stable")
             arrivals, message = arrivals[order], message.take(kept[order])
             if len(kept) == 0:
-                return arrivals
-        if self._span_ticks and self.delay_ticks:
-            # Seen from the start of the replica that sent it: a long delay leads past the next one.
-            start = ticks - ticks % self._span_ticks
-            in_time = arrivals - start < self._run_ticks
-            arrivals, message = arrivals[in_time], message.take(np.flatnonzero(in_time))
-            if len(arrivals) == 0:
                 return arrivals
         self._waiting.append((arrivals, message))
         if self._pushed is not None:
@@ -140,11 +128,11 @@ class Channel:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
         self._waiting = left
-        joined = _joined(taken)
-        if self._faults is not None and joined is not None and len(taken) > 1:
-            order = np.argsort(joined[0], kind="stable")
-            joined = joined[0][order], joined[1].take(order)
-        return joined
+        found = joined(taken)
+        if self._faults is not None and found is not None and len(taken) > 1:
+            order = np.argsort(found[0], kind="stable")
+            found = found[0][order], found[1].take(order)
+        return found
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds at each of `ticks` (in order, all before `end`).
@@ -160,17 +148,15 @@ class Channel:
             self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
             if new[0][0] <= ticks[0]:
                 last = None  # superseded before the first instant asked about: spare the copy
-        held = _joined([part for part in (last, new) if part is not None])
+        held = joined([part for part in (last, new) if part is not None])
         if held is None:
             return None
         arrivals, message = held
-        rows = last_at_or_before(arrivals, ticks)
-        if self._span_ticks:
-            rows[arrivals[rows] // self._span_ticks != ticks // self._span_ticks] = -1
-        return message, rows
+        return message, last_at_or_before(arrivals, ticks)
 
 
-def _joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+def joined(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+    """Return the rows of all parts as one, in the order given, or None without any."""
     if not parts:
         return None
     if len(parts) == 1:

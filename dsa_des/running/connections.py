@@ -3,21 +3,16 @@
 from collections.abc import Mapping
 
 from dsa_des.errors import SceneError
-from dsa_des.running.channel import Channel
 from dsa_des.running.demand import Demand
 from dsa_des.running.node import Node
-from dsa_des.running.timing_effects import may_be_late
-from dsa_des.running.wire_faults import WireFaults
+from dsa_des.running.timeline import Timeline
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
-from dsa_des.time.randomness import Streams
 from dsa_des.time.timeline import ReplicaTime
 
 
-def connect(
-    scene: Scene, nodes: Mapping[str, Node], time: ReplicaTime, *, everything: bool = False
-) -> None:
+def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
 
     Parameters
@@ -25,10 +20,8 @@ def connect(
     scene : Scene
     nodes : mapping
         Running blocks by name.
-    time : ReplicaTime
-        How the runs lie in time.
-    everything : bool
-        Draw loss and jitter also for wires that have none.
+    timeline : Timeline
+        Makes the channels; has been laid.
 
     Raises
     ------
@@ -38,7 +31,7 @@ def connect(
     """
     for wire in scene.wires:
         delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
-        channel = Channel(wire.source, delay, _faults(scene, wire, everything), time)
+        channel = timeline.channel(wire, delay)
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             channel.hold(declared.initial(wire.holds), 0)
@@ -48,7 +41,7 @@ def connect(
             (channel, target, wire.input)
         )
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name, time)
+        node.demands = find_demands(nodes, name, timeline.time)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
             raise SceneError([scene.problem(f"blocks.{name}", message)])
@@ -90,19 +83,6 @@ def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None
             f"{longest_s:.4g} s"
         )
         raise SceneError([scene.problem("duration_s", message)])
-
-
-def _faults(scene: Scene, wire: Wire, everything: bool) -> WireFaults | None:
-    if not may_be_late(wire, everything):
-        return None
-    streams = Streams(scene.seed)
-    return WireFaults(
-        float(wire.jitter_s * scene.ticks_per_s),
-        wire.drop_probability,
-        streams.stream(str(wire), "wire jitter"),
-        streams.stream(str(wire), "wire loss"),
-        scene.ticks_per_s,
-    )
 
 
 def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:

@@ -23,6 +23,7 @@ class Demand:
         # A row that would arrive after the end of the run is not needed.
         last = min(end + self.lead_ticks, self.time.end_tick)
         _, ticks = self.clock.between(start + self.lead_ticks, last)
-        if self.time.span_ticks:  # rows from before a replica's start do not exist
+        if self.time.span_ticks and not self.time.side_by_side:
+            # Rows from before a replica's start do not exist.
             ticks = ticks[ticks % self.time.span_ticks >= self.lead_ticks]
         return ticks - self.lead_ticks

@@ -37,7 +37,7 @@ class Inputs:
     wires : mapping
         The wires into each.
     ticks_per_s : int
-    span_ticks : int
+    span_ticks, side_by_side
         As for `Wake`.
     """
 
@@ -47,11 +47,14 @@ class Inputs:
         wires: Mapping[str, Sequence[WireEnd]],
         ticks_per_s: int,
         span_ticks: int = 0,
+        *,
+        side_by_side: bool = False,
     ) -> None:
         every = [(port, wire) for port in declared for wire in wires.get(port, ())]
         self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].held]
         self._queued = [(p, wire) for p, wire in every if not declared[p].held]
         self._ticks_per_s, self._span_ticks = ticks_per_s, span_ticks
+        self._side_by_side = side_by_side
 
     def seen(
         self,
@@ -96,7 +99,10 @@ class Inputs:
             if new is not None:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         asked = None if demand is None else partial(demand, ticks)
-        return Wake(ticks, scans, self._ticks_per_s, held, arrived, asked, self._span_ticks)
+        return Wake(
+            ticks, scans, self._ticks_per_s, held, arrived, asked, self._span_ticks,
+            side_by_side=self._side_by_side,
+        )  # fmt: skip
 
 
 def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:

@@ -211,7 +211,10 @@ class Node:
     @cached_property
     def _inputs(self) -> Inputs:
         run = self.simulation
-        return Inputs(self.component.inputs, self.channels, run.ticks_per_s, run.span_ticks)
+        return Inputs(
+            self.component.inputs, self.channels, run.ticks_per_s, run.span_ticks,
+            side_by_side=run.side_by_side,
+        )  # fmt: skip
 
     def _run(self, ticks: IntArray, scans: IntArray, end: int) -> None:
         wake = self._inputs.seen(ticks, scans, end, self._rows_asked_for)
@@ -232,7 +235,7 @@ class Node:
     def _rows_asked_for(self, ticks: IntArray) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
-        start, end = int(ticks[0]), int(ticks[-1]) + 1
+        start, end = self.simulation.stretch(ticks)
         rows = {}
         for demand in self.demands:
             asked = demand.between(start, end)

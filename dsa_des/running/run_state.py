@@ -47,6 +47,13 @@ class RunState(Protocol):
     def span_ticks(self) -> int:
         """Ticks from one replica's start to the next; 0 where one runs by itself."""
 
+    @property
+    def side_by_side(self) -> bool:
+        """Whether windows are stretches of time of all replicas."""
+
+    def stretch(self, ticks: IntArray) -> tuple[int, int]:
+        """Return a start and an end between which the rows of a wake lie, as clocks count."""
+
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:

@@ -24,7 +24,6 @@ from dsa_des.record.recording import Recorder
 from dsa_des.running.assembly import Assembly, WrapEffect
 from dsa_des.running.connections import check_reach, connect
 from dsa_des.running.effect_plan import Planned
-from dsa_des.running.grain import grain_of
 from dsa_des.running.node import Abort
 from dsa_des.running.nodes import build_nodes, start_processors
 from dsa_des.running.pinpoint import pinpoint
@@ -143,7 +142,7 @@ class Simulation:
         self._window = window
         self._cuts = sorted(cuts)
         self._has_run = False
-        grain = grain_of(scene, window, check_rewinding)
+        grain = self.timeline.grain(window, check_rewinding)
         #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
         self.unwound = grain.unwound
         assembly = Assembly(scene, self.timeline, simulate_everything, wrap_effect)
@@ -157,7 +156,7 @@ class Simulation:
         self.nodes = build_nodes(
             self, self.timeline, self.components, grain, processors, shuffle_ties
         )
-        connect(scene, self.nodes, self.time, everything=simulate_everything)
+        connect(scene, self.nodes, self.timeline)
         check_reach(scene, self.nodes, self.time.run_ticks)
         #: How many scans of all clocks together a run has, about.
         self.scans = scans_of(self.nodes, self.time)
@@ -185,6 +184,11 @@ class Simulation:
     def span_ticks(self) -> int:
         """Ticks from one replica's start to the next; 0 for a single run."""
         return self.time.span_ticks
+
+    @property
+    def side_by_side(self) -> bool:
+        """Whether windows are stretches of time of all replicas."""
+        return self.time.side_by_side
 
     @property
     def end_tick(self) -> int:
@@ -221,7 +225,7 @@ class Simulation:
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self.recorder.advance(final)
+                self.recorder.advance(self.timeline.final_before(final))
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
@@ -232,6 +236,10 @@ class Simulation:
             sorted(name for name, node in self.nodes.items() if node.windowed),
             self.timeline.finish(self.components),
         )
+
+    def stretch(self, ticks: IntArray) -> tuple[int, int]:
+        """Return a start and an end between which the rows of a wake lie, as clocks count."""
+        return self.timeline.stretch(ticks, self.window)
 
     def _check_ready(self) -> None:
         """Refuse to run what waits for a host, or has run."""

@@ -8,12 +8,18 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
+from dsa_des.running.channel import Channel
+from dsa_des.running.grain import Grain, grain_of
 from dsa_des.running.rewind import Rewinder, RewindingWindows
-from dsa_des.running.windows import EqualWindows, Windows
+from dsa_des.running.timing_effects import may_be_late
+from dsa_des.running.windows import EqualWindows, Window, Windows
+from dsa_des.running.wire_faults import WireFaults
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
-from dsa_des.time.randomness import Streams
+from dsa_des.time.randomness import Stream, Streams
 from dsa_des.time.timeline import ReplicaTime
 
 
@@ -60,6 +66,34 @@ class Timeline:
             return None
         draw = self.streams.scan_normals(name, "clock jitter")
         return ScanClock(spec, self.scene.ticks_per_s, draw, always_draws=self._everything)
+
+    def channel(self, wire: Wire, delay_ticks: int) -> Channel:
+        """Return the receiving end of a wire, with its faults."""
+        faults = None
+        if may_be_late(wire, self._everything):
+            faults = self.wire_faults(wire)
+        return Channel(wire.source, delay_ticks, faults)
+
+    def wire_faults(self, wire: Wire) -> WireFaults:
+        """Return what happens to the rows on a wire that loses or delays some."""
+        return WireFaults(*self._fault_arguments(wire))
+
+    def _fault_arguments(self, wire: Wire) -> tuple[float, float, Stream, Stream, int]:
+        ticks_per_s = self.scene.ticks_per_s
+        late, lost = (self.streams.stream(str(wire), f"wire {kind}") for kind in ("jitter", "loss"))
+        return float(wire.jitter_s * ticks_per_s), wire.drop_probability, late, lost, ticks_per_s
+
+    def grain(self, window: int | None, check_rewinding: bool) -> Grain:
+        """Return at which grain the blocks run; see `Simulation` for the parameters."""
+        return grain_of(self.scene, window, check_rewinding)
+
+    def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
+        """Return a start and an end between which the rows of a wake lie, as clocks count."""
+        return int(ticks[0]), int(ticks[-1]) + 1
+
+    def final_before(self, tick: int) -> int:
+        """Return before which tick rows are final when windows have come to a tick."""
+        return tick
 
     def runner(self, component: Component) -> Any:
         """Return what handles the wakes of a block: itself, or what stands in for it."""

@@ -1,6 +1,7 @@
 """How many scans a run has, and how long its look-ahead windows are."""
 
 from collections.abc import Iterable, Mapping
+from fractions import Fraction
 
 from dsa_des.errors import SceneError
 from dsa_des.running.node import Node
@@ -42,8 +43,10 @@ def longest_window(nodes: Mapping[str, Node], time: ReplicaTime, window: int | N
     """
     width = max(node.component.width for node in nodes.values())
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // max(1, width))
-    scans_per_tick = sum(1 / clock.period for clock in _clocks(nodes.values()))
-    return max(1, int(scans / scans_per_tick)) if scans_per_tick else time.end_tick
+    per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
+    if time.side_by_side and window is None:  # each of them makes these scans
+        per_tick *= time.replicas
+    return max(1, int(scans / per_tick)) if per_tick else time.end_tick
 
 
 def _clocks(nodes: Iterable[Node]) -> list[ScanClock]:

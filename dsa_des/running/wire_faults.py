@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
 
@@ -31,12 +31,12 @@ class WireFaults:
 
     def kept(self, ticks: IntArray) -> BoolArray:
         """Return which rows sent at `ticks` are not lost."""
-        return self.drops.uniform(self._keys(ticks), 0) >= self.drop_probability
+        return self._drawn(self.drops, ticks) >= self.drop_probability
 
     def lateness(self, ticks: IntArray) -> IntArray:
         """Return the extra delay of the rows sent at `ticks`, in ticks."""
-        draws = self.jitter.uniform(self._keys(ticks), 0)
-        return np.rint(draws * self.jitter_ticks).astype(np.int64)
+        return np.rint(self._drawn(self.jitter, ticks) * self.jitter_ticks).astype(np.int64)
 
-    def _keys(self, ticks: IntArray) -> IntArray:
-        return nanosecond_of(ticks, self.ticks_per_s).astype(np.uint64)
+    def _drawn(self, stream: Stream, ticks: IntArray) -> FloatArray:
+        instant = nanosecond_of(ticks, self.ticks_per_s).astype(np.uint64)
+        return stream.uniform(instant, 0)

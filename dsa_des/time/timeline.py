@@ -1,9 +1,15 @@
-"""One timeline for many replicas, laid end to end.
+"""One timeline for many replicas, laid end to end or side by side.
 
 Replicas of a scene that run in lock step share one run: replica r occupies the ticks from r times
 the span. Rows of many replicas are then rows of one long run, in order, and every array expression
 over rows is one over replicas and rows. Scan numbers carry the replica in their high bits, so that
 a draw is still a function of its own replica's seed and scan.
+
+Replicas that run *end to end* go along that line, some whole replicas at a time. In a feedback loop
+they run *side by side*: a window is a stretch of time of all of them at once, and it holds that
+stretch's rows of the first replica, then those of the second, and so on. Ticks of rows are those of
+the line in both cases; side by side, those of windows, and those that clocks are asked for, are
+within the replicas.
 """
 
 from dataclasses import dataclass
@@ -27,20 +33,27 @@ class ReplicaTime:
         Length of each run: it covers [0, run_ticks) of its own ticks.
     span_ticks : int
         Ticks from one replica's start to the next; 0 for a run by itself.
+    side_by_side : bool
+        Whether a window is a stretch of time of all replicas, not of the line they lie on.
     """
 
     replicas: int
     run_ticks: int
     span_ticks: int = 0
+    side_by_side: bool = False
 
     @classmethod
-    def end_to_end(cls, replicas: int, run_ticks: int) -> "ReplicaTime":
+    def of_replicas(
+        cls, replicas: int, run_ticks: int, *, side_by_side: bool = False
+    ) -> "ReplicaTime":
         """Return replicas so far apart that nothing of one run reaches the other's."""
-        return cls(replicas, run_ticks, 1 << (2 * run_ticks).bit_length())
+        return cls(replicas, run_ticks, 1 << (2 * run_ticks).bit_length(), side_by_side)
 
     @property
     def end_tick(self) -> int:
-        """First tick of the timeline that is no longer simulated."""
+        """First tick that no window reaches."""
+        if self.side_by_side:
+            return self.run_ticks
         return (self.replicas - 1) * self.span_ticks + self.run_ticks
 
     @property

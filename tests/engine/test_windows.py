@@ -44,7 +44,7 @@ def test_equal_windows_cover_a_run_once(longest, cuts, expected):
 @pytest.mark.parametrize("longest", [1, 3, 10, 25, 1000])
 @pytest.mark.parametrize("cuts", [(), (3, 15, 40, 71)])
 def test_windows_over_replicas_cover_each_once_and_hold_whole_ones(longest, cuts):
-    time = ReplicaTime.end_to_end(4, 10)
+    time = ReplicaTime.of_replicas(4, 10)
     found = all_of(ReplicaWindows(time, longest, cuts))
     ticks = np.concatenate([np.arange(*window) for window in found])
     ran = ticks[ticks % time.span_ticks < time.run_ticks]

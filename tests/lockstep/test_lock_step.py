@@ -90,21 +90,23 @@ def test_random_traffic_is_drawn_from_each_seed():
     assert_equal_to_separate_runs(variants(scene))
 
 
-@pytest.mark.parametrize(
-    ("sets", "what"),
-    [
-        (["wires[4]={from='radar', to='fusion', drop_probability=0.1}"], "loses"),
-        (["processors.gpu.service_s=0.01", "blocks.eo.processor=gpu"], "shared processors"),
-    ],
-)
-def test_what_cannot_run_together_says_so(sets, what):
-    scene = load_scene(FIRST_LIGHT, sets=sets[:1] if "wires" not in sets[0] else [])
-    if "wires" in sets[0]:
-        wires = [replace(w, drop_probability=0.1) if w.source == "eo" else w for w in scene.wires]
-        scene = replace(scene, wires=wires)
-    else:
-        scene = load_scene(FIRST_LIGHT, sets=sets)
-    with pytest.raises(NotInLockStep, match=what):
+def test_wires_that_lose_and_delay_rows():
+    scene = load_scene(FIRST_LIGHT, duration_s="20")
+    wires = [
+        replace(wire, drop_probability=0.2, jitter_s=Fraction(3, 10))
+        if wire.source in ("eo", "radar", "traffic")
+        else wire
+        for wire in scene.wires
+    ]
+    scene = replace(scene, wires=wires)
+    for window in (None, 7):
+        assert_equal_to_separate_runs(variants(scene), window=window)
+
+
+def test_shared_processors_are_refused_by_name():
+    sets = ["processors.gpu.service_s=0.01", "blocks.eo.processor=gpu"]
+    scene = load_scene(FIRST_LIGHT, sets=sets)
+    with pytest.raises(NotInLockStep, match="shared processors"):
         lock_step([scene, scene])
 
 

@@ -1,0 +1,150 @@
+"""The buffer at the receiving end of one wire, for the rows of all replicas in lock step.
+
+Rows stand in order of replica, then of arrival. Replicas that run end to end pass by one after the
+other; of replicas side by side every window takes what arrives in its stretch of time, and what
+each of them holds is remembered until the next.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.message import Message
+from dsa_des.running.channel import Channel, joined
+from dsa_des.running.wire_faults import WireFaults
+from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.randomness import Stream
+from dsa_des.time.timeline import ReplicaTime, first_scan
+
+
+@dataclass(frozen=True)
+class ReplicaWireFaults(WireFaults):
+    """Keyed faults of a wire in every replica; its streams are those of replicas.
+
+    Parameters
+    ----------
+    span_ticks : int
+        From one replica's start to the next.
+    """
+
+    span_ticks: int = 0
+
+    def _drawn(self, stream: Stream, ticks: IntArray) -> FloatArray:
+        replica, own = np.divmod(ticks, self.span_ticks)
+        instant = nanosecond_of(own, self.ticks_per_s).astype(np.uint64)
+        return stream.uniform(instant, replica * first_scan(1))
+
+
+class ReplicaChannel(Channel):
+    """Rows on their way to one input, of many replicas.
+
+    Parameters
+    ----------
+    source, delay_ticks, faults
+        As for `Channel`.
+    time : ReplicaTime
+    """
+
+    def __init__(
+        self, source: str, delay_ticks: int, faults: WireFaults | None, time: ReplicaTime
+    ) -> None:
+        super().__init__(source, delay_ticks, faults)
+        self._time, self._span = time, time.span_ticks
+
+    def hold(self, message: Message, tick: int) -> None:
+        """Make `message` the last arrived one in every replica, as if it had come at `tick`."""
+        begin = np.arange(self._time.replicas, dtype=np.int64) * self._span
+        starts = enumerate(begin.tolist())
+        held = [message.shifted(start, first_scan(number)) for number, start in starts]
+        self._last = begin + tick, type(message).concatenate(held)
+
+    def push(self, message: Message, sent: int | IntArray | None = None) -> IntArray:
+        """Deposit a message and return the ticks at which its rows arrive, in order."""
+        arrivals = message.tick + self.delay_ticks if self.delay_ticks else message.tick
+        if self._faults is None and not self.delay_ticks:
+            self._waiting.append((arrivals, message))
+            return arrivals
+        start = message.tick - message.tick % self._span
+        kept = np.ones(len(arrivals), dtype=bool)
+        if self._faults is not None:
+            kept = self._faults.kept(message.tick)
+            arrivals = arrivals + self._faults.lateness(message.tick)
+        # What would arrive after the end of its replica does not: nothing would wait for it there.
+        kept &= arrivals - start < self._time.run_ticks
+        if not kept.all():
+            rows = np.flatnonzero(kept)
+            arrivals, message = arrivals[rows], message.take(rows)
+        if len(arrivals) == 0:
+            return arrivals
+        if self._faults is not None and bool((arrivals[1:] < arrivals[:-1]).any()):
+            order = np.argsort(arrivals, kind="stable")
+            arrivals, message = arrivals[order], message.take(order)
+        self._waiting.append((arrivals, message))
+        return arrivals
+
+    def forget(self, tick: int) -> None:
+        """Keep all: a row is superseded in its own replica only."""
+
+    def next_arrivals(self, end: int) -> IntArray:
+        """Return the ticks at which rows arrive before `end` that were not collected yet."""
+        ticks = [arrivals[self._due(arrivals, end)] for arrivals, _ in self._waiting]
+        ticks = [part for part in ticks if len(part)]
+        if len(ticks) == 1 and self._faults is None:
+            return ticks[0]
+        return sorted_union(ticks) if ticks else np.empty(0, dtype=np.int64)
+
+    def _due(self, arrivals: IntArray, end: int) -> slice | BoolArray:
+        """Return which rows arrive before `end`."""
+        if not self._time.side_by_side:
+            return slice(0, int(np.searchsorted(arrivals, end)))
+        due = arrivals % self._span < end
+        return slice(None) if due.all() else due
+
+    def collect(self, end: int) -> tuple[IntArray, Message] | None:
+        """Remove and return the rows that arrive before `end`, or None."""
+        taken: list[tuple[IntArray, Message]] = []
+        left: deque[tuple[IntArray, Message]] = deque()
+        for arrivals, message in self._waiting:
+            due = self._due(arrivals, end)
+            if isinstance(due, slice):
+                now, later = due, slice(len(arrivals[due]), None)
+                if len(arrivals[now]):
+                    taken.append((arrivals[now], message.take(now)))
+                if len(arrivals[later]):
+                    left.append((arrivals[later], message.take(later)))
+                continue
+            rows, others = np.flatnonzero(due), np.flatnonzero(~due)
+            if len(rows):
+                taken.append((arrivals[rows], message.take(rows)))
+            left.append((arrivals[others], message.take(others)))
+        self._waiting = left
+        return _in_order(taken)
+
+    def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return what the input holds in each replica at each of `ticks`; see `Channel.sample`."""
+        new = self.collect(end)
+        held = _in_order([part for part in (self._last, new) if part is not None])
+        if held is None:
+            return None
+        arrivals, message = held
+        replica = arrivals // self._span
+        if new is not None:
+            ends = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
+            if not self._time.side_by_side:  # those that have passed never come again
+                ends = ends[replica[ends] >= ticks[-1] // self._span]
+            self._last = (arrivals[ends], message.take(ends)) if len(ends) else None
+        rows = last_at_or_before(arrivals, ticks)
+        rows[replica[rows] != ticks // self._span] = -1
+        return message, rows
+
+
+def _in_order(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
+    """Join rows and put them in order; what arrives at one instant stays in the order given."""
+    found = joined(parts)
+    if found is None or len(parts) == 1 or bool((found[0][1:] >= found[0][:-1]).all()):
+        return found
+    order = np.argsort(found[0], kind="stable")
+    return found[0][order], found[1].take(order)
