@@ -22,6 +22,7 @@ from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.sensor.marks import IR
+from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -194,7 +195,7 @@ class Scope:
         if self._rules is None or len(on) == 0 or not np.all(np.isfinite(alerts.own_mps)):
             return []
         level = self._rules[0].corrective_level(self._rules[1])
-        if level is None:
+        if level is None or not isinstance(level.volume, Volume):
             return []
         found = lost_area(level.volume, alerts.own_mps, alerts.relative[:, on], _LOOKAHEAD_S)
         degrees = np.degrees(found.direction_rad)
