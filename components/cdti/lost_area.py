@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from components.well_clear.violation import violation_span
+from components.well_clear.detection import detection_span
+from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
 
@@ -30,7 +31,11 @@ class Reached(NamedTuple):
 
 
 def lost_area(
-    volume: Volume, own_mps: FloatArray, relative: FloatArray, lookahead_s: float
+    volume: Volume | TcasAdvisory,
+    own_alt_m: float,
+    own_mps: FloatArray,
+    relative: FloatArray,
+    lookahead_s: float,
 ) -> Reached:
     """Return where the ownship would be in a volume about other aircraft, were it to turn at once.
 
@@ -40,7 +45,8 @@ def lost_area(
 
     Parameters
     ----------
-    volume : Volume
+    volume : Volume or TcasAdvisory
+    own_alt_m : float
     own_mps : (3,)
         East, north and upward.
     relative : (6, targets)
@@ -57,7 +63,8 @@ def lost_area(
     north = speed_mps * np.cos(DIRECTIONS_RAD)[:, np.newaxis] - own_mps[1]
     turned = [*relative[:3], relative[3] + east, relative[4] + north, relative[5]]
     parts = [part.reshape(-1) for part in np.broadcast_arrays(*turned)]
-    span = violation_span(volume, parts, 0.0, lookahead_s)
+    own_up = np.full(len(parts[0]), own_alt_m), np.full(len(parts[0]), own_mps[2])
+    span = detection_span(volume, parts, own_up, None, 0.0, lookahead_s)
     lost = np.flatnonzero(span.begin_s < span.end_s)
     direction = np.repeat(DIRECTIONS_RAD, relative.shape[1])[lost]
     return Reached(direction, speed_mps * span.begin_s[lost], speed_mps * span.end_s[lost])

@@ -22,7 +22,6 @@ from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.sensor.marks import IR
-from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -43,6 +42,7 @@ class _Alerts:
     target: Any
     level: Any
     relative: FloatArray
+    own_alt_m: float
     own_mps: FloatArray
     to_loss_s: Any
     closest_m: Any
@@ -120,6 +120,7 @@ class Scope:
             last.target,
             last.level,
             np.array([last.relative[name] for name in _RELATIVE]),
+            float(last.own_motion["alt_m"][0]),
             np.array([last.own_motion[name][0] for name in _RELATIVE[3:]]),
             to_loss,
             last.closest_horizontal_m,
@@ -195,9 +196,12 @@ class Scope:
         if self._rules is None or len(on) == 0 or not np.all(np.isfinite(alerts.own_mps)):
             return []
         level = self._rules[0].corrective_level(self._rules[1])
-        if level is None or not isinstance(level.volume, Volume):
+        if level is None:
             return []
-        found = lost_area(level.volume, alerts.own_mps, alerts.relative[:, on], _LOOKAHEAD_S)
+        relative = alerts.relative[:, on]
+        found = lost_area(
+            level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S
+        )
         degrees = np.degrees(found.direction_rad)
         return [
             [round(a, 1), round(b, 1), round(c, 1)]
