@@ -199,9 +199,7 @@ class Scope:
         if level is None:
             return []
         relative = alerts.relative[:, on]
-        found = lost_area(
-            level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S
-        )
+        found = lost_area(level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S)
         degrees = np.degrees(found.direction_rad)
         return [
             [round(a, 1), round(b, 1), round(c, 1)]
