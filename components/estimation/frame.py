@@ -64,7 +64,7 @@ def place_in_frame(
     """
     lat, lon, alt = position_deg_m
     north, east, up = north_east_up(*origin_deg_m, lat, lon, alt)
-    there, here = _ned_axes(lat, lon), _ned_axes(origin_deg_m[0], origin_deg_m[1])
+    there, here = ned_axes(lat, lon), ned_axes(origin_deg_m[0], origin_deg_m[1])
     turned = np.empty((3, 3, np.size(lat)))
     for j in range(3):
         # Axis j of the frame, along the axes of the aircraft's own horizon.
@@ -78,7 +78,7 @@ def place_in_frame(
     return Place(np.stack([north, east, -up]), turned, moves)
 
 
-def _ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
+def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
     """Return north, east and down of places, in Earth-centred axes, each (3, n)."""
     east, north, up = (np.stack(axis) for axis in local_axes(lat_deg, lon_deg))
     return [north, east, -up]

@@ -149,6 +149,10 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "updated_s": ("s", "", "when the last measurement in it was made"),
         "contributors": ("", "", "sensors that ever updated it, joined by +"),
         "updated_by": ("", "", "sensors of its last update, joined by +"),
+        **{
+            f"own_{axis}_m": ("m", _FRAME, f"where the ownship believed to be then, {axis}")
+            for axis in ("north", "east", "down")
+        },
         "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
         "origin_lon_deg": ("deg", _WGS84, "its longitude"),
         "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),

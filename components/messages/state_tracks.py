@@ -58,6 +58,8 @@ class StateTracks(Message):
         start of the run.
     contributors, updated_by : (entries,) of int
         Sensors that ever updated it, and those of its last update, as in `FusedDetections`.
+    own_north_m, own_east_m, own_down_m : (entries,)
+        Where in the frame the ownship believed to be at that look.
     origin_lat_deg, origin_lon_deg, origin_alt_m : (entries,)
         Origin of the frame (WGS 84): where the ownship believed to be at its first look.
     extras : dict of (entries,)
@@ -94,6 +96,9 @@ class StateTracks(Message):
     updated_by: IntArray = per_entry(
         column="text", value=lambda m: combination_text(m.updated_by, m.sensors)
     )
+    own_north_m: FloatArray = per_entry(column="float64")
+    own_east_m: FloatArray = per_entry(column="float64")
+    own_down_m: FloatArray = per_entry(column="float64")
     origin_lat_deg: FloatArray = per_entry(column="float64")
     origin_lon_deg: FloatArray = per_entry(column="float64")
     origin_alt_m: FloatArray = per_entry(column="float64")
@@ -125,5 +130,6 @@ class StateTracks(Message):
 _NUMBERS = (
     "existence", "north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s",
     "azimuth_rad", "elevation_rad", "azimuth_variance_rad2", "elevation_variance_rad2",
-    "age_s", "state_s", "updated_s", "origin_lat_deg", "origin_lon_deg", "origin_alt_m",
+    "age_s", "state_s", "updated_s", "own_north_m", "own_east_m", "own_down_m",
+    "origin_lat_deg", "origin_lon_deg", "origin_alt_m",
 )  # fmt: skip

@@ -14,8 +14,9 @@ from components.metrics.set_distances import assigned, chi_square_bounds, set_di
 from components.metrics.true_states import RecordedTruth
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Parameters
+from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
@@ -48,6 +49,11 @@ _RESULTS = {
 class TrackingParameters(Parameters):
     """When tracks are compared with the truth, and what belongs together."""
 
+    block: str | None = Field(
+        default=None,
+        description="Whose tracks; results then bear its name. By default those of the blocks "
+        "whose tracks go into no other's.",
+    )
     step_s: float = Field(
         default=0.5, gt=0, le=60, description="Time from one comparison to the next, s."
     )
@@ -90,30 +96,39 @@ class Tracking(Metric):
     Parameters = TrackingParameters
     tables = {
         _TABLE: (
-            "time_s", "state_s", "track", "track_status", "has_range", *_STATE, *_ORIGIN,
+            "block", "time_s", "state_s", "track", "track_status", "has_range", *_STATE, *_ORIGIN,
             *COVARIANCE.values(),
         ),
         "detections": ("time_s", "target"),
     }  # fmt: skip
 
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        known, block = recorded_by(scene, _TABLE), self.p.block
+        if block is not None and block not in known:
+            raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")
+
     def results(self) -> list[Result]:
         """Return errors, honesty, distances of sets, and identities."""
-        return [Result(name, NUMBER, says) for name, says in _RESULTS.items()]
+        of = "" if self.p.block is None else f".{self.p.block}"
+        return [Result(name + of, NUMBER, says) for name, says in _RESULTS.items()]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all of every replica."""
         columns: Any = group.tables[_TABLE]
-        found = {name: np.full(len(group), np.nan) for name in _RESULTS}
+        of = "" if self.p.block is None else f".{self.p.block}"
+        found = {name + of: np.full(len(group), np.nan) for name in _RESULTS}
         held = np.isin(columns["track_status"].codes, _codes(columns["track_status"].names))
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
-            mine = np.flatnonzero(replica == number)
+            told = _told_by(columns["block"], scene, self.p.block)
+            mine = np.flatnonzero((replica == number) & told)
             first = _first_detections(group.tables["detections"], number)
             values = self._of_run(
                 columns, mine, held, scene, first, float(group.duration_s[number])
             )
             for name, value in values.items():
-                found[name][number] = value
+                found[name + of][number] = value
         return found
 
     def _of_run(
@@ -190,6 +205,19 @@ class Tracking(Metric):
             tally.numbers.setdefault(target, []).append(int(numbers[track]))
             tally.since.setdefault(target, time_s)
             tally.owned.add(int(numbers[track]))
+
+
+def _told_by(column: Any, scene: Scene, block: str | None) -> Any:
+    """Return which rows are of the block that is asked for, or of those that are last."""
+    names = column.names
+    if block is None:
+        fed = {
+            source for source, target in scene.graph.edges if source in names and target in names
+        }
+        wanted = [i for i, name in enumerate(names) if name not in fed]
+    else:
+        wanted = [i for i, name in enumerate(names) if name == block]
+    return np.isin(column.codes, wanted)
 
 
 def _summed(

@@ -1,6 +1,19 @@
-"""Whether Stone Soup is there; it is imported only where it is used."""
+"""Whether Stone Soup is there, and what makes its trackers repeatable.
 
+Stone Soup holds tracks and detections in sets, whose order is that of addresses in memory, and
+draws from NumPy's and Python's global generators. Neither may show in a recording: while a tracker
+works, objects are ordered by when they were first put into a set, and draws come from a state of
+its own.
+"""
+
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import count
+from typing import Any
+
+import numpy as np
 
 
 def needs_stone_soup(what: str) -> None:
@@ -18,3 +31,46 @@ def needs_stone_soup(what: str) -> None:
     """
     if find_spec("stonesoup") is None:
         raise ImportError(f"{what} needs Stone Soup: pip install 'dsa-des[stonesoup]'")
+
+
+class Repeatable:
+    """What a tracker's order and draws follow from.
+
+    Parameters
+    ----------
+    seed : int
+        From 0; its low 32 bits count.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._numbers = count()
+        self._draws = np.random.RandomState(seed % 2**32).get_state()
+        self._python = random.Random(seed).getstate()
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        """Let Stone Soup work meanwhile; afterwards all is as it was for others."""
+        from stonesoup.base import Base
+
+        numbers = self._numbers
+
+        def place(thing: Any) -> int:
+            own = object.__getattribute__(thing, "__dict__")
+            if "_dsa_des_place" not in own:
+                own["_dsa_des_place"] = next(numbers)
+            found: int = own["_dsa_des_place"]
+            return found
+
+        # The global generators are what Stone Soup draws from.
+        theirs, pythons = np.random.get_state(), random.getstate()  # noqa: NPY002
+        before = Base.__hash__
+        Base.__hash__ = place
+        np.random.set_state(self._draws)  # noqa: NPY002
+        random.setstate(self._python)
+        try:
+            yield
+        finally:
+            self._draws, self._python = np.random.get_state(), random.getstate()  # noqa: NPY002
+            np.random.set_state(theirs)  # noqa: NPY002
+            random.setstate(pythons)
+            Base.__hash__ = before

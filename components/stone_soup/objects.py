@@ -6,6 +6,7 @@ there is one, in the axes nose, left wing, roof: the elevation is ours, the bear
 counter-clockwise and so our azimuth with the other sign.
 """
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -48,9 +49,16 @@ class Poses:
     ----------
     place : Place
         Of n sensors in the frame north, east, down.
+    mapping : sequence of int
+        Where x, y and z stand in a state.
+    state_size : int
+        How many components a state has.
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(
+        self, place: Place, mapping: Sequence[int] = POSITION, state_size: int = 6
+    ) -> None:
+        self._mapping, self._size = tuple(mapping), state_size
         north, east, down = place.position_m
         self._offset = np.stack([east, north, -down])
         self._angles = rotation_offsets(place.to_body)
@@ -63,7 +71,7 @@ class Poses:
         """Return roll, pitch and yaw of sensor i (`components.stone_soup.rotation`)."""
         return StateVector(self._angles[:, i])
 
-    def model(self, i: int, variances: FloatArray, ndim_state: int = 6) -> Any:
+    def model(self, i: int, variances: FloatArray) -> Any:
         """Return what sensor i would measure of a state, and how well.
 
         Parameters
@@ -71,15 +79,13 @@ class Poses:
         i : int
         variances : (2,) or (3,)
             Of elevation, azimuth and, where it is measured, range.
-        ndim_state : int
-            Length of the states of the tracker.
         """
         kind = (
             CartesianToElevationBearingRange if len(variances) == 3 else CartesianToElevationBearing
         )
         return kind(
-            ndim_state=ndim_state,
-            mapping=POSITION,
+            ndim_state=self._size,
+            mapping=self._mapping,
             noise_covar=np.diag(variances),
             translation_offset=self.position(i),
             rotation_offset=self.orientation(i),
@@ -106,7 +112,6 @@ def detections(
     measured: FloatArray,
     variance: FloatArray,
     metadata: "list[dict[str, Any]]",
-    ndim_state: int = 6,
 ) -> set[Detection]:
     """Return detections of one look.
 
@@ -120,7 +125,6 @@ def detections(
         Azimuth, elevation and range, as our sensors give them; NaN where there is no range.
     metadata : list of dict
         What each carries besides.
-    ndim_state : int
     """
     found = set()
     for k, i in enumerate(which):
@@ -134,7 +138,7 @@ def detections(
         one = NumberedDetection(
             StateVector(vector),
             timestamp=when,
-            measurement_model=poses.model(i, variance[rows, k], ndim_state),
+            measurement_model=poses.model(i, variance[rows, k]),
             metadata=metadata[k],
         )
         one.number = k

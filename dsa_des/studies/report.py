@@ -16,8 +16,9 @@ from typing import Any
 
 from dsa_des.record.version import __version__
 from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.labels import short
 from dsa_des.studies.output import Tables, cut_off_text
-from dsa_des.studies.printing import interval_text, short
+from dsa_des.studies.printing import interval_text
 from dsa_des.studies.safe_files import read_regular
 from dsa_des.studies.study import run_command
 from dsa_des.text.safe_text import printable, shortened

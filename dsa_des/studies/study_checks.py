@@ -115,6 +115,10 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
+    for number, wanted in enumerate(study.requirements):
+        if wanted.metric not in names:
+            message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
+            add(("requirements", number, "metric"), message, wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure["kind"] != "run" and figure["metric"] not in names:
             message = "no metric of the study gives it"

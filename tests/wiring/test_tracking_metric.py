@@ -68,3 +68,20 @@ def test_what_is_far_away_is_missed_and_false():
     one = measured(wrong, {**keys, "within_m": 60.0, "order": 1.0})
     assert one["track_gospa_missed_m"] == pytest.approx(60.0 / 2.0)
     assert far["track_ospa_m"] == pytest.approx(100.0, rel=0.2)
+
+
+@covers("block", of=("[metric tracking]",))
+def test_one_block_s_tracks_count():
+    """Of a chain of trackers the last one's count, or those of the block that is named."""
+    both = scene()
+    both["blocks"]["fused"] = {"type": "fusion.covariance_intersection", "tentative": True}
+    both["wires"].append("tracker -> fused")
+    told = measured(both, {"metric": "tracking", "step_s": 0.25})
+    mine = measured(both, {"metric": "tracking", "step_s": 0.25, "block": "tracker"})
+    last = measured(both, {"metric": "tracking", "step_s": 0.25, "block": "fused"})
+    assert told["track_ambiguity"] == last["track_ambiguity.fused"] == 1.0
+    assert told["track_position_error_m"] == last["track_position_error_m.fused"]
+    alone = measured(scene(), {"metric": "tracking", "step_s": 0.25})
+    assert mine["track_nees_mean.tracker"] == alone["track_nees_mean"]
+    with pytest.raises(Exception, match="'fusd' tells no tracks; did you mean 'fused'"):
+        measured(both, {"metric": "tracking", "block": "fusd"})

@@ -1,0 +1,152 @@
+"""Two estimates made one where nobody knows how their errors hang together.
+
+Covariance intersection weighs the information of the two by w and 1 - w. What comes out is never
+too sure, whatever the correlation of their errors. Source: S. J. Julier, J. K. Uhlmann, "A
+non-divergent estimation algorithm in the presence of unknown correlations", Proc. American Control
+Conference, 1997, p. 2369-2373, eq. 6-8; weight by the least determinant or trace as there.
+
+Both estimates are brought into the axes in which the first one's covariance is the identity and
+the second one's information diagonal (eigenvalues λ): then the best weight is the root of a
+function of one variable that only falls.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from components.estimation.batched import (
+    cholesky,
+    product,
+    product_transposed,
+    solve_lower,
+    solve_upper,
+    symmetric,
+    times,
+)
+from dsa_des.arrays.types import FloatArray
+
+#: What the weight makes least, or how estimates are combined without one.
+Rule = Literal["determinant", "trace", "independent"]
+
+_STEPS = 60
+# A weight is good when it moves by no more than this.
+_CLOSE = 1e-15
+
+
+def combined(
+    covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a second piece of information does to estimates.
+
+    Parameters
+    ----------
+    covariance : (d, d, n)
+        P of the first estimate.
+    information : (d, d, n)
+        B of the second piece, along the same axes: the inverse of an estimate's covariance, or
+        HᵀR⁻¹H of one that tells less than the whole state.
+    pull : (d, n)
+        B times how far the second estimate lies from the first, or HᵀR⁻¹ times the residual.
+    rule : {"determinant", "trace", "independent"}
+        ``determinant`` takes the weight w that makes the determinant of
+        (w P⁻¹ + (1 - w) B)⁻¹ least; ``trace`` that of its first three rows and columns, the
+        position; ``independent`` adds P⁻¹ + B, which is right only if the errors have nothing in
+        common.
+
+    Returns
+    -------
+    shift : (d, n)
+        How far the combined estimate lies from the first.
+    covariance : (d, d, n)
+    weight : (n,)
+        Of the first estimate; 1 for both together where they are taken to be independent.
+    """
+    root = cholesky(covariance)
+    scaled = product(product(root.swapaxes(0, 1), information), root)
+    # LAPACK takes matrix by matrix: the result does not depend on the company.
+    values, axes = np.linalg.eigh(np.ascontiguousarray(symmetric(scaled).transpose(2, 0, 1)))
+    eigenvalues = np.maximum(values.T, 0.0)
+    turned = product(root, np.ascontiguousarray(axes.transpose(1, 2, 0)))
+    if rule == "independent":
+        weight, share = np.ones(covariance.shape[-1]), np.ones(covariance.shape[-1])
+    else:
+        cost = np.ones_like(eigenvalues)
+        if rule == "trace":
+            cost = turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2
+        weight = best_weight(eigenvalues, cost, 1 if rule == "determinant" else 2)
+        share = 1.0 - weight
+    spread = 1.0 / (weight + share * eigenvalues)
+    found = symmetric(product_transposed(turned * spread, turned))
+    return share * times(found, pull), found, weight
+
+
+def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatArray:
+    """Return the root in [0, 1] of Σ cost (1 - λ) / (w + (1 - w) λ)^power, or the end it is beyond.
+
+    Parameters
+    ----------
+    eigenvalues, cost : (d, n)
+    power : {1, 2}
+        1 for the determinant, 2 for the trace.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        By Newton's steps, halving where they leave the bracket; each element by itself.
+    """
+    excess = cost * (1.0 - eigenvalues)
+
+    def slope(weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+        mixed = weight + (1.0 - weight) * eigenvalues
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            term = excess / mixed**power
+            value = _summed(term)
+            change = -power * _summed(term * (1.0 - eigenvalues) / mixed)
+        return value, change
+
+    count = eigenvalues.shape[-1]
+    low, high = np.zeros(count), np.ones(count)
+    weight = np.full(count, 0.5)
+    # A piece that tells nothing of some direction must not stand alone.
+    ends_low = (eigenvalues > 0.0).all(axis=0) & (slope(low)[0] <= 0.0)
+    ends_high = slope(high)[0] >= 0.0
+    busy = ~(ends_low | ends_high)
+    for _ in range(_STEPS):
+        if not busy.any():
+            break
+        value, change = slope(weight)
+        low, high = np.where(value > 0.0, weight, low), np.where(value > 0.0, high, weight)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = weight - value / change
+        middle = 0.5 * (low + high)
+        new = np.where((new > low) & (new < high), new, middle)
+        moved = np.abs(new - weight)
+        weight = np.where(busy, new, weight)
+        busy &= moved > _CLOSE
+    return np.where(ends_high, 1.0, np.where(ends_low, 0.0, weight))
+
+
+def inverse(covariance: FloatArray) -> FloatArray:
+    """Return the inverses of positive definite matrices (d, d, n)."""
+    root = cholesky(covariance)
+    size = len(covariance)
+    identity = np.repeat(np.eye(size)[:, :, np.newaxis], covariance.shape[-1], axis=2)
+    # The roots have the tracks on their last axis, the right sides a column before it.
+    whole = [
+        solve_upper(root, solve_lower(root, np.ascontiguousarray(identity[:, j])))
+        for j in range(size)
+    ]
+    return symmetric(np.stack(whole, axis=1))
+
+
+def distance_squared(apart: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return squared Mahalanobis distances of differences (d, n) with covariances (d, d, n)."""
+    scaled = solve_lower(cholesky(covariance), apart)
+    return _summed(scaled * scaled)
+
+
+def _summed(values: FloatArray) -> FloatArray:
+    total = values[0].copy()
+    for value in values[1:]:
+        total += value
+    return total

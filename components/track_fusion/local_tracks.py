@@ -1,0 +1,209 @@
+"""The tracks of several trackers in one frame: what each told last, and how that goes on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
+
+import numpy as np
+
+from components.estimation.batched import times
+from components.estimation.frame import Place
+from components.estimation.frame_change import frame_change
+from components.estimation.motion import ConstantVelocity
+from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_OWN = ("own_north_m", "own_east_m", "own_down_m")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+#: Tracks of one tracker in a run are fewer than this.
+_NUMBERS = 1 << 36
+
+
+@dataclass(frozen=True, eq=False)
+class LocalTracks:
+    """Tracks of several trackers, in the frame of the replica that they belong to.
+
+    Parameters
+    ----------
+    replica, tracker, number : (n,) of int
+        The tracker by its place among all of the scene, and its own number of the track.
+    system : (n,) of int
+        Number of the fused track that it belongs to; 0 for none yet.
+    status : (n,) of int
+    existence : (n,)
+    ranged : (n,) of bool
+    state, covariance : (6, n), (6, 6, n)
+        Of a track without a range 0 and the identity.
+    azimuth_rad, elevation_rad : (n,)
+        Direction along the tracker's own axes, and its variances.
+    azimuth_variance_rad2, elevation_variance_rad2 : (n,)
+    own_m : (3, n)
+        Where the ownship believed to be then.
+    turn : (3, 3, n)
+        Turns the tracker's axes into those of the frame.
+    time_s : (n,)
+        The instant that all this speaks of.
+    updated_s : (n,)
+    contributors, updated_by : (n,) of int
+        Masks over all sensors.
+    """
+
+    replica: IntArray
+    tracker: IntArray
+    number: IntArray
+    system: IntArray
+    status: IntArray
+    existence: FloatArray
+    ranged: BoolArray
+    state: FloatArray
+    covariance: FloatArray
+    azimuth_rad: FloatArray
+    elevation_rad: FloatArray
+    azimuth_variance_rad2: FloatArray
+    elevation_variance_rad2: FloatArray
+    own_m: FloatArray
+    turn: FloatArray
+    time_s: FloatArray
+    updated_s: FloatArray
+    contributors: IntArray
+    updated_by: IntArray
+
+    def __len__(self) -> int:
+        return len(self.replica)
+
+    def take(self, which: AnyArray) -> Self:
+        """Return some of them."""
+        return type(self)(**{f.name: getattr(self, f.name)[..., which] for f in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return those of all parts, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            **{
+                f.name: np.concatenate([getattr(part, f.name) for part in parts], axis=-1)
+                for f in fields(cls)
+            }
+        )
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no tracks."""
+        shapes: Mapping[str, tuple[int, ...]] = {
+            "state": (6, 0), "covariance": (6, 6, 0), "own_m": (3, 0), "turn": (3, 3, 0),
+        }  # fmt: skip
+        whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by")
+        types = {**dict.fromkeys(whole, np.int64), "ranged": np.bool_}
+        return cls(
+            **{
+                f.name: np.empty(shapes.get(f.name, (0,)), types.get(f.name, np.float64))
+                for f in fields(cls)
+            }
+        )
+
+    def key(self) -> IntArray:
+        """Return a number for each that no other track bears, also later."""
+        trackers = 64
+        return (self.replica * trackers + self.tracker) * _NUMBERS + self.number
+
+    def at(self, time_s: FloatArray, motion: ConstantVelocity) -> tuple[FloatArray, FloatArray]:
+        """Return states and covariances at instants (n,) that are not before their own."""
+        return motion.predict(self.state, self.covariance, time_s - self.time_s)
+
+    def with_systems_of(self, old: Self) -> Self:
+        """Return them with the fused tracks that they belonged to before."""
+        if len(old) == 0 or len(self) == 0:
+            return self
+        known = old.key()
+        order = np.argsort(known)
+        mine = self.key()
+        place = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
+        return replace(self, system=np.where(known[place] == mine, old.system[place], 0))
+
+    def place(self) -> Place:
+        """Return from where, and along which axes, each tells its direction."""
+        return Place(self.own_m, self.turn.swapaxes(0, 1))
+
+    def direction(self) -> tuple[FloatArray, FloatArray]:
+        """Return azimuth and elevation along the frame's axes."""
+        level = np.cos(self.elevation_rad)
+        unit = np.stack(
+            [level * np.cos(self.azimuth_rad), level * np.sin(self.azimuth_rad),
+             -np.sin(self.elevation_rad)]
+        )  # fmt: skip
+        north, east, down = times(self.turn, unit)
+        return np.arctan2(east, north), np.arctan2(-down, np.hypot(north, east))
+
+
+def local_tracks(
+    message: StateTracks,
+    replica: IntArray,
+    tracker: int,
+    origin_deg_m: FloatArray,
+    masks: Sequence[int],
+    tentative: bool,
+) -> tuple[LocalTracks, IntArray]:
+    """Return the tracks of a message in the frames of their replicas, and the row of each.
+
+    Parameters
+    ----------
+    message : StateTracks
+    replica : (rows,)
+    tracker : int
+    origin_deg_m : (3, rows)
+        Of the frame of each row's replica.
+    masks : sequence of int
+        Bit of each of the message's sensors among all.
+    tentative : bool
+        Whether tentative tracks count; deleted ones never do.
+    """
+    row = np.repeat(np.arange(len(message)), np.diff(message.offsets))
+    kept = message.track_status != DELETED
+    if not tentative:
+        kept &= message.track_status != TENTATIVE
+    which = np.flatnonzero(kept)
+    row = row[which]
+
+    def column(name: str) -> Any:
+        return getattr(message, name)[which]
+
+    ranged = column("has_range")
+    state = np.stack([np.where(ranged, column(name), 0.0) for name in _STATE])
+    covariance = np.empty((6, 6, len(which)))
+    for (i, j), name in COVARIANCE.items():
+        value = np.where(ranged, message.covariance[name][which], float(i == j))
+        covariance[i, j] = covariance[j, i] = value
+    change = frame_change(np.stack([column(name) for name in _ORIGIN]), origin_deg_m[:, row])
+    found = LocalTracks(
+        replica=replica[row],
+        tracker=np.full(len(which), tracker, dtype=np.int64),
+        number=column("track"),
+        system=np.zeros(len(which), dtype=np.int64),
+        status=column("track_status"),
+        existence=column("existence"),
+        ranged=ranged,
+        state=np.where(ranged, change.states(state), 0.0),
+        covariance=change.covariances(covariance),
+        azimuth_rad=column("azimuth_rad"),
+        elevation_rad=column("elevation_rad"),
+        azimuth_variance_rad2=column("azimuth_variance_rad2"),
+        elevation_variance_rad2=column("elevation_variance_rad2"),
+        own_m=change.positions(np.stack([column(name) for name in _OWN])),
+        turn=change.turn,
+        time_s=column("state_s"),
+        updated_s=column("updated_s"),
+        contributors=_among_all(column("contributors"), masks),
+        updated_by=_among_all(column("updated_by"), masks),
+    )
+    return found, row
+
+
+def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
+    """Return masks over a tracker's own sensors as masks over those of all."""
+    found = np.zeros(len(mask), dtype=np.int64)
+    for i, bit in enumerate(masks):
+        found |= np.where(mask >> i & 1 == 1, np.int64(bit), 0)
+    return found

@@ -1,0 +1,232 @@
+"""A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from components.estimation.frame import Place, place_in_frame
+from components.estimation.measurement import Kind, linearised
+from components.messages.columns import COVARIANCE
+from components.messages.fused import FusedDetections
+from components.messages.state_tracks import StateTracks
+from components.sensor.marks import TRACKER
+from components.stone_soup.library import Repeatable, needs_stone_soup
+from components.tracking.scans import Scans, scans_of, when_made
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Component, Parameters
+from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.source_file import absolute
+from dsa_des.block.strangers import Left, strangers_code
+from dsa_des.block.wake import Wake
+from dsa_des.time.randomness import key_of
+
+if TYPE_CHECKING:
+    from components.stone_soup.followed import Followed
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+
+
+def _builder(value: Any) -> Any:
+    """Return a name with the file written out; a bare ``file.py`` lies beside the scene."""
+    if not isinstance(value, str):
+        return value
+    file = value.rpartition(":")[0]
+    if file.endswith(".py") and "/" not in file:
+        folder = getattr(value, "folder", None)
+        value = f"./{value}" if folder is None else f"{folder}/{value}"
+    return absolute(value)
+
+
+class StoneSoupParameters(Parameters):
+    """What is built, and how its states are laid out."""
+
+    builder: Annotated[str, BeforeValidator(_builder)] = Field(
+        description="The function that builds the tracker: my_tracker.py:build, beside the scene, "
+        "or module:build. It is called without arguments.",
+    )
+    position_mapping: tuple[int, int, int] = Field(
+        default=(0, 2, 4), description="Where x, y, z (east, north, up) stand in a state, from 0."
+    )
+    velocity_mapping: tuple[int, int, int] = Field(
+        default=(1, 3, 5), description="Where their rates stand in it."
+    )
+    state_size: int = Field(default=6, ge=6, le=100, description="Components of a state.")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Any:
+        places = (*self.position_mapping, *self.velocity_mapping)
+        if len(set(places)) != 6 or min(places) < 0 or max(places) >= self.state_size:
+            raise ValueError(
+                f"position_mapping = {list(self.position_mapping)} and velocity_mapping = "
+                f"{list(self.velocity_mapping)} must name six components of a state, each once, "
+                f"from 0 to {self.state_size - 1} (state_size = {self.state_size})"
+            )
+        return self
+
+
+class StoneSoupTracker(Component):
+    """Hands every look to a tracker of Stone Soup's, and tells its tracks.
+
+    The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
+    Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
+    `fusion.pass_through` also those in vain. A look that comes after a later one is left out and
+    counted. Tracks that a tracker shows count as confirmed, after a look in vain as coasted.
+    """
+
+    mark = TRACKER
+    inputs = {"fused": Input(FusedDetections, "trigger", "What was measured.")}
+    outputs = {"tracks": Output(StateTracks, "The tracker's tracks.")}
+    Parameters = StoneSoupParameters
+
+    def setup(self) -> None:
+        """Build the tracker.
+
+        Raises
+        ------
+        ImportError
+            The extra ``stonesoup`` is not installed.
+        ValueError
+            The builder cannot be imported, fails, or returns no tracker.
+        """
+        needs_stone_soup("tracking.stonesoup")
+        from components.stone_soup.followed import Follower
+
+        self._ahead: Scans | None = None
+        self._origin: FloatArray | None = None
+        self._newest = -1
+        self._late = 0
+        self._masks: dict[str, int] = {}
+        self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
+        self._repeatable = Repeatable(
+            key_of(getattr(self.context.streams, "seed", 0), self.name, "stone soup")
+        )
+        self._tracker = self._built()
+
+    def _built(self) -> Any:
+        name = self.p.builder
+        try:
+            build = load_named(name, f"blocks.{self.name}.builder")
+        except NotAllowed:
+            return None  # `check --no-import` runs nothing
+        except NotImportable as error:
+            raise ValueError(f"builder = {name}: {error}") from error
+        if not callable(build):
+            raise ValueError(f"builder = {name}: is no function that builds a tracker")
+        try:
+            with strangers_code(), self._repeatable.working():
+                tracker = build()
+        except Left as error:
+            raise ValueError(f"builder = {name}: failed with {error}") from error.__cause__
+        if not callable(getattr(tracker, "update_tracker", None)):
+            raise ValueError(
+                f"builder = {name}: returned {type(tracker).__name__}, which has no "
+                "update_tracker(time, detections) as Stone Soup's trackers have"
+            )
+        return tracker
+
+    def run(self, wake: Wake) -> StateTracks | None:
+        """Hand over what came, look by look, and tell all tracks."""
+        fused = wake["fused"]
+        if fused is None:
+            return None
+        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake)
+        if len(scans) == 0:
+            return None
+        if self._origin is None:
+            self._origin = scans.pose[:3, 0].copy()
+        lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
+        pose = scans.pose
+        places = place_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+                                (pose[3], pose[4], pose[5]))  # fmt: skip
+        told: dict[int, Followed] = {}
+        last = -1
+        for look in range(len(scans)):
+            tick = int(scans.tick[look])
+            if tick < self._newest:
+                self._late += 1
+                continue
+            self._newest, last = tick, look
+            for one in self._looked(fused, scans, look, places, wake):
+                told[one.number] = one
+        if last < 0:
+            return None
+        return self._message(wake, fused.sensors, list(told.values()), places, last)
+
+    def _looked(
+        self, fused: FusedDetections, scans: Scans, look: int, places: Place, wake: Wake
+    ) -> "list[Followed]":
+        """Hand one look over, and return the tracks after it."""
+        from components.stone_soup.objects import Poses, detections, instant
+
+        begin = int(wake.replica[0]) * wake.span_ticks
+        time_s = (int(scans.tick[look]) - begin) / wake.ticks_per_s
+        when = instant(time_s)
+        which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
+        masks = [int(mask) for mask in scans.contributors[which]]
+        names = ["+".join(n for i, n in enumerate(fused.sensors) if m >> i & 1) for m in masks]
+        poses = Poses(
+            places.take(np.array([look])), self.p.position_mapping, self.p.state_size
+        )  # fmt: skip
+        found = detections(
+            poses, [0] * len(masks), when, scans.measured[:3, which], scans.variance[:3, which],
+            [{"sensor": name} for name in names],
+        )  # fmt: skip
+        with self._repeatable.working():
+            _, tracks = self._tracker.update_tracker(when, found)
+            self._masks.update(zip(names, masks, strict=True))
+            return self._follower.told(tracks, time_s, when, self._masks)
+
+    def _message(
+        self, wake: Wake, sensors: tuple[str, ...], told: "list[Followed]", places: Place, look: int
+    ) -> StateTracks:
+        """Return the tracks as a message."""
+        count = len(told)
+        state = np.array([one.state for one in told], dtype=float).reshape(count, 6).T
+        spread = np.array([one.covariance for one in told], dtype=float).reshape(count, 6, 6)
+        spread = np.moveaxis(spread, 0, -1)
+        at = Place(
+            np.repeat(places.position_m[:, [look]], count, axis=1),
+            np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
+        )
+        seen, by_state = linearised(Kind(False), state, at)
+        angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
+        ranged = np.array([one.ranged for one in told], dtype=bool)
+
+        def known(values: FloatArray) -> FloatArray:
+            return np.where(ranged, values, np.nan)
+
+        def column(name: str, kind: type = float) -> Any:
+            return np.array([getattr(one, name) for one in told], dtype=kind)
+
+        assert self._origin is not None
+        lat, lon, alt = (np.full(count, value) for value in self._origin)
+        return StateTracks(
+            tick=wake.ticks[-1:],
+            offsets=np.array([0, count]),
+            track=column("number", np.int64),
+            track_status=column("status", np.int64),
+            existence=np.full(count, np.nan),
+            azimuth_rad=seen[0] % (2.0 * np.pi),
+            elevation_rad=seen[1],
+            azimuth_variance_rad2=angular[0],
+            elevation_variance_rad2=angular[1],
+            has_range=ranged,
+            age_s=column("age_s"),
+            state_s=column("state_s"),
+            updated_s=column("updated_s"),
+            contributors=column("contributors", np.int64),
+            updated_by=column("updated_by", np.int64),
+            origin_lat_deg=lat,
+            origin_lon_deg=lon,
+            origin_alt_m=alt,
+            covariance={name: known(spread[place]) for place, name in COVARIANCE.items()},
+            extras={},
+            sensors=sensors,
+            **{name: known(state[i]) for i, name in enumerate(_STATE)},
+        )  # fmt: skip
+
+    def report(self) -> dict[str, Any]:
+        """Return how many looks came too late."""
+        return {"late_looks": {self.name: self._late}}

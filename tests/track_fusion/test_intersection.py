@@ -1,0 +1,92 @@
+"""Covariance intersection and changes of frame, against computations that are not the project's."""
+
+import mpmath
+import numpy as np
+import pymap3d
+import pytest
+from scipy.optimize import minimize_scalar
+
+from components.estimation.covariance_intersection import combined, inverse
+from components.estimation.frame_change import frame_change
+
+
+def covariances(seed, count):
+    draw = np.random.default_rng(seed)
+    root = draw.normal(size=(count, 6, 6)) * np.exp(draw.normal(size=(count, 6, 1)))
+    return (root @ root.transpose(0, 2, 1)).transpose(1, 2, 0)
+
+
+def cost(rule, first, second, weight):
+    whole = weight * np.linalg.inv(first) + (1.0 - weight) * np.linalg.inv(second)
+    if rule == "determinant":
+        return -np.linalg.slogdet(whole)[1]
+    return np.trace(np.linalg.inv(whole)[:3, :3])
+
+
+@pytest.mark.parametrize("rule", ["determinant", "trace"])
+def test_the_weight_is_that_of_a_numerical_minimum(rule):
+    first, second = covariances(1, 12), covariances(2, 12)
+    apart = np.random.default_rng(3).normal(size=(6, 12))
+    information = inverse(second)
+    pull = np.einsum("ijn,jn->in", information, apart)
+    shift, spread, weight = combined(first, information, pull, rule)
+    inside = 0
+    for k in range(12):
+        p, q = first[..., k], second[..., k]
+        best = minimize_scalar(
+            lambda w, p=p, q=q: cost(rule, p, q, w), bounds=(0, 1), method="bounded",
+            options={"xatol": 1e-10},
+        )  # fmt: skip
+        ends = min(cost(rule, p, q, w) for w in (0.0, 1.0))
+        least = min(best.fun, ends)
+        assert cost(rule, p, q, weight[k]) <= least + 1e-9 * abs(least)
+        w = weight[k]
+        inside += 0.0 < w < 1.0
+        wanted = np.linalg.inv(w * np.linalg.inv(p) + (1 - w) * np.linalg.inv(q))
+        np.testing.assert_allclose(spread[..., k], wanted, rtol=1e-7, atol=1e-9 * wanted.max())
+        moved = wanted @ np.linalg.inv(q) @ apart[:, k] * (1 - w)
+        np.testing.assert_allclose(shift[:, k], moved, rtol=1e-6, atol=1e-9)
+    assert inside >= 6
+
+
+def test_one_case_to_40_digits():
+    """Axes that the two know better in turn, and one of which the second knows more."""
+    first, second = np.diag([4.0, 1.0, 9.0, 1.0, 1.0, 2.0]), np.diag([1.0, 4.0, 2.0, 1.0, 3.0, 2.0])
+    with mpmath.workdps(40):
+        ratio = [mpmath.mpf(a) / mpmath.mpf(b) for a, b in zip(np.diag(first), np.diag(second),
+                                                               strict=True)]  # fmt: skip
+        wanted = mpmath.findroot(lambda w: sum((1 - r) / (w + (1 - w) * r) for r in ratio), 0.5)
+    _, spread, weight = combined(
+        first[..., None], inverse(second[..., None]), np.zeros((6, 1)), "determinant"
+    )
+    assert weight[0] == pytest.approx(float(wanted), rel=1e-14)
+    w = float(wanted)
+    np.testing.assert_allclose(
+        np.diag(spread[..., 0]), 1.0 / (w / np.diag(first) + (1 - w) / np.diag(second)), rtol=1e-13
+    )
+
+
+def test_independent_estimates_add_their_information():
+    first, second = covariances(5, 3), covariances(6, 3)
+    _, spread, _ = combined(first, inverse(second), np.zeros((6, 3)), "independent")
+    for k in range(3):
+        wanted = np.linalg.inv(np.linalg.inv(first[..., k]) + np.linalg.inv(second[..., k]))
+        np.testing.assert_allclose(spread[..., k], wanted, rtol=1e-7, atol=1e-9)
+
+
+def test_a_frame_s_change_is_that_of_the_ellipsoid():
+    old, new = (-41.3, 179.99, 2400.0), (-41.12, -179.86, 1100.0)
+    change = frame_change(np.array(old)[:, None], np.array(new)[:, None])
+    position, velocity = np.array([1200.0, -3400.0, 560.0]), np.array([12.0, -34.0, 5.6])
+    there = pymap3d.ned2ecef(*position, *old)
+    ends = pymap3d.ned2ecef(*(position + velocity), *old)
+    wanted = np.array(pymap3d.ecef2ned(*there, *new))
+    moved = np.array(pymap3d.ecef2ned(*ends, *new)) - wanted
+    state = np.concatenate([position, velocity])[:, None]
+    np.testing.assert_allclose(change.states(state)[:, 0], [*wanted, *moved], atol=2e-8)
+    root = np.random.default_rng(4).normal(size=(6, 6))
+    turn = np.kron(np.eye(2), change.turn[..., 0])
+    wanted = turn @ (root @ root.T) @ turn.T
+    np.testing.assert_allclose(
+        change.covariances((root @ root.T)[..., None])[..., 0], wanted, atol=1e-12
+    )

@@ -1,0 +1,186 @@
+"""Every key of the fusion of tracks reaches what it says; one fused state is computed by hand."""
+
+import math
+
+import crooked
+import numpy as np
+import pymap3d
+import pytest
+from covering import covers
+from scipy.optimize import minimize_scalar
+from wired import HEARS_ALL, SEES_ALL, chain, rows, run
+
+KIND = "fusion.covariance_intersection"
+FINE = {**HEARS_ALL, "azimuth_resolution_deg": 0.3, "elevation_resolution_deg": 0.2,
+        "range_resolution_m": 5.0}  # fmt: skip
+#: A radar that errs otherwise, looks otherwise often, and starts later, in a frame of its own.
+OTHER = {**FINE, "scan_rate_hz": 0.75, "offset_s": 0.4, "range_resolution_m": 40.0,
+         "azimuth_resolution_deg": 0.1}  # fmt: skip
+CAMERA = {**SEES_ALL, "azimuth_pixels": 3600, "elevation_pixels": 1800, "scan_rate_hz": 2}
+#: A tracker that takes what it sees without a range to be about where it is.
+NEAR = {"assumed_range_m": 2500.0, "start_speed_m_s": 150.0}
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+def distributed(sensors, *, targets=(crooked.ROLLING,), duration_s=6, tracker=None, **keys):
+    """A scene in which every sensor has a tracker of its own, and their tracks are fused."""
+    scene = chain(sensors, targets=targets, duration_s=duration_s)
+    scene["blocks"]["fused"] = {"type": KIND, **keys}
+    for name in sensors:
+        scene["blocks"][f"{name}_looks"] = {"type": "fusion.pass_through"}
+        scene["blocks"][f"{name}_tracks"] = {
+            "type": "tracking.ekf", "confirm_m": 2, "confirm_n": 3, **(tracker or {})
+        }  # fmt: skip
+        scene["wires"].append(f"{name} -> {name}_looks -> {name}_tracks -> fused")
+    return rows(run(scene), "state_tracks")
+
+
+def of(found, block, **wanted):
+    return [r for r in found if r["block"] == block and all(r[k] == v for k, v in wanted.items())]
+
+
+def state(row):
+    return np.array([row[name] for name in _STATE])
+
+
+def covariance(row):
+    found = np.empty((6, 6))
+    for name, value in row.items():
+        if name.startswith("covariance_"):
+            i, j = int(name[11]), int(name[12])
+            found[i, j] = found[j, i] = value
+    return found
+
+
+def in_frame(row, origin):
+    """A row's state and covariance at another origin, by pymap3d."""
+    here = [row[name] for name in _ORIGIN]
+    x, p = state(row), covariance(row)
+    zero = np.array(pymap3d.ecef2ned(*pymap3d.ned2ecef(0, 0, 0, *here), *origin))
+    turn = np.array(
+        [np.array(pymap3d.ecef2ned(*pymap3d.ned2ecef(*axis, *here), *origin)) - zero
+         for axis in 1e6 * np.eye(3)]
+    ).T / 1e6  # fmt: skip
+    turned = np.kron(np.eye(2), turn)
+    moved = turned @ x
+    moved[:3] += zero
+    return moved, turned @ p @ turned.T
+
+
+def carried(x, p, dt_s, q):
+    step = np.kron([[1.0, dt_s], [0.0, 1.0]], np.eye(3))
+    noise = np.kron([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]], np.eye(3))
+    return step @ x, step @ p @ step.T + q * noise
+
+
+@covers("acceleration_intensity_m2_s3", "rule", of=(KIND,))
+@pytest.mark.parametrize("rule", ["determinant", "trace", "independent"])
+def test_a_fused_state_is_that_of_a_computation_by_hand(rule):
+    found = distributed({"fast": FINE, "slow": OTHER}, rule=rule, acceleration_intensity_m2_s3=2.5)
+    fused = [r for r in of(found, "fused") if r["contributors"] == "fast+slow"]
+    for row in (fused[0], fused[-1]):
+        origin = [row[name] for name in _ORIGIN]
+        held = []
+        for tracker in ("fast_tracks", "slow_tracks"):
+            told = [r for r in of(found, tracker) if r["time_s"] <= row["time_s"]][-1]
+            x, p = in_frame(told, origin)
+            held.append(carried(x, p, row["state_s"] - told["state_s"], 2.5))
+        (x, p), (y, q) = held
+        a, b = np.linalg.inv(p), np.linalg.inv(q)
+        if rule == "independent":
+            wanted = np.linalg.inv(a + b)
+            moved = wanted @ (a @ x + b @ y)
+        else:
+
+            def cost(w, a=a, b=b):
+                if rule == "determinant":
+                    return -np.linalg.slogdet(w * a + (1 - w) * b)[1]
+                return np.trace(np.linalg.inv(w * a + (1 - w) * b)[:3, :3])
+
+            w = minimize_scalar(cost, bounds=(0, 1), method="bounded", options={"xatol": 1e-11}).x
+            wanted = np.linalg.inv(w * a + (1 - w) * b)
+            moved = wanted @ (w * a @ x + (1 - w) * b @ y)
+        assert row["state_s"] == max(r["state_s"] for r in found if r["time_s"] <= row["time_s"])
+        np.testing.assert_allclose(state(row), moved, rtol=1e-5, atol=1e-3)
+        np.testing.assert_allclose(covariance(row), wanted, rtol=1e-4, atol=1e-3)
+
+
+def test_frames_differ_and_the_fused_track_is_where_the_target_is():
+    found = distributed({"fast": FINE, "slow": OTHER})
+    frames = {name: of(found, name)[0]["origin_lat_deg"] for name in ("fast_tracks", "slow_tracks")}
+    assert frames["fast_tracks"] != frames["slow_tracks"]
+    last = of(found, "fused")[-1]
+    assert {r["track"] for r in of(found, "fused")} == {1}
+    place = crooked.position(crooked.ROLLING, last["state_s"])
+    origin = [last[name] for name in _ORIGIN]
+    apart = state(last)[:3] - np.array(pymap3d.ecef2ned(*place, *origin))
+    assert np.linalg.norm(apart) < 30.0
+    own = crooked.position(crooked.OWNSHIP, last["state_s"])
+    wanted = pymap3d.ecef2ned(*own, *origin)
+    assert [last[f"own_{a}_m"] for a in ("north", "east", "down")] == pytest.approx(wanted, abs=0.5)
+
+
+def test_a_camera_s_direction_narrows_a_radar_s_track():
+    sensors = {"radar": {**FINE, "azimuth_resolution_deg": 2.0}, "camera": CAMERA}
+    found = distributed(sensors, duration_s=8, tracker=NEAR)
+    last = of(found, "fused")[-1]
+    assert last["contributors"] == "radar+camera"
+    assert last["has_range"]
+    assert {r["track"] for r in of(found, "fused", has_range=True)} == {last["track"]}
+    radar = of(found, "radar_tracks")[-1]
+    assert last["azimuth_variance_rad2"] < 0.3 * radar["azimuth_variance_rad2"]
+    camera = distributed({"camera": CAMERA}, duration_s=2, tracker=NEAR)
+    (told,), (mine,) = (of(camera, name, time_s=1.5) for name in ("fused", "camera_tracks"))
+    for name in ("azimuth_rad", "elevation_rad", "azimuth_variance_rad2"):
+        assert told[name] == pytest.approx(mine[name], rel=1e-12), name
+    assert told["has_range"] is False and told["north_m"] is None
+
+
+@covers("gate_probability", "stay_factor", of=(KIND,))
+def test_tracks_beyond_the_gate_are_two_and_stay_one_within_the_wider():
+    sensors = {"fast": FINE, "slow": OTHER}
+
+    def numbers(**keys):
+        return len({r["track"] for r in of(distributed(sensors, **keys), "fused")})
+
+    assert numbers() == 1
+    assert numbers(gate_probability=1e-9) == 2
+    # Once together, only the wider gate counts.
+    assert numbers(gate_probability=0.5, stay_factor=1.0) == 2
+    assert numbers(gate_probability=0.5, stay_factor=2.0) == 1
+
+
+@covers("tentative", "drop_after_s", of=(KIND,))
+def test_who_takes_part():
+    sensors = {"fast": FINE}
+    assert of(distributed(sensors), "fused")[0]["track_status"] == "confirmed"
+    assert of(distributed(sensors, tentative=True), "fused")[0]["track_status"] == "tentative"
+    away = {**crooked.ROLLING, "speed_mps": 150.0, "heading_deg": 250.0}
+    near = {**FINE, "range_km": 3.0}
+    keep = {"delete_misses": 50, "delete_after_s": 50.0, "delete_above_m": 1e6}
+
+    def ends(**keys):
+        found = of(distributed({"fast": near}, targets=[away], duration_s=12, tracker=keep, **keys),
+                   "fused")  # fmt: skip
+        (gone,) = [r["time_s"] for r in found if r["track_status"] == "deleted"] or (math.inf,)
+        return gone - max(r["updated_s"] for r in found)
+
+    assert ends(drop_after_s=2.0) == 3.0
+    assert ends(drop_after_s=30.0) == math.inf
+
+
+@covers("bearing_rate_deg_s", of=(KIND,))
+def test_directions_of_two_instants_may_differ_by_the_rate():
+    fast = {**crooked.ROLLING, "east_m": -700.0, "north_m": -300.0, "speed_mps": 150.0}
+    sensors = {"one": CAMERA, "other": {**CAMERA, "scan_rate_hz": 1, "offset_s": 0.25}}
+
+    def numbers(rate):
+        found = distributed(
+            sensors, targets=[fast], duration_s=4, bearing_rate_deg_s=rate, stay_factor=1.0,
+            tracker={**NEAR, "assumed_range_m": 900.0},
+        )  # fmt: skip
+        return {r["track"] for r in of(found, "fused")}
+
+    assert numbers(40.0) == {1}
+    assert len(numbers(0.0)) > 1
