@@ -146,7 +146,7 @@ class Replicas(Timeline):
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
             return False
-        if self.time.side_by_side and not type(component).side_by_side:
+        if self.time.side_by_side and not component.goes_side_by_side():
             return False
         if name in self._watched:
             return not self._watched[name].read
