@@ -9,7 +9,7 @@ from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_table import without_memory
 from components.alerting.levels import due_levels, memory_rule, violation_times_s
-from components.alerting.memory import AlertMemory
+from components.alerting.lasting_memory import LastingMemory
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
@@ -70,6 +70,8 @@ class DaidalusAlerting(Component):
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
 
     def request(self, port: str) -> Any:
         """Ask for no poses beside what is fused: the ownship's own come with the states."""
@@ -99,31 +101,48 @@ class DaidalusAlerting(Component):
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
         for arrived in wake.arrivals("states"):
-            self._take_states(arrived)
+            self._take_states(arrived, wake)
         if self._roster is None:
             return None
         if self._source:
             for arrived in wake.arrivals(self._source):
-                self._take_sights(arrived)
+                self._take_sights(arrived, wake)
         ticks = wake.ticks[wake.scans >= 0]
-        return self._levels(ticks) if len(ticks) else None
+        begins = self._begins(ticks, wake)
+        place = np.searchsorted(self._own_came, begins)
+        # Before the first state of a run has come, it has no levels.
+        come = self._own_came[np.minimum(place, len(self._own_came) - 1)]
+        known = (come >= begins) & (come <= ticks)
+        if not known.all():
+            ticks, begins, place = ticks[known], begins[known], place[known]
+        return self._levels(ticks, begins, place, wake) if len(ticks) else None
 
-    def _take_states(self, arrived: Arrivals) -> None:
+    def _begins(self, ticks: IntArray, wake: Wake) -> IntArray:
+        """Return where the runs of some instants begin."""
+        return ticks - wake.own_ticks(ticks) if wake.span_ticks else np.zeros_like(ticks)
+
+    def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
         """Remember the ownship's attitude, and where the targets are if that is believed."""
         states: TrafficStates = arrived.message
         if self._roster is None:
             self._roster = states.roster
             self._fit = StraightFit(self.p.fit_s, len(states.roster))
-            self._memory = AlertMemory(memory_rule(self._configuration), len(states.roster))
+            self._memory = LastingMemory(memory_rule(self._configuration), len(states.roster))
         place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         self._own_came = np.concatenate([self._own_came, arrived.tick])
-        # Of those that overtook each other on the way, the newest counts.
         ticks = np.concatenate([self._own_tick, states.tick])
-        self._own_tick = np.maximum.accumulate(ticks)
         self._own_place = np.concatenate([self._own_place, np.stack(place, axis=1)])
         if self._source:
             angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
             self._attitude = np.concatenate([self._attitude, np.stack(angles, axis=1)])
+        if wake.side_by_side:  # those of each replica together
+            order = np.argsort(self._own_came, kind="stable")
+            ticks, self._own_came = ticks[order], self._own_came[order]
+            self._own_place = self._own_place[order]
+            self._attitude = self._attitude[order] if self._source else self._attitude
+        # Of those that overtook each other on the way, the newest counts.
+        self._own_tick = np.maximum.accumulate(ticks)
+        if self._source:
             return
         own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
         east, north = east_north_m(np.radians(states.lat_deg), np.radians(states.lon_deg), *own)
@@ -131,9 +150,9 @@ class DaidalusAlerting(Component):
         position = np.full((len(states), len(self._roster), 3), np.nan)
         there = np.where(states.present[:, :, np.newaxis], np.stack([east, north, up], -1), np.nan)
         position[:, states.columns] = there
-        self._fit.add(arrived.tick, states.tick / self.context.ticks_per_s, position)
+        self._fit.add(arrived.tick, wake.own_ticks(states.tick) / wake.ticks_per_s, position)
 
-    def _take_sights(self, arrived: Arrivals) -> None:
+    def _take_sights(self, arrived: Arrivals, wake: Wake) -> None:
         """Turn what was measured in body axes into positions east, north and up."""
         sights = arrived.message
         row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
@@ -145,7 +164,7 @@ class DaidalusAlerting(Component):
             np.searchsorted(self._own_tick, sights.measured_tick, side="right"),
             np.searchsorted(self._own_came, arrived.tick[row], side="right"),
         )
-        new &= place > 0
+        new &= place > np.searchsorted(self._own_came, self._begins(arrived.tick, wake))[row]
         row, place = row[new], place[new] - 1
         yaw, pitch, roll = self._attitude[place].T
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
@@ -157,62 +176,81 @@ class DaidalusAlerting(Component):
         line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
         position = np.full((len(made), len(self._roster), 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
-        self._fit.add(came, made / self.context.ticks_per_s, position)
+        self._fit.add(came, wake.own_ticks(made) / wake.ticks_per_s, position)
 
-    def _levels(self, ticks: IntArray) -> AlertLevels:
-        """Return the levels at some scans."""
-        times = (ticks / self.context.ticks_per_s).tolist()
-        fitted = [
-            self._fit.states(int(tick), now_s)
-            for tick, now_s in zip(ticks.tolist(), times, strict=True)
-        ]
-        self._fit.forget_before(times[-1])
-        own = self._own_states(ticks)
-        self._forget_poses(int(ticks[-1]))
-        known = np.stack([one for one, _ in fitted])
+    def _levels(
+        self, ticks: IntArray, begins: IntArray, place: IntArray, wake: Wake
+    ) -> AlertLevels:
+        """Return the levels at some scans.
+
+        Parameters
+        ----------
+        ticks, begins : (n,)
+            The scans, and when their runs begin.
+        place : (n,)
+            The first state of each run.
+        wake : Wake
+        """
+        times = wake.own_ticks(ticks) / wake.ticks_per_s
+        known, state = self._fit.states(begins, ticks, times)
+        own = self._own_states(ticks, place)
+        self._forget(ticks, times, wake)
         # Positions count from the ownship: its own less theirs is the other way round.
-        relative = [-np.ravel([state[i] for _, state in fitted]) for i in range(6)]
+        relative = [-values.ravel() for values in state]
         levels = self._configuration.alerters[self.p.alerter - 1].levels
         lookahead_s = self._configuration["lookahead_time"]
         times_s = violation_times_s(levels, relative, lookahead_s, None)
         due, early = (
             part.reshape(*known.shape, len(levels)) for part in due_levels(levels, times_s)
         )
-        level = [
-            self._memory.step(now_s, known[i], due[i], early[i]) for i, now_s in enumerate(times)
-        ]
+        level = self._memory.levels(wake.replica_of(ticks), times, known, due, early)
         row, target = np.nonzero(known)
-        place = np.flatnonzero(known.ravel())
+        cells = np.flatnonzero(known.ravel())
         found = separation(relative, lookahead_s, np.full(known.size, np.nan))
-        times_s = np.where(np.isfinite(times_s), times_s, np.nan)[place]
+        times_s = np.where(np.isfinite(times_s), times_s, np.nan)[cells]
         return AlertLevels(
             ticks,
             offsets_of(row, len(ticks)),
             target,
-            np.concatenate(level)[place],
+            level[cells],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in range(1, len(levels) + 1)},
-            found.time_to_closest_s[place],
-            found.miss_horizontal_m[place],
-            found.miss_vertical_m[place],
-            {name: part[place] for name, part in zip(_RELATIVE, relative, strict=True)},
+            found.time_to_closest_s[cells],
+            found.miss_horizontal_m[cells],
+            found.miss_vertical_m[cells],
+            {name: part[cells] for name, part in zip(_RELATIVE, relative, strict=True)},
             own,
             self._roster,
         )
 
-    def _forget_poses(self, tick: int) -> None:
+    def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
+        """Drop what no later scan asks for."""
+        if not wake.side_by_side:
+            # Of replicas end to end, all before the last one have passed.
+            begin = int(ticks[-1]) - int(wake.own_ticks(ticks[-1:])[0]) if wake.span_ticks else 0
+            self._fit.forget_ticks_before(begin)
+            self._memory.forget_before(int(wake.replica_of(ticks[-1:])[0]))
+            self._forget_poses(int(ticks[-1]), begin)
+            self._fit.forget_before(float(times[-1]))
+            return
+        # Windows are stretches of time: the scans of the next one come after those of this one.
+        self._fit.forget_before(float(times.min()))
+
+    def _forget_poses(self, tick: int, begin: int) -> None:
         """Drop poses of the ownship that neither its velocity nor a late sight asks for."""
         span = round(self.p.fit_s * self.context.ticks_per_s)
         old = int(np.searchsorted(self._own_tick, tick - span, side="left"))
         keep = max(min(old, len(self._own_tick) - _KEPT_POSES), 0)
+        keep = max(keep, int(np.searchsorted(self._own_came, begin)))
         for name in ("_own_came", "_own_tick", "_own_place", "_attitude"):
             setattr(self, name, getattr(self, name)[keep:])
 
-    def _own_states(self, ticks: IntArray) -> dict[str, FloatArray]:
+    def _own_states(self, ticks: IntArray, place: IntArray) -> dict[str, FloatArray]:
         """Return the ownship's altitude and its mean velocity over the last seconds."""
         per_s = self.context.ticks_per_s
         span = round(self.p.fit_s * per_s)
-        last = np.maximum(np.searchsorted(self._own_came, ticks, side="right") - 1, 0)
-        first = np.minimum(np.searchsorted(self._own_tick, ticks - span, side="left"), last)
+        last = np.maximum(np.searchsorted(self._own_came, ticks, side="right") - 1, place)
+        first = np.maximum(np.searchsorted(self._own_tick, ticks - span, side="left"), place)
+        first = np.minimum(first, last)
         now, then = self._own_place[last], self._own_place[first]
         time_s = (self._own_tick[last] - self._own_tick[first]) / per_s
         time_s = np.where(time_s > 0.0, time_s, np.nan)

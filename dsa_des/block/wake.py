@@ -89,7 +89,11 @@ class Wake:
     @property
     def replica(self) -> IntArray:
         """Replica of each row, in order; 0 when only one runs."""
-        return self.ticks // self.span_ticks if self.span_ticks else np.zeros_like(self.ticks)
+        return self.replica_of(self.ticks)
+
+    def replica_of(self, ticks: IntArray) -> IntArray:
+        """Return the replicas that instants belong to."""
+        return ticks // self.span_ticks if self.span_ticks else np.zeros_like(ticks)
 
     def own_ticks(self, ticks: IntArray) -> IntArray:
         """Return instants as counted from the start of their own replica."""
