@@ -8,8 +8,8 @@ from pydantic import Field, field_validator
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_table import without_memory
-from components.alerting.levels import due_levels, memory_rule, violation_times_s
 from components.alerting.lasting_memory import LastingMemory
+from components.alerting.levels import due_levels, memory_rule, violation_times_s
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
@@ -27,6 +27,7 @@ from dsa_des.block.wake import Arrivals, Wake
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 # Poses of the ownship that are remembered beyond the last scan: for sights that come late.
 _KEPT_POSES = 10_000
+_POSES = ("_own_came", "_own_tick", "_own_place", "_attitude")
 
 
 class DaidalusParameters(ClockedParameters):
@@ -97,6 +98,8 @@ class DaidalusAlerting(Component):
         self._own_tick: IntArray = np.empty(0, dtype=np.int64)
         self._own_place: FloatArray = np.empty((0, 3))
         self._attitude: FloatArray = np.empty((0, 3))
+        #: Poses of replicas side by side that have been set aside, as the columns of `_kept`.
+        self._old_poses: list[list[Any]] = []
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
@@ -164,7 +167,11 @@ class DaidalusAlerting(Component):
             np.searchsorted(self._own_tick, sights.measured_tick, side="right"),
             np.searchsorted(self._own_came, arrived.tick[row], side="right"),
         )
-        new &= place > np.searchsorted(self._own_came, self._begins(arrived.tick, wake))[row]
+        first = np.searchsorted(self._own_came, self._begins(arrived.tick, wake))[row]
+        if self._old_poses and bool((new & (place <= first)).any()):
+            self._fetch_old_poses()
+            return self._take_sights(arrived, wake)
+        new &= place > first
         row, place = row[new], place[new] - 1
         yaw, pitch, roll = self._attitude[place].T
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
@@ -234,6 +241,34 @@ class DaidalusAlerting(Component):
             return
         # Windows are stretches of time: the scans of the next one come after those of this one.
         self._fit.forget_before(float(times.min()))
+        self._set_poses_aside(int(wake.own_ticks(ticks).min()), wake)
+
+    def _set_poses_aside(self, own_tick: int, wake: Wake) -> None:
+        """Keep older poses of replicas side by side where only what comes late asks for them."""
+        span = round(self.p.fit_s * self.context.ticks_per_s)
+        run = wake.replica_of(self._own_came)
+        recent = wake.own_ticks(self._own_tick) >= own_tick - 2 * span
+        recent |= np.append(run[1:] != run[:-1], True)  # the last one of each
+        old = np.flatnonzero(~recent)
+        if 2 * len(old) > len(recent):
+            self._old_poses.append([getattr(self, name)[old] for name in self._kept()])
+            self._keep_poses(np.flatnonzero(recent))
+
+    def _kept(self) -> tuple[str, ...]:
+        """Return what is remembered of the ownship's poses."""
+        return _POSES if self._source else _POSES[:-1]
+
+    def _keep_poses(self, which: Any) -> None:
+        for name in self._kept():
+            setattr(self, name, getattr(self, name)[which])
+
+    def _fetch_old_poses(self) -> None:
+        """Remember all poses again, those of each replica together."""
+        for place, name in enumerate(self._kept()):
+            parts = [*(old[place] for old in self._old_poses), getattr(self, name)]
+            setattr(self, name, np.concatenate(parts))
+        self._old_poses = []
+        self._keep_poses(np.argsort(self._own_came, kind="stable"))
 
     def _forget_poses(self, tick: int, begin: int) -> None:
         """Drop poses of the ownship that neither its velocity nor a late sight asks for."""
@@ -241,8 +276,7 @@ class DaidalusAlerting(Component):
         old = int(np.searchsorted(self._own_tick, tick - span, side="left"))
         keep = max(min(old, len(self._own_tick) - _KEPT_POSES), 0)
         keep = max(keep, int(np.searchsorted(self._own_came, begin)))
-        for name in ("_own_came", "_own_tick", "_own_place", "_attitude"):
-            setattr(self, name, getattr(self, name)[keep:])
+        self._keep_poses(slice(keep, None))
 
     def _own_states(self, ticks: IntArray, place: IntArray) -> dict[str, FloatArray]:
         """Return the ownship's altitude and its mean velocity over the last seconds."""

@@ -49,7 +49,7 @@ class LastingMemory:
         level = np.zeros((len(run), self._targets), dtype=np.int64)
         order = np.argsort(turn, kind="stable")
         for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
-            which = (place[np.cumsum(begins)[rows] - 1][:, np.newaxis] * self._targets + targets)
+            which = place[np.cumsum(begins)[rows] - 1][:, np.newaxis] * self._targets + targets
             part = self._memory.take(which.reshape(-1))
             shape = len(rows) * self._targets, -1
             stepped = part.step(

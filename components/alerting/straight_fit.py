@@ -85,7 +85,7 @@ class StraightFit:
         targets = self._position_m.shape[1]
         known = np.zeros((len(now), targets), dtype=bool)
         state = np.zeros((6, len(now), targets))
-        # As many positions as others are added up alike: what each comes to does not depend on them.
+        # Instants with as many positions are added up alike, each as it would be by itself.
         for count in np.flatnonzero(np.bincount(counts)).tolist():
             alike = np.flatnonzero(counts == count)
             if count < 2:

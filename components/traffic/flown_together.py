@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -81,9 +81,7 @@ class FlownTogether:
             if face.context.producers:
                 self._epochs = _Epochs(self, flown, self._width, look.range_m)
             else:
-                self._intervals = self._near_intervals(
-                    look.range_m, float(face.context.duration_s)
-                )
+                self._intervals = self._near_intervals(look.range_m, float(face.context.duration_s))
 
     def _near_intervals(self, reach_m: float, end_s: float) -> NearIntervals:
         flown, width = self._flown, max(1, self._width)
@@ -127,16 +125,26 @@ class FlownTogether:
             present &= near
             culled = self._width - near.sum(axis=1)
         return TrafficStates(
-            wake.ticks,
-            own.lat_deg, own.lon_deg, own.alt_m, own.yaw_rad, own.pitch_rad, own.roll_rad,
-            *states.arrays()[:6],
+            tick=wake.ticks,
+            own_lat_deg=own.lat_deg,
+            own_lon_deg=own.lon_deg,
+            own_alt_m=own.alt_m,
+            own_yaw_rad=own.yaw_rad,
+            own_pitch_rad=own.pitch_rad,
+            own_roll_rad=own.roll_rad,
+            lat_deg=states.lat_deg,
+            lon_deg=states.lon_deg,
+            alt_m=states.alt_m,
+            yaw_rad=states.yaw_rad,
+            pitch_rad=states.pitch_rad,
+            roll_rad=states.roll_rad,
             present=present,
             roster=self._roster,
             columns=self._columns,
             culled=culled,
-            true_flights=truth,
+            true_flights=cast(Any, truth),
             run_time_s=None if truth is None else time_s,
-        )  # fmt: skip
+        )
 
     def _steer(self, wake: Wake, replica: IntArray, time_s: FloatArray) -> RowFlights | None:
         """Let ownships fly what has come for them, and return the true flights of each row."""
@@ -165,9 +173,7 @@ class FlownTogether:
             return None
         return RowFlights(self._own, self._flown.targets, self._width, replica, known)
 
-    def _due(
-        self, wake: Wake
-    ) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
+    def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
         """Part what has come into what rows of this wake fly, and what is for later ones."""
         ticks = np.array([tick for tick, _ in self._told], dtype=np.int64)
         end = (ticks // wake.span_ticks + 1) * wake.span_ticks

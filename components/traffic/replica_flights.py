@@ -43,7 +43,7 @@ def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> Flown | None:
             fleets.append(SampledFleet(flights))
         else:
             return None
-    return flown(*fleets, own, targets)
+    return flown(fleets[0], fleets[1], own, targets)
 
 
 def flown(own_fleet: Any, target_fleet: Any, own: Any, targets: Any) -> Flown:

@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.replica_runs import ReplicaRuns, Runner
 from dsa_des.block.strangers import is_ours_to_obey
@@ -237,7 +237,12 @@ class Replicas(Timeline):
 
     def clock(self, name: str, component: Component) -> ScanClock | None:
         """Return the clocks of all replicas as one."""
-        found = [component.clock_of(scene.blocks[name].parameters) for scene in self._scenes]
+        found: list[Any] = []
+        known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
+        for parameters in self._parameters_of(name):
+            if id(parameters) not in known:
+                known[id(parameters)] = component.clock_of(parameters)
+            found.append(known[id(parameters)])
         specs = [spec for spec in found if spec is not None]
         if not specs:
             return None
@@ -247,11 +252,11 @@ class Replicas(Timeline):
             for wire in self.scene.wires:
                 if wire.delay_scans and name in (wire.source, wire.target):
                     raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
-        clocks = []
-        for scene, spec in zip(self._scenes, specs, strict=True):
-            draw = Streams(scene.seed).scan_normals(name, "clock jitter")
-            clocks.append(ScanClock(spec, scene.ticks_per_s, draw))
-        clock = ReplicaClock(clocks, self.time)
+
+        def jitter(number: int) -> Callable[[IntArray], FloatArray]:
+            return Streams(self._scenes[number].seed).scan_normals(name, "clock jitter")
+
+        clock = ReplicaClock(specs, self.scene.ticks_per_s, self.time, jitter)
         self._clocks.append(clock)
         return clock
 
