@@ -1,5 +1,6 @@
 """Alert levels in a scene, of tracks, fused lines of sight or the truth (``alerting.daidalus``)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,13 @@ from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_table import without_memory
 from components.alerting.lasting_memory import LastingMemory
-from components.alerting.levels import due_levels, memory_rule, violation_times_s
+from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
+from components.alerting.own_poses import OwnPoses
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
+from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.targets import TrafficStates
@@ -25,9 +28,7 @@ from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
-# Poses of the ownship that are remembered beyond the last scan: for sights that come late.
-_KEPT_POSES = 10_000
-_POSES = ("_own_came", "_own_tick", "_own_place", "_attitude")
+_OWN_MOTION = ("alt_m", "east_mps", "north_mps", "climb_mps")
 
 
 class DaidalusParameters(ClockedParameters):
@@ -94,12 +95,7 @@ class DaidalusAlerting(Component):
         self._source = next((port for port in ("tracks", "fused") if port in ports), "")
         self._configuration: Configuration = configuration
         self._roster: Any = None
-        self._own_came: IntArray = np.empty(0, dtype=np.int64)
-        self._own_tick: IntArray = np.empty(0, dtype=np.int64)
-        self._own_place: FloatArray = np.empty((0, 3))
-        self._attitude: FloatArray = np.empty((0, 3))
-        #: Poses of replicas side by side that have been set aside, as the columns of `_kept`.
-        self._old_poses: list[list[Any]] = []
+        self._poses = OwnPoses(round(self.p.fit_s * self.context.ticks_per_s))
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
@@ -112,13 +108,10 @@ class DaidalusAlerting(Component):
                 self._take_sights(arrived, wake)
         ticks = wake.ticks[wake.scans >= 0]
         begins = self._begins(ticks, wake)
-        place = np.searchsorted(self._own_came, begins)
         # Before the first state of a run has come, it has no levels.
-        come = self._own_came[np.minimum(place, len(self._own_came) - 1)]
-        known = (come >= begins) & (come <= ticks)
-        if not known.all():
-            ticks, begins, place = ticks[known], begins[known], place[known]
-        return self._levels(ticks, begins, place, wake) if len(ticks) else None
+        known = self._poses.have_come(begins, ticks)
+        ticks, begins = ticks[known], begins[known]
+        return self._levels(ticks, begins, wake) if len(ticks) else None
 
     def _begins(self, ticks: IntArray, wake: Wake) -> IntArray:
         """Return where the runs of some instants begin."""
@@ -132,19 +125,8 @@ class DaidalusAlerting(Component):
             self._fit = StraightFit(self.p.fit_s, len(states.roster))
             self._memory = LastingMemory(memory_rule(self._configuration), len(states.roster))
         place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
-        self._own_came = np.concatenate([self._own_came, arrived.tick])
-        ticks = np.concatenate([self._own_tick, states.tick])
-        self._own_place = np.concatenate([self._own_place, np.stack(place, axis=1)])
-        if self._source:
-            angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
-            self._attitude = np.concatenate([self._attitude, np.stack(angles, axis=1)])
-        if wake.side_by_side:  # those of each replica together
-            order = np.argsort(self._own_came, kind="stable")
-            ticks, self._own_came = ticks[order], self._own_came[order]
-            self._own_place = self._own_place[order]
-            self._attitude = self._attitude[order] if self._source else self._attitude
-        # Of those that overtook each other on the way, the newest counts.
-        self._own_tick = np.maximum.accumulate(ticks)
+        angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
+        self._poses.add(arrived.tick, states.tick, np.stack([*place, *angles], axis=1), wake)
         if self._source:
             return
         own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
@@ -163,17 +145,11 @@ class DaidalusAlerting(Component):
         if self._source == "tracks":
             new &= sights.updated  # others came with an earlier row
         # The attitude of when it was measured, of those that have arrived.
-        place = np.minimum(
-            np.searchsorted(self._own_tick, sights.measured_tick, side="right"),
-            np.searchsorted(self._own_came, arrived.tick[row], side="right"),
-        )
-        first = np.searchsorted(self._own_came, self._begins(arrived.tick, wake))[row]
-        if self._old_poses and bool((new & (place <= first)).any()):
-            self._fetch_old_poses()
-            return self._take_sights(arrived, wake)
-        new &= place > first
-        row, place = row[new], place[new] - 1
-        yaw, pitch, roll = self._attitude[place].T
+        begins = self._begins(arrived.tick, wake)
+        place, first = self._poses.known(sights.measured_tick, arrived.tick[row], begins[row], new)
+        new &= place >= first
+        row, place = row[new], place[new]
+        yaw, pitch, roll = self._poses.attitude(place)
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
         range_m = sights.range_m[new]
         level = range_m * np.cos(elevation)
@@ -185,31 +161,26 @@ class DaidalusAlerting(Component):
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
         self._fit.add(came, wake.own_ticks(made) / wake.ticks_per_s, position)
 
-    def _levels(
-        self, ticks: IntArray, begins: IntArray, place: IntArray, wake: Wake
-    ) -> AlertLevels:
+    def _levels(self, ticks: IntArray, begins: IntArray, wake: Wake) -> AlertLevels:
         """Return the levels at some scans.
 
         Parameters
         ----------
         ticks, begins : (n,)
             The scans, and when their runs begin.
-        place : (n,)
-            The first state of each run.
         wake : Wake
         """
         times = wake.own_ticks(ticks) / wake.ticks_per_s
         known, state = self._fit.states(begins, ticks, times)
-        own = self._own_states(ticks, place)
+        own = self._poses.states(ticks, begins, wake.ticks_per_s)
         self._forget(ticks, times, wake)
         # Positions count from the ownship: its own less theirs is the other way round.
         relative = [-values.ravel() for values in state]
-        levels = self._configuration.alerters[self.p.alerter - 1].levels
         lookahead_s = self._configuration["lookahead_time"]
-        times_s = violation_times_s(levels, relative, lookahead_s, None)
-        due, early = (
-            part.reshape(*known.shape, len(levels)) for part in due_levels(levels, times_s)
-        )
+        pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape))
+        alerter = self._configuration.alerters[self.p.alerter - 1]
+        times_s, *both = levels_without_memory(self._configuration, alerter, pairs)
+        due, early = (part.reshape(*known.shape, len(alerter.levels)) for part in both)
         level = self._memory.levels(wake.replica_of(ticks), times, known, due, early)
         row, target = np.nonzero(known)
         cells = np.flatnonzero(known.ravel())
@@ -220,7 +191,10 @@ class DaidalusAlerting(Component):
             offsets_of(row, len(ticks)),
             target,
             level[cells],
-            {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in range(1, len(levels) + 1)},
+            {
+                f"time_to_level_{k}_s": times_s[:, k - 1].copy()
+                for k in range(1, len(alerter.levels) + 1)
+            },
             found.time_to_closest_s[cells],
             found.miss_horizontal_m[cells],
             found.miss_vertical_m[cells],
@@ -229,72 +203,26 @@ class DaidalusAlerting(Component):
             self._roster,
         )
 
+    def _own_flights(self, own: Mapping[str, FloatArray], shape: tuple[int, ...]) -> State:
+        """Return the ownship's flight beside every target, in its own plane."""
+        zero = np.zeros(shape)
+        motion = (np.nan_to_num(own[name]) for name in _OWN_MOTION)
+        alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
+        return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
+
     def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
         """Drop what no later scan asks for."""
-        if not wake.side_by_side:
-            # Of replicas end to end, all before the last one have passed.
-            begin = int(ticks[-1]) - int(wake.own_ticks(ticks[-1:])[0]) if wake.span_ticks else 0
-            self._fit.forget_ticks_before(begin)
-            self._memory.forget_before(int(wake.replica_of(ticks[-1:])[0]))
-            self._forget_poses(int(ticks[-1]), begin)
-            self._fit.forget_before(float(times[-1]))
+        if wake.side_by_side:
+            # The scans of the next stretch of time come after all of these.
+            self._fit.forget_before(float(times.min()))
+            self._poses.set_aside(int(wake.own_ticks(ticks).min()), wake)
             return
-        # Windows are stretches of time: the scans of the next one come after those of this one.
-        self._fit.forget_before(float(times.min()))
-        self._set_poses_aside(int(wake.own_ticks(ticks).min()), wake)
-
-    def _set_poses_aside(self, own_tick: int, wake: Wake) -> None:
-        """Keep older poses of replicas side by side where only what comes late asks for them."""
-        span = round(self.p.fit_s * self.context.ticks_per_s)
-        run = wake.replica_of(self._own_came)
-        recent = wake.own_ticks(self._own_tick) >= own_tick - 2 * span
-        recent |= np.append(run[1:] != run[:-1], True)  # the last one of each
-        old = np.flatnonzero(~recent)
-        if 2 * len(old) > len(recent):
-            self._old_poses.append([getattr(self, name)[old] for name in self._kept()])
-            self._keep_poses(np.flatnonzero(recent))
-
-    def _kept(self) -> tuple[str, ...]:
-        """Return what is remembered of the ownship's poses."""
-        return _POSES if self._source else _POSES[:-1]
-
-    def _keep_poses(self, which: Any) -> None:
-        for name in self._kept():
-            setattr(self, name, getattr(self, name)[which])
-
-    def _fetch_old_poses(self) -> None:
-        """Remember all poses again, those of each replica together."""
-        for place, name in enumerate(self._kept()):
-            parts = [*(old[place] for old in self._old_poses), getattr(self, name)]
-            setattr(self, name, np.concatenate(parts))
-        self._old_poses = []
-        self._keep_poses(np.argsort(self._own_came, kind="stable"))
-
-    def _forget_poses(self, tick: int, begin: int) -> None:
-        """Drop poses of the ownship that neither its velocity nor a late sight asks for."""
-        span = round(self.p.fit_s * self.context.ticks_per_s)
-        old = int(np.searchsorted(self._own_tick, tick - span, side="left"))
-        keep = max(min(old, len(self._own_tick) - _KEPT_POSES), 0)
-        keep = max(keep, int(np.searchsorted(self._own_came, begin)))
-        self._keep_poses(slice(keep, None))
-
-    def _own_states(self, ticks: IntArray, place: IntArray) -> dict[str, FloatArray]:
-        """Return the ownship's altitude and its mean velocity over the last seconds."""
-        per_s = self.context.ticks_per_s
-        span = round(self.p.fit_s * per_s)
-        last = np.maximum(np.searchsorted(self._own_came, ticks, side="right") - 1, place)
-        first = np.maximum(np.searchsorted(self._own_tick, ticks - span, side="left"), place)
-        first = np.minimum(first, last)
-        now, then = self._own_place[last], self._own_place[first]
-        time_s = (self._own_tick[last] - self._own_tick[first]) / per_s
-        time_s = np.where(time_s > 0.0, time_s, np.nan)
-        east, north = east_north_m(then[:, 0], then[:, 1], now[:, 0], now[:, 1])
-        return {
-            "alt_m": now[:, 2],
-            "east_mps": -east / time_s,
-            "north_mps": -north / time_s,
-            "climb_mps": (now[:, 2] - then[:, 2]) / time_s,
-        }
+        last = ticks[-1:]
+        begin = int(self._begins(last, wake)[0])  # what was before is of replicas that have passed
+        self._fit.forget_ticks_before(begin)
+        self._fit.forget_before(float(times[-1]))
+        self._memory.forget_before(int(wake.replica_of(last)[0]))
+        self._poses.forget_before(int(last[0]), begin)
 
 
 def _by_instant(
