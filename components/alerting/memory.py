@@ -53,6 +53,20 @@ class AlertMemory:
         self._risen_s = np.full(count, _LONG_AGO_S)
         self._queue = np.full((count, max(rule.n, 1)), _NONE, dtype=np.int64)
 
+    def grow(self, count: int) -> None:
+        """Remember so many targets from now on; those that come in addition are new."""
+        more = count - self._count
+        self._count = count
+        self._last_s = np.concatenate([self._last_s, np.full(more, _LONG_AGO_S)])
+        self._output = np.concatenate([self._output, np.full(more, _NONE)])
+        self._risen_s = np.concatenate([self._risen_s, np.full(more, _LONG_AGO_S)])
+        empty = np.full((more, self._queue.shape[1]), _NONE)
+        self._queue = np.concatenate([self._queue, empty])
+
+    def forget(self, which: IntArray) -> None:
+        """Take some targets as new ones."""
+        self._last_s[which] = _LONG_AGO_S
+
     def step(self, now_s: float, present: BoolArray, due: BoolArray, early: BoolArray) -> IntArray:
         """Take in one instant and return the level of each target.
 
