@@ -55,6 +55,21 @@ class AlertMemory:
         self._output[which] = _NONE
         self._queue[which] = _NONE
 
+    def grow(self, count: int) -> None:
+        """Remember so many targets from now on; those that come in addition are new."""
+        more = count - self._count
+        self._count = count
+        self._last_s = np.concatenate([self._last_s, np.full(more, _LONG_AGO_S)])
+        self._output = np.concatenate([self._output, np.full(more, _NONE)])
+        self._risen_s = np.concatenate([self._risen_s, np.full(more, _LONG_AGO_S)])
+        empty = np.full((more, self._queue.shape[1]), _NONE)
+        self._queue = np.concatenate([self._queue, empty])
+        self._own_time_s = np.concatenate([self._own_time_s, np.full(more, np.nan)])
+
+    def forget(self, which: IntArray) -> None:
+        """Take some targets as new ones."""
+        self._last_s[which] = _LONG_AGO_S
+
     def take(self, which: IntArray) -> "AlertMemory":
         """Return the memory of some targets, to be put back with `put`."""
         part = AlertMemory(self._rule, len(which))
@@ -116,6 +131,14 @@ class AlertMemory:
         self._output = np.where(present, level, self._output)
         self._last_s = np.where(present, now_s, self._last_s)
         return level
+
+    def levels(
+        self, times_s: FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
+    ) -> IntArray:
+        """Take in some instants in order and return all levels, (instants * targets,)."""
+        rows = enumerate(times_s.tolist())
+        found = [self.step(now_s, present[i], due[i], early[i]) for i, now_s in rows]
+        return np.concatenate(found)
 
     def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
         """Return whose early alerting time counts for guidance: levels that rose before now.

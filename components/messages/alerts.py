@@ -34,6 +34,12 @@ class AlertLevels(Message):
         met within the lookahead.
     time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
         The projected closest approach, in straight flight.
+    numbers : dict of (entries,)
+        ``track``: the tracker's own number, where tracks with states are believed. Their `target`
+        is the one they are nearest to, for whoever evaluates; -1 for none.
+    deviations : dict of (entries,)
+        Standard deviations of the state, where they are known: ``position_m``, ``height_m``,
+        ``velocity_mps``, ``climb_mps``.
     relative : dict of (entries,)
         What the levels rest on, ownship less target: ``east_m``, ``north_m``, ``up_m`` and
         ``east_mps``, ``north_mps``, ``climb_mps``.
@@ -52,6 +58,8 @@ class AlertLevels(Message):
     time_to_closest_s: FloatArray = per_entry(column="float64")
     closest_horizontal_m: FloatArray = per_entry(column="float64")
     closest_vertical_m: FloatArray = per_entry(column="float64")
+    numbers: dict[str, IntArray] = per_entry(columns={"track": "int64"})
+    deviations: dict[str, FloatArray] = per_entry()
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()

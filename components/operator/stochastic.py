@@ -170,7 +170,7 @@ class Stochastic(Component):
             if 0.0 < self.p.turn_share < 1.0 or by_turn == turns:
                 changes = changes_out(
                     "hdir" if by_turn else "alt", self._configuration, self._alerter,
-                    alerts.own_motion, alerts.relative, place, entries,
+                    alerts.own_motion, alerts.relative, place, entries, alerts.deviations,
                 )  # fmt: skip
                 change = 0.0 if changes is None else steering(changes, by_turn, draws)
                 if change != 0.0:
