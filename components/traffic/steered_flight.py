@@ -75,7 +75,7 @@ class SteeredFlight:
         )
         along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
         speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
-        climb = float(state.alt_m[2] - state.alt_m[0]) / (2.0 * _BASE_S)
+        climb = 0.5 * float(state.alt_m[2] - state.alt_m[0]) / _BASE_S
         part = ScriptedTrajectory(
             self.name,
             lat_deg=here[0],

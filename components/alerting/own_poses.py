@@ -10,7 +10,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 _KEPT_POSES = 10_000
 
 
-class OwnFlight:
+class OwnPoses:
     """What has come of the ownship's poses.
 
     Parameters
