@@ -111,7 +111,8 @@ def test_distances_are_taken_so_often(tmp_path):
 def test_flights_may_be_those_as_flown(tmp_path):
     """Told to turn, the ownship is not flown over: then the alert was for nothing."""
     path = tmp_path / "one.conf"
-    path.write_text(CONF, encoding="utf-8")
+    recovery = "min_horizontal_recovery = 1 [m]\nmin_vertical_recovery = 1 [m]\n"
+    path.write_text(f"{CONF}{recovery}corrective_region = MID\n", encoding="utf-8")
     scene = chain({}, targets=[behind("near", BEHIND_M, 60.0)], duration_s=50)
     conf = {"conf": str(path)}
     scene["blocks"] = {
