@@ -102,6 +102,33 @@ def mixed(
     return new_states, new_covariances, predicted
 
 
+def before(
+    rates_per_s: FloatArray, probabilities: FloatArray, until_s: FloatArray, since_s: FloatArray
+) -> FloatArray:
+    """Return how likely each model was at an instant that is past, for each model of now.
+
+    Parameters
+    ----------
+    rates_per_s : (modes, modes)
+    probabilities : (modes, n)
+        Before that instant.
+    until_s, since_s : (n,)
+        Times from then to the instant, and from the instant to now.
+
+    Returns
+    -------
+    ndarray of shape (modes then, modes now, n)
+        Over the models of then it sums to 1.
+    """
+    many = len(probabilities)
+    steps = transition_probabilities(rates_per_s, until_s)
+    then = np.stack(
+        [_sum([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+    )
+    joint = np.maximum(then, LEAST)[:, np.newaxis] * transition_probabilities(rates_per_s, since_s)
+    return np.asarray(joint / np.maximum(_sum(list(joint)), LEAST))
+
+
 def combined(
     states: Sequence[FloatArray], covariances: Sequence[FloatArray], probabilities: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

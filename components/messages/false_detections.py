@@ -1,4 +1,4 @@
-"""Detections of what is not there: how false alarms join a sensor's report."""
+"""Detections of what is not there: how false alarms join a sensor's report, and hide in it."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,6 +12,19 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Index into the roster of a detection without a target; it is recorded as null.
 FALSE_TARGET = -1
+
+
+def in_measured_order(detections: Detections) -> Detections:
+    """Return a sensor's report with the detections of each scan by what was measured of them.
+
+    Nearest first, then by azimuth, elevation and confidence: the order of a roster would tell who
+    is who, and that false alarms come after targets, which is which.
+    """
+    row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
+    measured = (
+        detections.confidence, detections.elevation_rad, detections.azimuth_rad, detections.range_m
+    )  # fmt: skip
+    return detections.reordered(np.lexsort((*measured, row)))
 
 
 def add_false_detections(

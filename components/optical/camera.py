@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.geometry.field_of_view import sector_width_rad
 from components.optical.area_of_cells import check_silhouette
@@ -74,6 +75,11 @@ class CameraParameters(SensorParameters):
     false_alarms_per_frame: float = Field(
         default=0.0, ge=0, le=1, description="Probability that a frame brings a false alarm."
     )
+    marked_false_alarms: bool = Field(
+        default=False,
+        description="Whether false alarms can be told from targets: after them in their frame, "
+        "with confidence 0 and no pixels.",
+    )
 
     @model_validator(mode="after")
     def _noise_is_known(self) -> Self:
@@ -121,6 +127,7 @@ class Camera(Sensor):
             self.azimuth_step_rad = self.pixel_azimuth_rad
         if not parameters.elevation_resolution_deg:
             self.elevation_step_rad = self.pixel_elevation_rad
+        self._all_pixels = float(self.p.azimuth_pixels * self.p.elevation_pixels)
         self._areas: list[CellValues] = []
         self._contrast_factors: list[CellValues] = []
         self._signatures: list[CellValues] = []
@@ -162,6 +169,11 @@ class Camera(Sensor):
             )
         return said
 
+    @property
+    def contrast_column(self) -> str:
+        """Column of the roster that holds the contrast it sees."""
+        return self.contrasts
+
     def area(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell, m²."""
         raise TypeError(f"{type(self).__name__} has no area(cells)")
@@ -185,7 +197,7 @@ class Camera(Sensor):
             cells.range_m,
             self.pixel_azimuth_rad,
             self.pixel_elevation_rad,
-            float(self.p.azimuth_pixels * self.p.elevation_pixels),
+            self._all_pixels,
         )
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
@@ -223,8 +235,15 @@ class Camera(Sensor):
             "elevation": self.pixel_elevation_rad**2 * variance,
         }
 
-    def signal_at_threshold(self, count: int) -> dict[str, FloatArray]:
-        """Return the signal of so many targets of one pixel that just reach the threshold."""
-        weight = self.p.static_weight
-        contrast = max(self.p.threshold, 0.0) / weight if weight else 0.0
-        return {"pixels": np.ones(count), "contrast": np.full(count, contrast)}
+    def contrasts_of(self, roster: Roster) -> FloatArray:
+        """Return the contrast gains that the targets have by themselves, each once; else 1."""
+        if not self.contrast_column or not len(roster):
+            return np.ones(1)
+        found = np.unique(roster.column(self.contrast_column))
+        return found[found > 0.0] if (found > 0.0).any() else np.ones(1)
+
+    def signal_of(self, signature: FloatArray, contrast: FloatArray) -> dict[str, FloatArray]:
+        """Return the signal of targets that have some signatures by their size alone (eq. 18)."""
+        # Without a weight of its own, size says nothing: as much as if it had the unit one.
+        pixels = signature / ((self.p.static_weight or 1.0) * contrast)
+        return {"pixels": np.minimum(pixels, self._all_pixels), "contrast": contrast}

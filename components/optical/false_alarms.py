@@ -95,6 +95,56 @@ def false_alarm_direction(
     return unflatten(azimuth, shape), unflatten(elevation, shape)
 
 
+def false_alarm_signature(
+    uniform: ArrayLike, *, threshold: float, false_alarm_probability: float
+) -> Any:
+    """Return the signature that false alarms have: noise, given that it crosses the threshold.
+
+    Parameters
+    ----------
+    uniform : array_like
+        In [0, 1), one per false alarm.
+    threshold : float
+        The signature that is detected (eq. 19); noise below 0 is no signature, whatever it is.
+    false_alarm_probability : float
+        Per frame, in (0, 1].
+
+    Returns
+    -------
+    array of the shape of `uniform`
+        In the unit of the threshold, never below it, nor below 0.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or not finite.
+
+    Notes
+    -----
+    Assumption: the largest noise of a frame is Gaussian with mean 0, and a false alarm is a frame
+    in which it crosses the threshold (as the AFRL cameras' two thresholds are told apart, see
+    configs/sensors/). So its standard deviation is threshold / z, where z is the quantile that the
+    probability lies beyond, and what crosses has the tail of that distribution. Where more frames
+    have a false alarm than lie beyond one standard deviation, it is the threshold itself; without
+    a threshold above 0 nothing is known of the noise, and it is 1.
+    """
+    from statistics import NormalDist
+
+    draws = _unit("uniform", uniform)
+    level = max(float(finite("threshold", threshold)), 0.0)
+    probability = finite("false_alarm_probability", false_alarm_probability)
+    allowed = (probability > 0.0) & (probability <= 1.0)
+    refuse("false_alarm_probability", probability, ~allowed, "be in (0, 1]")
+    normal = NormalDist()
+    beyond_one = normal.cdf(-1.0)
+    crossed = -normal.inv_cdf(min(float(probability), beyond_one))
+    deviation = level / crossed or 1.0
+    tail = normal.cdf(-level / deviation)
+    # One by one: there are few, and the library's quantile is good to the last places.
+    found = [-deviation * normal.inv_cdf(tail * (1.0 - u)) for u in draws.reshape(-1).tolist()]
+    return np.maximum(np.array(found), level).reshape(draws.shape)
+
+
 def _unit(name: str, value: ArrayLike) -> Any:
     array = finite(name, value)
     refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "be in [0, 1)")

@@ -1,4 +1,4 @@
-"""The false alarms of a camera, frame by frame."""
+"""The false alarms of a camera, frame by frame, and what they look like."""
 
 from typing import Any
 
@@ -6,12 +6,16 @@ import numpy as np
 
 from components.geometry.field_of_view import sector_width_rad
 from components.messages.detections import Detections
-from components.messages.false_detections import add_false_detections
-from components.optical.false_alarms import false_alarm_direction, false_alarm_in_frame
+from components.messages.false_detections import add_false_detections, in_measured_order
+from components.optical.false_alarms import (
+    false_alarm_direction,
+    false_alarm_in_frame,
+    false_alarm_signature,
+)
 from dsa_des.block.effect import Effect, Verdict
 
-# Draws 1 and 2 of a frame say where, draw 0 whether.
-_WHETHER, _AZIMUTH, _ELEVATION = range(3)
+# Draw 0 of a frame says whether, the others where, how strong and of which contrast.
+_WHETHER, _AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST = range(5)
 # Draws that belong to the frame and to no target.
 _NO_TARGET = np.uint64(0)
 
@@ -38,8 +42,11 @@ class FrameFalseAlarms(Effect):
 class AddedFalseAlarms:
     """Draws the false alarms of a camera, keyed by its scans.
 
-    A false alarm is reported on the pixel grid, like a target; its confidence is 0, just at the
-    threshold: what is published is how often they come, not how strong they are.
+    A false alarm is reported as a target would be: on the pixel grid, with the confidence of noise
+    that crosses the threshold (`false_alarm_signature`), and with the pixels that a target of that
+    signature covers whose contrast is one of those of the scene's targets. Detections of a frame
+    stand by what was measured of them. With ``marked_false_alarms`` a false alarm comes last, with
+    a confidence of 0 and no pixels.
 
     Parameters
     ----------
@@ -55,6 +62,13 @@ class AddedFalseAlarms:
 
     def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
         """Return the report with its false alarms."""
+        if not self._probability:  # built all the same, it changes nothing
+            return detections
+        marked = self._block.p.marked_false_alarms
+        joined = self._with_alarms(detections, marked)
+        return joined if marked else in_measured_order(joined)
+
+    def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
         whether = self._draws.uniform(_NO_TARGET, detections.scan, _WHETHER)
         row = np.flatnonzero(false_alarm_in_frame(whether, self._probability))
         if len(row) == 0:
@@ -70,14 +84,21 @@ class AddedFalseAlarms:
             highest_elevation_rad=reach.elevation_rad[1],
         )
         where = {"azimuth": across, "elevation": upward, "range": np.full(len(row), np.nan)}
-        azimuth, elevation, _, measured = block.report_noise(
-            where, block.signal_at_threshold(len(row))
+        signature = false_alarm_signature(
+            self._draws.uniform(_NO_TARGET, scan, _STRENGTH),
+            threshold=block.p.threshold,
+            false_alarm_probability=self._probability,
         )
+        contrasts = block.contrasts_of(detections.roster)
+        which = self._draws.uniform(_NO_TARGET, scan, _CONTRAST) * len(contrasts)
+        signal = block.signal_of(signature, contrasts[which.astype(np.int64)])
+        azimuth, elevation, _, measured = block.report_noise(where, signal)
         return add_false_detections(
             detections,
             row,
             azimuth_rad=azimuth,
             elevation_rad=elevation,
-            confidence=0.0,
+            confidence=0.0 if marked else signature - block.p.threshold,
+            extras={} if marked else {"pixels": signal["pixels"]},
             measured=measured,
         )

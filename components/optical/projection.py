@@ -42,9 +42,10 @@ class Projection(Camera):
         """Return the ladder of the cameras of its band."""
         return (INFRARED,) if parameters.band == "ir" else cls.ladders
 
-    def __init__(self, name: str, parameters: Any, context: Any) -> None:
-        super().__init__(name, parameters, context)
-        self._contrast = "contrast_ir" if parameters.band == "ir" else "contrast"
+    @property
+    def contrast_column(self) -> str:
+        """Column of the roster that holds the contrast it sees, by its band."""
+        return "contrast_ir" if self.p.band == "ir" else "contrast"
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the area of the line: the target's length times one pixel's height there, m²."""
@@ -59,7 +60,7 @@ class Projection(Camera):
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's colour contrast."""
-        return cells.of_target(cells.roster.column(self._contrast))
+        return cells.of_target(cells.roster.column(self.contrast_column))
 
 
 def fuselage_length_m(front_m2: FloatArray, side_m2: FloatArray) -> FloatArray:

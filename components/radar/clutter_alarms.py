@@ -10,7 +10,7 @@ import numpy as np
 from components.geometry.attitude import body_to_ned, unit_vector
 from components.geometry.normals import Vector
 from components.messages.detections import Detections
-from components.messages.false_detections import add_false_detections
+from components.messages.false_detections import add_false_detections, in_measured_order
 from components.messages.targets import RelativeTargets
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import beamwidths_rad, terrain_of
@@ -136,7 +136,7 @@ class GroundReports:
             where["range_rate"] = rate
         azimuth, elevation, range_m, measured = self._block.report_noise(where, {"snr": snr})
         snr_db = 10.0 * np.log10(snr)
-        return add_false_detections(
+        joined = add_false_detections(
             detections,
             row,
             azimuth_rad=azimuth,
@@ -146,6 +146,8 @@ class GroundReports:
             extras={"snr_db": snr_db},
             measured=measured,
         )
+        # Without any here, the report is in that order already.
+        return in_measured_order(joined)
 
     def _of_scan(
         self, targets: RelativeTargets, row: int, scan: int

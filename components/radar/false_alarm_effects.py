@@ -1,14 +1,13 @@
 """False alarms as an effect: what noise alone adds to a radar's report."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from components.messages.detections import Detections
-from components.messages.false_detections import add_false_detections
+from components.messages.false_detections import add_false_detections, in_measured_order
 from components.messages.targets import RelativeTargets
-from components.radar.false_alarms import false_alarm_count, false_alarm_snr, measured_snr
+from components.radar.false_alarms import false_alarm_count, false_alarm_snr
 from components.radar.field_of_view import cells_of_radar
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -22,9 +21,10 @@ class FalseAlarms(Effect):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
     Every resolution cell from the minimum range to ``range_km`` may bring one. They are reported
-    on the sensor's grid after the true detections of their scan, with no target and nothing true.
-    Where there are some, ``snr_db`` and ``confidence`` are of the output that crossed the
-    threshold, for targets too, and ``detection_probability`` is null for all (``looks`` has it).
+    as targets are, with no target and nothing true; detections of a scan stand by what was
+    measured of them. Where there are some, ``snr_db`` and ``confidence`` are of the output that
+    crossed the threshold, for targets too (`MeasuredStrength`), and ``detection_probability`` is
+    null for all (``looks`` has it).
     """
 
     lockstep = True
@@ -75,13 +75,14 @@ class NoiseReports:
             )
         self._counts = block.stream("false alarms")
         self._places = block.stream("false alarm places")
-        self._strengths = block.stream("measured strength")
 
     def __call__(
         self, detections: Detections, targets: RelativeTargets, rows: IntArray
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
-        detections = self._as_measured(detections)
+        return in_measured_order(self._with_alarms(detections))
+
+    def _with_alarms(self, detections: Detections) -> Detections:
         count = false_alarm_count(
             self._counts.uniform(_NO_TARGET, detections.scan),
             cells=self._cells.count,
@@ -121,26 +122,6 @@ class NoiseReports:
             extras={"snr_db": snr_db},
             measured=measured,
         )
-
-    def _as_measured(self, detections: Detections) -> Detections:
-        """Return true detections with what a radar knows of them, as it does of false alarms.
-
-        Their SNR and confidence are those of the output that crossed the threshold, and the
-        probability of detection, which only the truth gives, is left out.
-        """
-        extras = dict(detections.extras)
-        extras.pop("detection_probability", None)
-        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))
-        keys = detections.roster.keys_of(detections.target)
-        snr = measured_snr(
-            self._strengths.uniform(keys, detections.scan[row]),
-            10.0 ** (0.1 * detections.extras["snr_db"]),
-            false_alarm_probability=self._pfa,
-            pulses=self._block.p.pulses_summed,
-        )
-        extras["snr_db"] = 10.0 * np.log10(np.maximum(snr, 1e-6))
-        confidence = extras["snr_db"] - self._block.false_alarm_zero_db()
-        return replace(detections, extras=extras, confidence=confidence)
 
 
 def _between(uniform: Any, field: tuple[float, float]) -> Any:

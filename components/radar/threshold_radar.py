@@ -20,6 +20,7 @@ from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
+from components.radar.measured_strength import MeasuredStrength
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.plausible import (
     clutter_as_signal,
@@ -75,6 +76,7 @@ class LinkBudgetRadar(Radar):
         DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
+        MeasuredStrength(),
         FalseAlarms(),
         ClutterAlarms(),
         TimeBudget(),

@@ -1,4 +1,7 @@
-"""The rule by which a sensor declares a target: m detections in its last n looks."""
+"""The rule by which a sensor declares a target: m detections in its last n looks at *it*.
+
+That knows which detections are of one target: `declaration_by_place` goes by what is measured.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -24,10 +27,14 @@ class DeclarationRule(Effect):
         m, n = block.p.declare_m, block.p.declare_n
         if m is None:
             return Verdict(False, "declare_m and declare_n are not given")
+        if block.p.declares_by == "place":
+            return Verdict(False, "places are declared, not targets")
         return Verdict(True, f"declare_m is {m} and declare_n is {n}")
 
     def build(self, block: Any) -> "Declarations":
         """Return what judges the looks of this sensor; 1 of 1 where it has no rule."""
+        if block.p.declares_by == "place":  # built all the same, it declares whatever is reported
+            return Declarations(1, 1)
         return Declarations(block.p.declare_m or 1, block.p.declare_n or 1)
 
 

@@ -1,7 +1,7 @@
 """Parameters of every sensor: clock, field of view, grid, mounting and rule of declaration."""
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -73,6 +73,23 @@ class SensorParameters(ErrorParameters):
     declare_n: int | None = Field(
         default=None, ge=1, le=1000, description="Last looks at a target that they are counted in."
     )
+    declare_by: Literal["target", "place"] | None = Field(
+        default=None,
+        description="Whether looks at one 'target' are counted, as if the sensor knew whom it "
+        "sees, or scans with detections at one measured 'place'; by default 'place' where there "
+        "are false alarms.",
+    )
+    declare_speed_m_s: float = Field(
+        default=300.0,
+        ge=0,
+        description="How fast a declared place may come nearer or move away, m/s.",
+    )
+    declare_rate_deg_s: float = Field(
+        default=5.0,
+        ge=0,
+        le=180,
+        description="How fast a declared place may move across the line of sight, deg/s.",
+    )
 
     @model_validator(mode="after")
     def _declaration_rule(self) -> Self:
@@ -103,6 +120,15 @@ class SensorParameters(ErrorParameters):
                     f"field of view, {angle}_deg = [{edges}], or nothing could be reported"
                 ) from error
         return self
+
+    @property
+    def declares_by(self) -> Literal["target", "place"]:
+        """What detections are counted of."""
+        if self.declare_by is not None:
+            return self.declare_by
+        # Radars and cameras that can have false alarms say so by these keys.
+        noisy = getattr(self, "false_alarms", False) or getattr(self, "false_alarms_per_frame", 0)
+        return "place" if noisy else "target"
 
     def reach(self) -> Reach:
         """Return the sensor's reach."""

@@ -19,6 +19,7 @@ from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport
 from components.sensor.believed_pose import believed_pose
+from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.grid import AZIMUTH, ELEVATION
 from components.sensor.look import Cells, Look
@@ -38,6 +39,7 @@ SENSOR_EFFECTS: tuple[Effect, ...] = (
     Mounting(),
     MeasurementErrors(),
     DeclarationRule(),
+    DeclarationByPlace(),
     NavigationReport(),
 )
 
@@ -61,6 +63,7 @@ class Sensor(Measuring):
     hooks: ClassVar[Mapping[str, str]] = {
         "cue": "(targets, rows, wake) -> which targets lie in a cue cone at each scan",
         "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "strength": "(cells, found, look) -> look: as strong as its detections came out",
         "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
         "declaration": "(cells, look) -> look: which detections declare their target",
         "report": "(detections, targets, rows) -> detections: what is sent",
@@ -136,6 +139,10 @@ class Sensor(Measuring):
         return self.built("cue")
 
     @cached_property
+    def _strengths(self) -> list[Any]:
+        return self.built("strength")
+
+    @cached_property
     def _reporting(self) -> list[Any]:
         return self.built("report")
 
@@ -181,6 +188,9 @@ class Sensor(Measuring):
                 look = judge(cells, look)
             self._idle = None if len(cells) else look
         found = look.detected.nonzero()[0]
+        decided = look
+        for measures in self._strengths:
+            look = measures(cells, found, look)
         culled = None if targets.culled is None else targets.culled[rows]
         evaluated, skipped = counted(
             reason, len(targets.roster), culled, targets.hidden is not None
@@ -213,7 +223,7 @@ class Sensor(Measuring):
             extras={name: values[found] for name, values in self._extras(cells, look).items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
-            looks=looks_of(cells, look, len(wake)) if self._says_looks else None,
+            looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
@@ -244,7 +254,8 @@ class Sensor(Measuring):
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""
-        declarations = self.context.effects.get("declaration")
+        rule = "declaration" if self.p.declares_by == "target" else "declaration by place"
+        declarations = self.context.effects.get(rule)
         if declarations is None or self.p.declare_m is None:
             return {}
         return {"declarations": {self.name: declarations.first(self.context.ticks_per_s)}}

@@ -3,6 +3,8 @@
 A look is late if one that was made after it has been worked on. Rungs, from crude to exact:
 
 - ``drop``: it is left out.
+- ``one_step``: tracks go one step back to its instant, are corrected there, and what that tells of
+  them now is carried over; nothing is worked on again, and no track is started.
 - ``rerun``: tracks go back to how they were before it, and every look since is worked on again in
   the order in which they were made. What comes out is what would have been had all come in time.
 
@@ -62,6 +64,10 @@ class Plan:
     look : (works,)
     back_to : (works,)
         Look before which the tracks are gone back to first; -1 for none.
+    since : (works,)
+        Of a look that is worked on in one step, the first look of those made since; -1 of others.
+    seen_from : (works,)
+        Newest look by then: where tracks are seen from when they are told.
     tells : (works,) of bool
         Whether tracks are told after it: it is the last work that a row brings.
     of : (works,)
@@ -74,6 +80,8 @@ class Plan:
 
     look: IntArray
     back_to: IntArray
+    since: IntArray
+    seen_from: IntArray
     tells: BoolArray
     of: IntArray
     row: IntArray
@@ -139,15 +147,67 @@ def rerun_plan(
         brought_by += [row[new]] * len(works)
         replica += [place] * len(works)
         forgotten += [[] for _ in again] + [past]
-    rows, place_of = np.array(brought_by, dtype=np.int64), np.array(replica, dtype=np.int64)
+    return _planned(look, back_to, None, look, brought_by, replica, forgotten), left_out
+
+
+def one_step_plan(
+    scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
+) -> tuple[Plan, int]:
+    """Return the order of work where late looks are worked on in one step.
+
+    Parameters and what is returned are those of `rerun_plan`.
+    """
+    keys = keys_of(scans)
+    look: list[int] = []
+    since: list[int] = []
+    seen_from: list[int] = []
+    replica: list[int] = []
+    forgotten: list[list[int]] = []
+    left_out = 0
+    for new, place in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
+        known = memory.setdefault(place, Memory())
+        key, first, gone = keys[new], -1, 0
+        newest = known.keys[-1][0] if known.keys else key[0]
+        if key[0] < newest - lag_ticks:
+            left_out += 1
+            continue
+        if key[0] < newest:
+            first = known.looks[bisect_left(known.keys, (key[0] + 1, 0))]
+        else:
+            known.keys.append(key)
+            known.looks.append(new)
+            while known.keys[gone][0] < key[0] - lag_ticks:
+                gone += 1
+        past, known.keys, known.looks = known.looks[:gone], known.keys[gone:], known.looks[gone:]
+        look.append(new)
+        since.append(first)
+        seen_from.append(known.looks[-1])
+        replica.append(place)
+        forgotten.append(past)
+    row = scans.row[look].tolist()
+    return _planned(look, None, since, seen_from, row, replica, forgotten), left_out
+
+
+def _planned(
+    look: list[int],
+    back_to: list[int] | None,
+    since: list[int] | None,
+    seen_from: list[int],
+    row: list[int],
+    replica: list[int],
+    forgotten: list[list[int]],
+) -> Plan:
+    none = np.full(len(look), -1)
+    rows, place_of = np.array(row, dtype=np.int64), np.array(replica, dtype=np.int64)
     tells = np.ones(len(look), dtype=bool)
     if len(look):
         tells[:-1] = (rows[1:] != rows[:-1]) | (place_of[1:] != place_of[:-1])
-    plan = Plan(
-        np.array(look, dtype=np.int64), np.array(back_to, dtype=np.int64), tells, place_of,
-        rows, forgotten,
+    return Plan(
+        np.array(look, dtype=np.int64),
+        none if back_to is None else np.array(back_to, dtype=np.int64),
+        none if since is None else np.array(since, dtype=np.int64),
+        np.array(seen_from, dtype=np.int64), tells, place_of, rows, forgotten,
     )  # fmt: skip
-    return plan, left_out
 
 
 def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, int]:
@@ -167,7 +227,19 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, i
     look = np.flatnonzero(keep)
     row = scans.row[look]
     tells = np.append(row[1:] != row[:-1], True)[: len(look)]
-    return Plan(look, np.full(len(look), -1), tells, of[look], row, []), len(scans) - len(look)
+    none = np.full(len(look), -1)
+    plan = Plan(look, none, none, look, tells, of[look], row, [])
+    return plan, len(scans) - len(look)
+
+
+def stores_before(before: dict[int, Before], looks: list[int], replicas: list[int]) -> TrackStore:
+    """Return how tracks of some replicas (ascending) were, each before a look of its own."""
+    return TrackStore.joined(
+        [
+            before[look].store.take(before[look].store.replica == replica)
+            for look, replica in zip(looks, replicas, strict=True)
+        ]
+    )
 
 
 def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> TrackStore:

@@ -80,15 +80,16 @@ class TrackerParameters(Parameters):
         description="Standard deviation of a position that ends a track with a range, m.",
     )  # fmt: skip
 
-    late: Literal["drop", "rerun"] = Field(
+    late: Literal["drop", "one_step", "rerun"] = Field(
         default="drop",
-        description="What becomes of a look that comes after a later one: it is left out, or all "
-        "looks since it are worked on again in order.",
+        description="What becomes of a look that comes after a later one: it is left out, tracks "
+        "are corrected by one step back and forth, or all looks since it are worked on again in "
+        "order.",
     )
     lag_s: NonNegativeRational = Field(
         default=Fraction(1),
-        description="How much older than the newest a look may be to be worked on again "
-        "(`rerun`), s; older ones are left out and counted.",
+        description="How much older than the newest a look may be to be worked on after all "
+        "(`one_step`, `rerun`), s; older ones are left out and counted.",
     )
 
     @model_validator(mode="after")

@@ -52,10 +52,10 @@ def step(
     alive = here & (store.status != DELETED)
     part, of = store.take(alive), of[alive]
     tick = scans.tick[looks]
-    detection, of_detection = _detections(scans, looks)
+    detection, of_detection = detections_of(scans, looks)
     part = _predicted(rules, part, tick[of])
     if len(part):
-        part, gated = _updated(rules, part, of, scans, places, codes, looks, detection,
+        part, gated = looked_at(rules, part, of, scans, places, codes, looks, detection,
                                of_detection)  # fmt: skip
     else:
         gated = np.zeros(len(detection), dtype=bool)
@@ -66,7 +66,7 @@ def step(
     return TrackStore.joined([rest, part, born]), next_number
 
 
-def _detections(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
+def detections_of(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
     """Return the detections of looks, and to which of them each belongs."""
     first = scans.offsets[looks]
     counts = scans.offsets[looks + 1] - first
@@ -85,7 +85,7 @@ def _predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackSt
     return part.with_columns(tick=tick, weights=weights, **named(states, covariances))
 
 
-def _updated(
+def looked_at(
     rules: TrackerRules,
     part: TrackStore,
     of: IntArray,
@@ -125,23 +125,32 @@ def _updated(
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),
+        nis=np.where(hit, changed.nis, np.nan), freedom=np.where(hit, changed.freedom, 0),
     )  # fmt: skip
-    spread = _position_variance(changed)
-    if not bool(np.isfinite(spread).all() & (spread >= 0.0).all()):
-        number = int(changed.number[~(np.isfinite(spread) & (spread >= 0.0))][0])
-        raise ValueError(
-            f"the covariance of track {number} has become singular: the stated variances are "
-            "smaller than what the filter's arithmetic resolves at this range; state larger ones"
-        )
+    spread = position_variance(changed)
     ended = changed.ranged & (spread > rules.delete_above_m**2)
     ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
     return changed.with_columns(status=np.where(ended, DELETED, status)), gated
 
 
-def _position_variance(part: TrackStore) -> FloatArray:
+def position_variance(part: TrackStore) -> FloatArray:
+    """Return the variance of each track's position, summed over its axes.
+
+    Raises
+    ------
+    ValueError
+        If one is negative or no number.
+    """
     total = np.zeros(len(part))
     for weight, spread in zip(part.weights, part.covariances(), strict=True):
         total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
+    good = np.isfinite(total) & (total >= 0.0)
+    if not bool(good.all()):
+        number = int(part.number[~good][0])
+        raise ValueError(
+            f"the covariance of track {number} has become singular: the stated variances are "
+            "smaller than what the filter's arithmetic resolves at this range; state larger ones"
+        )
     return total
 
 

@@ -18,9 +18,12 @@ from components.tracking.late_looks import (
     Memory,
     Plan,
     gone_back,
+    one_step_plan,
     rerun_plan,
+    stores_before,
     straight_plan,
 )
+from components.tracking.one_step import late_step
 from components.tracking.parameters import TrackerParameters
 from components.tracking.replica_memory import Heads, Past
 from components.tracking.report import Reported, state_tracks
@@ -87,7 +90,7 @@ class Tracker(Component):
         self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
-        self._late = 0
+        self._late, self._early = 0, 0
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -163,7 +166,9 @@ class Tracker(Component):
         if self.rules is None or fused.sensors != self._sensors:
             self.rules, self._sensors = self._rules(fused.sensors), fused.sensors
             self._store = TrackStore.empty(self.rules.bank.sizes, len(fused.sensors))
-        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake)
+        told = scans_of(fused)
+        self._early += int((told.tick > wake.ticks[told.row]).sum())
+        scans, self._ahead = when_made(told, self._ahead, wake)
         if len(scans) == 0:
             return None
         replica = wake.replica[scans.row]
@@ -178,29 +183,41 @@ class Tracker(Component):
             scans = Scans.joined([past.scans, scans])
             replica = np.concatenate([np.full(begin, past.replica), replica])
         of = np.searchsorted(heads.replica, replica)
-        if self.p.late == "rerun":
-            plan, left_out = rerun_plan(scans, of, begin, memory, self._lag_ticks)
-        else:
+        if self.p.late == "drop":
             plan, left_out = straight_plan(scans, of, heads.tick)
+        else:
+            planned = rerun_plan if self.p.late == "rerun" else one_step_plan
+            plan, left_out = planned(scans, of, begin, memory, self._lag_ticks)
         self._late += left_out
         moves = scans.velocity if self.rules.rates_of else None
         places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
         reported: list[Reported] = []
         for works in _turns(plan.of):
-            looks, mine = plan.look[works], plan.of[works]
-            if self.p.late == "rerun":
-                store = self._remember(store, heads, plan, works, before)
-            store, heads.next_number[mine] = step(
-                self.rules, store, scans, places, codes, looks, heads.replica[mine],
-                heads.next_number[mine],
-            )  # fmt: skip
-            heads.tick[mine] = scans.tick[looks]
+            late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
+            if len(late):
+                replicas = heads.replica[plan.of[late]]
+                old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
+                store = late_step(
+                    self.rules, store, old, scans, places, codes, plan.look[late], replicas
+                )
+            looks, mine = plan.look[works_now], plan.of[works_now]
+            if self.p.late != "drop":
+                store = self._remember(store, heads, plan, works_now, before)
+            if len(looks):
+                store, heads.next_number[mine] = step(
+                    self.rules, store, scans, places, codes, looks, heads.replica[mine],
+                    heads.next_number[mine],
+                )  # fmt: skip
+                heads.tick[mine] = scans.tick[looks]
             tell = plan.tells[works]
             if len(store) and tell.any():
                 reported.append(
                     Reported.of(
-                        store, heads.replica[mine[tell]], looks[tell], plan.row[works[tell]]
+                        store,
+                        heads.replica[plan.of[works[tell]]],
+                        plan.seen_from[works[tell]],
+                        plan.row[works[tell]],
                     )
                 )
         self._heads = heads.take(heads.replica == heads.replica[-1])
@@ -238,8 +255,8 @@ class Tracker(Component):
         return store
 
     def report(self) -> dict[str, Any]:
-        """Return how many looks came too late."""
-        return {"late_looks": {self.name: self._late}}
+        """Return how many looks came too late, and how many had to wait for their own instant."""
+        return {"late_looks": {self.name: self._late}, "early_looks": {self.name: self._early}}
 
 
 def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:

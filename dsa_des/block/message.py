@@ -194,6 +194,19 @@ class Message:
                 setattr(result, name, _pick(getattr(self, name), index))
         return result
 
+    def reordered(self, order: IntArray) -> Self:
+        """Return the message with its entries in another order, each still of its row.
+
+        Parameters
+        ----------
+        order : (entries,) of int
+            The entry that comes to each place; rows stay ascending.
+        """
+        result = copy(self)
+        for name in _layout(type(self))[1]:
+            setattr(result, name, _pick(getattr(self, name), order))
+        return result
+
     def shifted(self, ticks: int, scans: int) -> Self:
         """Return the message with its ticks, and its scan numbers if it has any, moved."""
         result = copy(self)

@@ -10,8 +10,52 @@ _ERRORS = (
 _IN_CELL = "wiring/test_noise_lies_in_its_cell.py"
 _VARIANCES = "wiring/test_variances_of_detections.py"
 _CARRIED = "wiring/test_what_fusion_carries.py"
+_ALIKE = "wiring/test_false_alarms_look_like_targets.py"
 
 FAULTS = [
+    *in_file(
+        _GROUP, "components/optical/frame_false_alarms.py", _ALIKE,
+        ("alarms-just-at-the-threshold", "signature - block.p.threshold,", "0.0 * signature,"),
+        ("alarms-of-no-pixels", 'else {"pixels": signal["pixels"]}', "else {}"),
+        ("alarms-of-cameras-last", "joined if marked else in_measured_order(joined)", "joined"),
+        ("alarms-of-one-contrast", "contrasts[which.astype(np.int64)]",
+         "contrasts[0 * which.astype(np.int64)]"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/false_alarms.py", _ALIKE,
+        ("noise-of-cameras-half-as-wide", "deviation = level / crossed or 1.0",
+         "deviation = 0.5 * level / crossed or 1.0"),
+    ),
+    *in_file(
+        _GROUP, "components/messages/false_detections.py", _ALIKE,
+        ("targets-in-their-order", "np.lexsort((*measured, row))", "np.argsort(row)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/false_alarm_effects.py", _ALIKE,
+        ("alarms-of-radars-last", "in_measured_order(self._with_alarms(detections))",
+         "self._with_alarms(detections)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/measured_strength.py", _ALIKE,
+        ("errors-by-the-mean-echo", "signal[found] *= snr / mean", "signal[found] *= 1.0"),
+        ("confidence-of-the-mean-echo", "confidence[found] = snr_db[found] -",
+         "confidence[found] = extras[\"snr_db\"][found] -"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/declaration_by_place.py",
+        ("sensor_effects/test_declaration_delay.py::test_places_are_remembered_across_windows",
+         "wiring/test_what_is_remembered_across_windows.py", _ALIKE),
+        ("places-forgotten", "known = new if self._memory is None else self._memory.then(new)",
+         "known = new"),
+        ("places-of-one-scan-fewer", "- (self.n - 1))", "- (self.n - 2))"),
+        ("places-declared-by-any", "declared = company >= self.m", "declared = company >= 1"),
+        ("places-in-body-axes", "        if own:\n            turned",
+         "        if False:\n            turned"),
+        ("places-at-any-speed", "~(np.abs(places.range_m[one] - places.range_m[other]) > gate_m)",
+         "np.ones(len(one), dtype=bool)"),
+        ("places-a-scan-apart", "wanted = places.scan[asked] - lag",
+         "wanted = places.scan[asked] - 1"),
+    ),
     *in_file(
         _GROUP, "components/sensor/measurement_errors.py", (_IN_CELL, _VARIANCES),
         ("places-of-noise-by-one-draw", "uniform(keys[noise], scan[noise], number)",
@@ -83,11 +127,10 @@ FAULTS = [
          "self._beams = azimuth, elevation\n        self._body"),
     ),
     *in_file(
-        _GROUP, "components/radar/false_alarm_effects.py", "wiring/test_false_alarms_of_radars.py",
-        ("strength-of-one-pulse", "pulses=self._block.p.pulses_summed,\n        )\n        extras",
-         "pulses=1,\n        )\n        extras"),
-        ("strength-by-half-its-decibels", '10.0 ** (0.1 * detections.extras["snr_db"])',
-         '10.0 ** (0.05 * detections.extras["snr_db"])'),
+        _GROUP, "components/radar/measured_strength.py", "wiring/test_false_alarms_of_radars.py",
+        ("strength-of-one-pulse", "pulses=self._block.p.pulses_summed", "pulses=1"),
+        ("strength-by-half-its-decibels", '10.0 ** (0.1 * extras["snr_db"][found])',
+         '10.0 ** (0.05 * extras["snr_db"][found])'),
     ),
     *in_file(
         _GROUP, "components/messages/every_look.py", "wiring/test_looks.py",
@@ -104,8 +147,7 @@ FAULTS = [
         _GROUP, "components/optical/camera.py", _VALUES,
         ("height-by-the-width-of-a-pixel", "self.pixel_elevation_rad**2 * variance",
          "self.pixel_azimuth_rad**2 * variance"),
-        ("false-alarms-without-weight", "max(self.p.threshold, 0.0) / weight",
-         "max(self.p.threshold, 0.0)"),
+        ("false-alarms-without-weight", "(self.p.static_weight or 1.0) * contrast", "contrast"),
     ),
     *in_file(
         _GROUP, "components/radar/resolution_effects.py",

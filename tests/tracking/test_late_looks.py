@@ -53,7 +53,31 @@ def test_the_state_at_the_end_is_the_same_to_the_bit(kind):
     assert "eo" not in "".join(dropped["contributors"].to_pylist())
 
 
-@pytest.mark.parametrize("late", ["drop", "rerun"])
+@pytest.mark.parametrize("kind", ["tracking.ekf", "tracking.imm"])
+def test_one_step_is_near_what_working_on_all_again_gives(kind):
+    """Both cameras are late by two looks of the radar, all the time; errors of what is told."""
+    stop = ["blocks.radar.scan_rate_hz=5", "blocks.eo.scan_rate_hz=2", "blocks.ir.scan_rate_hz=2",
+            "blocks.eo.false_alarms_per_frame=0", *LATE]  # fmt: skip
+    if kind == "tracking.imm":
+        stop.append("blocks.tracker.association='jpda'")
+    tables = {}
+    for late in ("drop", "one_step", "rerun"):
+        _, table = tracked(Simulation, scene(*stop, f"blocks.tracker.late='{late}'", kind=kind))
+        rows = {(r["tick"], r["track"]): r for r in table.to_pylist() if r["time_s"] > 2.0}
+        tables[late] = rows
+    exact = tables.pop("rerun")
+    apart = {}
+    for late, rows in tables.items():
+        shared = exact.keys() & rows.keys()
+        assert len(shared) > 20
+        apart[late] = np.sqrt(np.mean([
+            (rows[k][name] - exact[k][name]) ** 2 / exact[k][f"covariance_{i}{i}_m2"]
+            for k in shared for i, name in enumerate(("north_m", "east_m", "down_m"))
+        ]))  # fmt: skip
+    assert apart["one_step"] < 0.02 * apart["drop"]
+
+
+@pytest.mark.parametrize("late", ["drop", "one_step", "rerun"])
 def test_late_looks_change_no_byte_by_window_or_company(late):
     one = scene(*LATE, f"blocks.tracker.late='{late}'", duration_s="2.5")
     _, alone = tracked(Simulation, one)
@@ -82,3 +106,18 @@ def test_looks_older_than_the_lag_are_left_out_and_counted():
     )  # fmt: skip
     assert most > some > 0
     assert left_out() >= most
+
+
+def test_looks_of_the_future_wait_and_are_counted():
+    """A sweeping radar's scan is reported as it begins, with the instants of its beam."""
+    swept = scene("blocks.radar.beam_sweep=true", "blocks.radar.scan_rate_hz=1", duration_s="3")
+    simulation, table = tracked(Simulation, swept)
+    sink = MemorySink()
+    Simulation(swept, recorder=Recorder([sink])).run()
+    seen = sink.tables()["detections"].filter(
+        pc.equal(sink.tables()["detections"]["block"], "radar")
+    )
+    after = seen["illuminated_s"].to_numpy() > seen["time_s"].to_numpy()
+    report = simulation.nodes["tracker"].component.report()
+    assert report["early_looks"]["tracker"] == after.sum() > 0
+    assert (table["state_s"].to_numpy() <= table["time_s"].to_numpy()).all()

@@ -301,15 +301,18 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
         np.testing.assert_allclose(upward / (2.0 * pixel) ** 2, expected, rtol=1e-9)
 
 
-def test_a_camera_s_false_alarm_errs_like_one_pixel_at_the_threshold():
-    """Signature 0.6 of weight 0.3 is a contrast of 2, over noise 8."""
+def test_a_camera_s_false_alarm_errs_like_a_target_of_its_signature():
+    """Noise of signature E is E / 0.3 pixels of contrast 1, over a noise of 0.25."""
     keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 1.0}
-    run_ = alone("optical.eo", threshold=0.6, static_weight=0.3, quantised=False, **keys)
+    run_ = alone("optical.eo", threshold=0.6, quantised=False, scan_rate_hz=5, **keys)
     found = rows(run_, target=None)
     pixel = math.radians(0.01)
-    expected = pixel**2 * 8.0 * math.pi * (0.25 + 2.0 / 12.0) ** 2 / 8.0**2
-    assert found
+    assert len(found) == 5
     for row in found:
+        pixels = (row["confidence"] + 0.6) / 0.3
+        assert row["pixels"] == pytest.approx(pixels)
+        s2 = 0.25 + (pixels + 1.0) / 12.0
+        expected = pixel**2 * 8.0 * math.pi * s2**2 / (pixels / 0.25) ** 2
         assert row["azimuth_variance_rad2"] == pytest.approx(expected)
 
 

@@ -161,7 +161,9 @@ def test_a_late_look_is_left_out_or_worked_on_again(kind):
         return {name for joined in names for name in joined.split("+")}
 
     assert updated_by() == updated_by(late="rerun", lag_s=0.5) == {"radar"}
-    assert updated_by(late="rerun", lag_s=2.0) == {"radar", "eye"}
+    assert updated_by(late="one_step", lag_s=0.5) == {"radar"}
+    for late in ("one_step", "rerun"):
+        assert updated_by(late=late, lag_s=2.0) == {"radar", "eye"}
 
 
 @covers("alpha", "beta", "kappa", of=("tracking.ukf",))

@@ -2,7 +2,7 @@
 
 import crooked
 import pytest
-from wired import HEARS_ALL, SEES_ALL, chain
+from wired import HEARS_ALL, SEES_ALL, chain, sensor
 
 from dsa_des.library.scenes import load_scene
 from dsa_des.record.recording import MemorySink, Recorder
@@ -36,3 +36,18 @@ def test_the_first_declaration_stays_the_first(window):
     for target in crooked.TARGETS:
         (row,) = (r for r in rows if r["target"] == target["name"] and r["time_s"] == 0.5)
         assert found[target["name"]] == {"time_s": 0.5, "range_m": row["true_range_m"]}
+
+
+@pytest.mark.parametrize("window", [1, 2, 5])
+def test_places_are_remembered_as_long_as_the_rule_counts(window):
+    """A radar that misses now and then: the scan before the last one counts, too."""
+    radar = sensor("radar.swerling", power_w=2.0, false_alarm_probability=1e-4, scan_rate_hz=20,
+                   declare_m=2, declare_n=3, declare_by="place")  # fmt: skip
+    scene = chain({"radar": radar}, targets=[crooked.ROLLING], duration_s=3)
+    _, whole = ran(scene, None)
+    _, cut = ran(scene, window)
+    assert cut == whole
+    seen = {row["scan"]: row["declared"] for row in whole}
+    for scan, declared in seen.items():
+        assert declared is (scan - 1 in seen or scan - 2 in seen)
+    assert any(scan - 1 not in seen and scan - 2 in seen for scan in seen)
