@@ -31,9 +31,10 @@ def expected_range(pd, range_m):
     return mean / total
 
 
-def looks(**sets):
-    scene = dsa_des.load_scene(SCENE, sets=["record.looks=true", *(f"{k}={v}" for k, v in
-                                                                  sets.items())])  # fmt: skip
+def looks(duration_s, **sets):
+    """Every look of the radar; the camera takes two pictures a second to keep it short."""
+    told = ["record.looks=true", "blocks.eo.scan_rate_hz=2", *(f"{k}={v}" for k, v in sets.items())]
+    scene = dsa_des.load_scene(SCENE, sets=told, duration_s=duration_s)
     run = dsa_des.run(scene)
     found = [row for row in run["looks"].to_pylist() if row["block"] == "radar"]
     return run, found
@@ -42,7 +43,7 @@ def looks(**sets):
 def test_the_gain_of_declaration_range_is_the_analytic_one():
     gains = []
     for factor in (1, 4):
-        run, found = looks(**{"blocks.radar.cued_dwell_factor": factor})
+        run, found = looks("80", **{"blocks.radar.cued_dwell_factor": factor})
         range_m = [row["true_range_m"] for row in found]
         # Swerling I, one pulse: Pd = Pfa^(1/(1+SNR)), calibrated at 6.91 km for 1.76 dBsm.
         pfa = 1e-4
@@ -62,7 +63,7 @@ def test_the_gain_of_declaration_range_is_the_analytic_one():
 
 
 def test_a_cue_moves_no_scan_and_no_draw_of_an_uncued_look():
-    cued, plain = (looks(**{"blocks.radar.cued_dwell_factor": f})[1] for f in (4, 1))
+    cued, plain = (looks("10", **{"blocks.radar.cued_dwell_factor": f})[1] for f in (4, 1))
     assert [r["time_s"] for r in cued] == [r["time_s"] for r in plain]
     first = [r for r in cued if r["time_s"] < 0.5]
     assert first == [r for r in plain if r["time_s"] < 0.5]
