@@ -36,6 +36,7 @@ class OpticalRangeBoundary(Sensor):
     Parameters = CameraBoundaryParameters
     inputs = CUED_INPUTS
     lockstep = True
+    side_by_side = True
     ladders = (VISIBLE,)
 
     def setup(self) -> None:
