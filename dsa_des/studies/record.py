@@ -208,6 +208,12 @@ class StudyRecord(StudyHead):
         row : mapping
             Column → value of its row in the parts.
         """
+        return run_command(self.scene, int(row["seed"]), *self.changes(row))
+
+    def changes(
+        self, row: Mapping[str, Any]
+    ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+        """Return the swaps and the values that make the scene of a run."""
         swaps, sets = list(self.swaps), list(self.sets)
         place = int(row["cell"])
         places = []
@@ -218,7 +224,7 @@ class StudyRecord(StudyHead):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         sets += [(draw.key, set_text(row[draw.column])) for draw in self.draws]
-        return run_command(self.scene, int(row["seed"]), swaps, sets)
+        return swaps, sets
 
 
 def results_of(study: Study) -> list[Result]:

@@ -45,7 +45,7 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
 
     _check_axes(study, add)
     scenes: list[Scene] = []
-    for cell in _one_per_value(study):
+    for cell in one_per_value(study):
         try:
             scenes.append(study.scene(cell))
         except SceneError as error:
@@ -199,7 +199,7 @@ def _build_metrics(
     return built
 
 
-def _one_per_value(study: Study) -> list[int]:
+def one_per_value(study: Study) -> list[int]:
     """Return cells that together hold every value of every axis; the first cell comes first."""
     wanted = [(0,) * len(study.axes)]
     for place, axis in enumerate(study.axes):
