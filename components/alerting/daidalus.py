@@ -12,6 +12,7 @@ from components.alert_configuration.margins import Deviations, margins
 from components.alerting.alert_table import without_memory
 from components.alerting.believed_flights import BelievedFlights
 from components.alerting.followed_tracks import FollowedTracks
+from components.alerting.lasting_memory import LastingMemory
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import AlertMemory
 from components.alerting.own_poses import OwnPoses
@@ -79,6 +80,8 @@ class DaidalusAlerting(Component):
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
 
     def request(self, port: str) -> Any:
         """Ask for no poses beside what is fused: the ownship's own come with the states."""
@@ -107,10 +110,14 @@ class DaidalusAlerting(Component):
         self._own = OwnPoses(self.context.ticks_per_s)
         self._followed = FollowedTracks(self._configuration["hysteresis_time"])
 
+    def serves_replicas(self) -> bool:
+        """Say no where tracks are followed by their numbers, which belong to a run."""
+        return super().serves_replicas() and self._source != "estimates"
+
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
         for arrived in wake.arrivals("states"):
-            self._take_states(arrived)
+            self._take_states(arrived, wake)
         if self._roster is None:
             return None
         if self._source:
@@ -118,20 +125,23 @@ class DaidalusAlerting(Component):
                 if self._source == "estimates":
                     self._followed.add(arrived.tick, arrived.message)
                 else:
-                    self._take_sights(arrived)
+                    self._take_sights(arrived, wake)
         ticks = wake.ticks[wake.scans >= 0]
-        return self._levels(ticks) if len(ticks) else None
+        # Before the first state of a run has come, it has no levels.
+        ticks = ticks[self._own.have_come(ticks, _begins(ticks, wake))]
+        return self._levels(ticks, wake) if len(ticks) else None
 
-    def _take_states(self, arrived: Arrivals) -> None:
+    def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
         """Remember the ownship's pose, and where the targets are if that is asked for."""
         states: TrafficStates = arrived.message
         if self._roster is None:
             self._roster = states.roster
             count = len(states.roster)
             self._fit = StraightFit(self.p.fit_s, count)
-            followed = 0 if self._source == "estimates" else count
-            self._memory = AlertMemory(memory_rule(self._configuration), followed)
-        self._own.add(arrived.tick, states)
+            rule = memory_rule(self._configuration)
+            self._memory = LastingMemory(rule, count)
+            self._of_tracks = AlertMemory(rule, 0)
+        self._own.add(arrived.tick, states, wake)
         if self._source in ("tracks", "fused"):
             return
         own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
@@ -143,9 +153,9 @@ class DaidalusAlerting(Component):
         if self._source:
             self._followed.add_truth(arrived.tick, position)
         else:
-            self._fit.add(arrived.tick, states.tick / self.context.ticks_per_s, position)
+            self._fit.add(arrived.tick, wake.own_ticks(states.tick) / wake.ticks_per_s, position)
 
-    def _take_sights(self, arrived: Arrivals) -> None:
+    def _take_sights(self, arrived: Arrivals, wake: Wake) -> None:
         """Turn what was measured in body axes into positions east, north and up."""
         sights = arrived.message
         row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
@@ -153,7 +163,8 @@ class DaidalusAlerting(Component):
         if self._source == "tracks":
             new &= sights.updated  # others came with an earlier row
         # The attitude of when it was measured, of those that have arrived.
-        place = self._own.pose_of(sights.measured_tick, arrived.tick[row])
+        came = arrived.tick[row]
+        place = self._own.pose_of(sights.measured_tick, came, _begins(came, wake), new)
         new &= place >= 0
         row = row[new]
         yaw, pitch, roll = self._own.attitude_rad(place[new])
@@ -166,20 +177,25 @@ class DaidalusAlerting(Component):
         line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
         position = np.full((len(made), len(self._roster), 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
-        self._fit.add(came, made / self.context.ticks_per_s, position)
+        self._fit.add(came, wake.own_ticks(made) / wake.ticks_per_s, position)
 
-    def _levels(self, ticks: IntArray) -> AlertLevels:
+    def _levels(self, ticks: IntArray, wake: Wake) -> AlertLevels:
         """Return the levels at some scans."""
-        times = (ticks / self.context.ticks_per_s).tolist()
+        times = wake.own_ticks(ticks) / wake.ticks_per_s
+        begins = _begins(ticks, wake)
         estimated = self._source == "estimates"
-        own = self._own.states(ticks, 0.0 if estimated else self.p.fit_s)
+        own = self._own.states(ticks, begins, 0.0 if estimated else self.p.fit_s)
         if estimated:
-            flights = self._followed.flights(ticks, times, own, self._own.place(ticks))
-            self._memory.grow(flights.known.shape[1])
-            self._memory.forget(flights.new)
+            places = self._own.place(ticks)
+            flights = self._followed.flights(ticks, times.tolist(), own, places)
+            self._of_tracks.grow(flights.known.shape[1])
+            self._of_tracks.forget(flights.new)
             self._own.forget_before(int(ticks[-1]))
         else:
-            flights = self._fitted(ticks, times)
+            known, state = self._fit.states(begins, ticks, times)
+            # Positions count from the ownship: its own less theirs is the other way round.
+            flights = BelievedFlights(known, tuple(-state))
+            self._forget(ticks, times, wake)
         known, relative = flights.known, [np.ravel(part) for part in flights.relative]
         bounds = None
         if flights.deviations is not None:
@@ -188,9 +204,11 @@ class DaidalusAlerting(Component):
         pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape), bounds)
         times_s, *both = levels_without_memory(self._configuration, self._alerter, pairs)
         due, early = (part.reshape(*known.shape, len(self._alerter.levels)) for part in both)
-        level = [
-            self._memory.step(now_s, known[i], due[i], early[i]) for i, now_s in enumerate(times)
-        ]
+        level = (
+            self._of_tracks.levels(times, known, due, early)
+            if estimated
+            else self._memory.levels(wake.replica_of(ticks), times, known, due, early)
+        )
         row, column = np.nonzero(known)
         place = np.flatnonzero(known.ravel())
         lookahead_s = self._configuration["lookahead_time"]
@@ -202,7 +220,7 @@ class DaidalusAlerting(Component):
             ticks,
             offsets_of(row, len(ticks)),
             column if flights.target is None else flights.target[row, column],
-            np.concatenate(level)[place],
+            level[place],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
             found.time_to_closest_s[place],
             found.miss_horizontal_m[place],
@@ -214,18 +232,20 @@ class DaidalusAlerting(Component):
             self._roster,
         )
 
-    def _fitted(self, ticks: IntArray, times: list[float]) -> BelievedFlights:
-        """Return the flights of targets by their positions of the last seconds."""
-        fitted = [
-            self._fit.states(int(tick), now_s)
-            for tick, now_s in zip(ticks.tolist(), times, strict=True)
-        ]
-        self._fit.forget_before(times[-1])
-        self._own.forget_before(int(ticks[-1]) - round(self.p.fit_s * self.context.ticks_per_s))
-        known = np.stack([one for one, _ in fitted])
-        # Positions count from the ownship: its own less theirs is the other way round.
-        relative = tuple(-np.stack([state[i] for _, state in fitted]) for i in range(6))
-        return BelievedFlights(known, relative)
+    def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
+        """Drop what no later scan asks for."""
+        span = round(self.p.fit_s * self.context.ticks_per_s)
+        if wake.side_by_side:
+            # The scans of the next stretch of time come after all of these.
+            self._fit.forget_before(float(times.min()))
+            self._own.set_aside(int(wake.own_ticks(ticks).min()) - span, wake)
+            return
+        last = ticks[-1:]
+        begin = int(_begins(last, wake)[0])  # what was before is of runs that have passed
+        self._fit.forget_ticks_before(begin)
+        self._fit.forget_before(float(times[-1]))
+        self._memory.forget_before(int(wake.replica_of(last)[0]))
+        self._own.forget_before(int(last[0]) - span, begin)
 
     def _own_flights(self, own: Mapping[str, FloatArray], shape: tuple[int, ...]) -> State:
         """Return the ownship's flight beside every target, in its own plane."""
@@ -233,6 +253,11 @@ class DaidalusAlerting(Component):
         motion = (np.nan_to_num(own[name]) for name in _OWN_MOTION)
         alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
         return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
+
+
+def _begins(ticks: IntArray, wake: Wake) -> IntArray:
+    """Return when the runs of some instants begin."""
+    return ticks - wake.own_ticks(ticks) if wake.span_ticks else np.zeros_like(ticks)
 
 
 def _by_instant(

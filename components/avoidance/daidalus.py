@@ -57,13 +57,16 @@ class TurnOut(Component):
     outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
     Parameters = TurnOutParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
-        self._free_from = 0
+        #: By replica, from when on it may turn again.
+        self._free_from: dict[int, int] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look at every instant with an alert."""
@@ -71,16 +74,17 @@ class TurnOut(Component):
         if alerts is None:
             return None
         ticks, told = [], []
-        for place, tick in enumerate(wake.ticks.tolist()):
-            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-            highest = int(np.max(alerts.level[entries], initial=0))
-            if highest < self.p.level or tick < self._free_from:
+        replica = wake.replica
+        for place in np.flatnonzero(alerts.highest() >= self.p.level).tolist():
+            tick, run = int(wake.ticks[place]), int(replica[place])
+            if tick < self._free_from.get(run, 0):
                 continue
+            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
             manoeuvre = self._manoeuvre(alerts, place, entries)
             if manoeuvre is not None:
                 ticks.append(tick)
                 told.append(manoeuvre)
-                self._free_from = tick + self._pause_ticks
+                self._free_from[run] = tick + self._pause_ticks
         return Manoeuvres.of(ticks, told) if ticks else None
 
     def _manoeuvre(self, alerts: AlertLevels, place: int, entries: slice) -> Manoeuvre | None:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from components.aircraft.aircraft import Roster
 from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -61,3 +63,9 @@ class AlertLevels(Message):
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
+
+    def highest(self) -> IntArray:
+        """Return the highest level of each row, 0 where there is no target, (rows,)."""
+        found = np.zeros(len(self), dtype=np.int64)
+        np.maximum.at(found, np.repeat(np.arange(len(self)), np.diff(self.offsets)), self.level)
+        return found

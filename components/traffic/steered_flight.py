@@ -17,6 +17,7 @@ from components.traffic.legs import AnyLeg, Climb, ScriptedTrajectory, Straight,
 _SPEED_STEP_S = 0.5
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
+AROUND_S = np.array([-_BASE_S, 0.0, _BASE_S])
 
 
 class SteerableFlight(Protocol):
@@ -67,25 +68,7 @@ class SteeredFlight:
             the path's projection, and without acceleration upward. Speeds change steadily, each
             without the other.
         """
-        state = self.at(np.array([time_s - _BASE_S, time_s, time_s + _BASE_S]))
-        here = float(state.lat_deg[1]), float(state.lon_deg[1]), float(state.alt_m[1])
-        # Ends of the chord seen from its middle, so that the track is the one there.
-        north, east, _ = line_of_sight_ned(
-            *here, state.lat_deg[[0, 2]], state.lon_deg[[0, 2]], state.alt_m[[0, 2]]
-        )
-        along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
-        speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
-        climb = 0.5 * float(state.alt_m[2] - state.alt_m[0]) / _BASE_S
-        part = ScriptedTrajectory(
-            self.name,
-            lat_deg=here[0],
-            lon_deg=here[1],
-            alt_m=here[2],
-            heading_deg=math.degrees(math.atan2(along_east, along_north)),
-            speed_mps=speed,
-            legs=_legs(told, here[2], speed, climb),
-            start_time_s=time_s,
-        )
+        part = flown_from(self.name, self.at(time_s + AROUND_S), time_s, told)
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -106,6 +89,39 @@ class SteeredFlight:
         order = np.argsort(np.concatenate(chosen), kind="stable")
         columns = zip(*(state.arrays() for state in states), strict=True)
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
+
+
+def flown_from(
+    name: str, around: TrajectoryState, time_s: float, told: Manoeuvre
+) -> ScriptedTrajectory:
+    """Return what is flown from a manoeuvre on.
+
+    Parameters
+    ----------
+    name : str
+    around : TrajectoryState
+        Arrays (3,): where the aircraft would be without it, `AROUND_S` of the time.
+    time_s : float
+    told : Manoeuvre
+    """
+    here = float(around.lat_deg[1]), float(around.lon_deg[1]), float(around.alt_m[1])
+    # Ends of the chord seen from its middle, so that the track is the one there.
+    north, east, _ = line_of_sight_ned(
+        *here, around.lat_deg[[0, 2]], around.lon_deg[[0, 2]], around.alt_m[[0, 2]]
+    )
+    along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
+    speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
+    climb = 0.5 * float(around.alt_m[2] - around.alt_m[0]) / _BASE_S
+    return ScriptedTrajectory(
+        name,
+        lat_deg=here[0],
+        lon_deg=here[1],
+        alt_m=here[2],
+        heading_deg=math.degrees(math.atan2(along_east, along_north)),
+        speed_mps=speed,
+        legs=_legs(told, here[2], speed, climb),
+        start_time_s=time_s,
+    )
 
 
 def _legs(told: Manoeuvre, alt_m: float, speed_mps: float, climb_mps: float) -> list[AnyLeg]:
