@@ -17,7 +17,6 @@ from components.estimation.batched import (
     solve_lower,
     solve_upper,
     squared_length,
-    symmetric,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 

@@ -123,9 +123,7 @@ def direction(
     # Along the unit vector in which the elevation grows.
     a, b, up = c * (z / distance), s * (z / distance), -safe / distance
     upward = a * a * covariance[0, 0] + b * b * covariance[1, 1] + up * up * covariance[2, 2]
-    upward += 2.0 * (
-        a * b * covariance[0, 1] + up * (a * covariance[0, 2] + b * covariance[1, 2])
-    )
+    upward += 2.0 * (a * b * covariance[0, 1] + up * (a * covariance[0, 2] + b * covariance[1, 2]))
     return (
         np.arctan2(y, x), np.arctan2(-z, level),
         across / (safe * safe), upward / (distance * distance),

@@ -4,9 +4,11 @@ Between looks a target may change its model, as a Markov chain in continuous tim
 so that the mixing follows the time between looks whatever the sensors' scan rates.
 
 Sources: Blom, Bar-Shalom, IEEE Trans. AC 33 (1988); Bar-Shalom, Li, Kirubarajan (2001), §11.6.6.
-Models of different states are mixed by the components they share; what a model has alone keeps its
-own mean and spread (Granström, Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal
-dimension states*, IEEE Trans. AES 51 (2015), the unbiased choice).
+Models of different states are mixed by the components they share. What a target that enters a model
+has not had before, a turn rate or an acceleration, is 0 with the spread of a new track's: were it
+what the model's own filter thought while it was not true, a turn would be learnt late (Granström,
+Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal dimension states*, IEEE Trans.
+AES 51 (2015), discuss the choices).
 """
 
 from collections.abc import Sequence
@@ -65,6 +67,7 @@ def mixed(
     covariances: Sequence[FloatArray],
     probabilities: FloatArray,
     transitions: FloatArray,
+    fresh: Sequence[float],
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
     """Return what each model starts from, and the models' probabilities before the look.
 
@@ -76,6 +79,8 @@ def mixed(
     covariances : sequence of (d_i, d_i, n)
     probabilities : (modes, n)
     transitions : (modes, modes, n)
+    fresh : (modes,) of float
+        Variance of what a model has besides position and velocity, in a target that enters it.
 
     Returns
     -------
@@ -95,7 +100,7 @@ def mixed(
         covariance = np.zeros_like(covariances[j])
         for i in range(many):
             apart = given[i] - state
-            whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
+            whole = _filled_covariance(covariances[i], covariances[j], sizes[i], fresh[j])
             covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
         new_states.append(state)
         new_covariances.append(symmetric(covariance))
@@ -163,15 +168,18 @@ def _shared(one: FloatArray, other: FloatArray) -> int:
 
 
 def _filled(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
-    return given[:shared] if shared == len(own) else np.concatenate([given[:6], own[6:]])
+    if shared == len(own):
+        return given[:shared]
+    return np.concatenate([given[:6], np.zeros_like(own[6:])])
 
 
-def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
+def _filled_covariance(given: FloatArray, own: FloatArray, shared: int, fresh: float) -> FloatArray:
     if shared == len(own):
         return given[:shared, :shared]
     whole = np.zeros_like(own)
     whole[:6, :6] = given[:6, :6]
-    whole[6:, 6:] = own[6:, 6:]
+    for i in range(6, len(own)):
+        whole[i, i] = fresh
     return whole
 
 

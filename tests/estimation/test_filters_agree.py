@@ -190,6 +190,7 @@ def test_interacting_models_follow_the_textbook():
             [c[:, :, np.newaxis] for c in covariances],
             probabilities[:, np.newaxis],
             got[:, :, 1:],
+            (0.0, 1.7, 0.3),
         )
         np.testing.assert_allclose(predicted[:, 0], probabilities @ steps, rtol=1e-12)
         for j, model in enumerate(models):
@@ -200,9 +201,10 @@ def test_interacting_models_follow_the_textbook():
                     given.append((states[i], covariances[i]))
                     continue
                 x, c = states[j].copy(), covariances[j].copy()
-                x[:6] = states[i][:6]
+                x[:6], x[6:] = states[i][:6], 0.0
                 c[:6, :6] = covariances[i][:6, :6]
                 c[:6, 6:] = c[6:, :6] = 0.0
+                c[6:, 6:] = np.eye(model.size - 6) * (0.0, 1.7, 0.3)[j]
                 given.append((x, c))
             mean = sum(w * x for w, (x, _) in zip(mu, given, strict=True))
             spread = sum(
