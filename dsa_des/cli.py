@@ -206,6 +206,12 @@ _workers_option = click.option(
 @click.option("--out", metavar="DIR", help="Folder for the results [default: studies/STUDY-NNN].")
 @click.option("--metrics", is_flag=True, help="List what studies can measure.")
 @_figures_option
+@click.option(
+    "--measure",
+    is_flag=True,
+    help="Measure how wrong the models of the first run are, for the report; by itself from 100 "
+    "runs on.",
+)
 @click.option("--quiet", is_flag=True, help="Print no tables.")
 @plain_errors
 def study(**options: Any) -> None:

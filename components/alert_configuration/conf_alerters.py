@@ -8,11 +8,14 @@ from components.alert_configuration.conf_keys import (
     CLASSES,
     KEYS,
     LEVEL_KEYS,
+    TCAS_CLASS,
+    TCAS_KEYS,
     VOLUME_KEYS,
 )
 from components.alert_configuration.conf_values import BadValue, parse_value
 from components.alert_configuration.configuration import Alerter, Level
 from components.traffic.traffic_file import MOST_OF_A_CELL, Problems, did_you_mean
+from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.text.safe_text import shortened
 
@@ -87,12 +90,6 @@ class AlerterKeys:
         for key, kind in LEVEL_KEYS.items():
             needed = key in ("region", "detector", "alerting_time")
             values[key] = self._value(begin + key, kind, needed, f"{name}_alert_{number}_{key}")
-        for spread in _SPREADS:
-            if values[spread]:
-                self._problems.add(
-                    f"{name}_alert_{number}_{spread} is not 0: only 0 is supported",
-                    line=self._lines[begin + spread][0],
-                )
         if values["detector"] is None:
             return None
         volume = self._volume(name, prefix, str(values["detector"]), begin + "detector")
@@ -106,11 +103,12 @@ class AlerterKeys:
             alerting_s,
             alerting_s if early_s is None else float(early_s),
             volume[1],
+            tuple((key.removeprefix("spread_"), values[key]) for key in _SPREADS if values[key]),
         )
 
     def _volume(
         self, name: str, prefix: str, detector: str, named_by: str
-    ) -> tuple[Volume, bool] | None:
+    ) -> tuple[Volume | TcasAdvisory, bool] | None:
         """Return the volume of a detector and whether bounds on the states count."""
         key = f"{prefix}{_CLASS}{detector.lower()}"
         self._expected.add(key)
@@ -129,13 +127,18 @@ class AlerterKeys:
         self._used.add(key)
         number, _, text = self._lines[key]
         class_name = text.rpartition(".")[2]
-        if text not in {CLASS_PREFIX + known for known in CLASSES}:
+        allowed = (*CLASSES, TCAS_CLASS)
+        if text not in {CLASS_PREFIX + known for known in allowed}:
             self._problems.add(
                 f"{self._lines[key][1]} is {shortened(text, 80)!r}: it must be {CLASS_PREFIX} and "
-                f"one of {', '.join(CLASSES)}{did_you_mean(class_name, CLASSES)}",
+                f"one of {', '.join(allowed)}{did_you_mean(class_name, allowed)}",
                 line=number,
             )
         begin = f"{prefix}{detector.lower()}_"
+        if class_name == TCAS_CLASS:
+            ((which, kind),) = TCAS_KEYS.items()
+            shown = f"{name}_{detector}_{which}"
+            return TcasAdvisory(bool(self._value(begin + which.lower(), kind, False, shown))), False
         sizes = {
             size: self._value(
                 begin + size.lower(), kind, size != "WCV_TCOA", f"{name}_{detector}_{size}"

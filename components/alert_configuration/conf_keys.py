@@ -109,6 +109,9 @@ VOLUME_KEYS: Mapping[str, str] = {
     "WCV_TTHR": "time",
     "WCV_TCOA": "time",
 }
+#: Keys of the class TCAS3D: its tables are fixed, and one key says which of them.
+TCAS_KEYS: Mapping[str, str] = {"TCAS3D_RA": "yes or no"}
+TCAS_CLASS = "TCAS3D"
 #: Time variable by class of volume.
 CLASSES: Mapping[str, str] = {
     "WCV_TAUMOD": "modified_tau",

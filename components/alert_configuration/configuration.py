@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 
 #: Regions of guidance from mild to severe.
@@ -16,20 +17,24 @@ class Level:
 
     Parameters
     ----------
-    volume : Volume
+    volume : Volume or TcasAdvisory
     region : str
         What its bands are painted as, one of `REGIONS`.
     alerting_time_s, early_alerting_time_s : float
         How long before the volume is entered the level is due; the early one holds while it is on.
     uncertain : bool
         Whether the bounds on the states count (volumes of class WCV_TAUMOD_SUM).
+    spreads : tuple of (kind, size)
+        By kind of guidance (hdir, hs, vs, alt): the level is due too if values so near the
+        ownship's own lead to its volume, rad, m/s, m. Kinds without a spread are left out.
     """
 
-    volume: Volume
+    volume: Volume | TcasAdvisory
     region: str
     alerting_time_s: float
     early_alerting_time_s: float
     uncertain: bool = False
+    spreads: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

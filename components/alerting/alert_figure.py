@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from components.alert_configuration.configuration import Configuration
-from components.alerting.bands_over_time import BandsOverTime, direction_bands
+from components.alerting.bands_over_time import BandsOverTime, bands_over_time
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
-from components.well_clear.volume import NAUTICAL_MILE_M
+from components.well_clear.volume import NAUTICAL_MILE_M, Volume
 from dsa_des.record.drawing import drawing, figure_text, tight
 
 #: Colour of each level from 0; levels beyond the last share its colour.
@@ -17,7 +17,7 @@ _COLOURS = ("#7f7f7f", "#e6b800", "#e07b00", "#c1121f")
 #: Colour of each region's bands; NONE is left blank.
 _REGIONS = {"FAR": "#f2d66b", "MID": "#e07b00", "NEAR": "#c1121f", "RECOVERY": "#5aa469"}
 _STYLES = ("-", "--", "-.", ":")
-_MOST_NAMED = 8
+_MOST_NAMED = 6
 
 
 def draw_alerts(
@@ -43,7 +43,7 @@ def draw_alerts(
         over_time = figure.add_subplot(grid[0, 0])
         _levels(over_time, configuration, encounter, alerts)
         _times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
-        bands = direction_bands(configuration, encounter, alerts)
+        bands = bands_over_time("hdir", configuration, encounter, alerts)
         _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
         _from_above(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
         figure.suptitle(figure_text(title))
@@ -63,8 +63,8 @@ def _levels(axes: Any, configuration: Configuration, encounter: Encounter, alert
     axes.set_yticks(range(configuration.most_levels + 1))
     axes.set_ylim(-0.2, configuration.most_levels + 0.2)
     axes.set_ylabel("alert level")
-    axes.set_title("alert level")
-    axes.legend(loc="upper left")
+    axes.set_title("alert level", loc="left")
+    _legend_above(axes)
 
 
 def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
@@ -82,38 +82,58 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
             label=f"level {number + 1}",
         )
     axes.set_ylabel("time to violation, s")
-    axes.set_title("time to the volume of each level")
+    axes.set_title("time to each level's volume", loc="left")
     axes.set_ylim(bottom=0.0)
-    axes.legend(loc="upper right")
+    _legend_above(axes)
 
 
 def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
     """Draw the bands of direction over time, and the direction that is flown."""
     time_s = found.time_s - encounter.time_s[0]
-    width_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
-    named: set[str] = set()
-    for at_s, bands in zip(time_s.tolist(), found.bands, strict=True):
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    ends_s = np.append(time_s[1:], time_s[-1] + step_s)
+    # Bands hold until the next instant, but not over a gap in the recording.
+    ends_s = np.minimum(ends_s, time_s + 3.0 * step_s)
+    stretches: dict[str, list[Any]] = {region: [] for region in _REGIONS}
+    for begin_s, end_s, bands in zip(time_s.tolist(), ends_s.tolist(), found.bands, strict=True):
         for band in bands:
-            colour = _REGIONS.get(band.region)
-            if colour is None:
-                continue
-            axes.bar(
-                at_s,
-                np.degrees(band.high - band.low),
-                width_s,
-                np.degrees(band.low),
-                color=colour,
-                align="edge",
-                label=None if band.region in named else band.region,
-            )
-            named.add(band.region)
-    axes.plot(time_s, np.degrees(found.own_value), "k.", markersize=2, label="flown")
+            if band.region in stretches:
+                low, high = np.degrees([band.low, band.high]).tolist()
+                stretches[band.region].append(
+                    [(begin_s, low), (end_s, low), (end_s, high), (begin_s, high)]
+                )
+    for region, corners in stretches.items():
+        if corners:
+            _fill(axes, corners, _REGIONS[region], region)
+    axes.plot(time_s, np.degrees(found.own_value), "k.", markersize=1.5, label="flown")
+    axes.set_xlim(0.0, max(float(ends_s[-1]), 1e-3))
     axes.set_ylim(0.0, 360.0)
     axes.set_yticks((0, 90, 180, 270, 360))
     axes.set_ylabel("direction, deg")
     axes.set_xlabel(f"time since {encounter.time_s[0]:.10g} s, s")
-    axes.set_title("bands of direction over ground")
-    axes.legend(loc="upper left")
+    axes.set_title("bands of direction", loc="left")
+    _legend_above(axes)
+
+
+def _fill(axes: Any, corners: list[Any], colour: str, label: str) -> None:
+    """Fill rectangles without seams between those that touch."""
+    from matplotlib.collections import PolyCollection
+
+    axes.add_collection(
+        PolyCollection(
+            corners, facecolor=colour, edgecolor=colour, linewidth=0.3, zorder=1, label=label
+        )
+    )
+
+
+def _legend_above(axes: Any) -> None:
+    """Put the legend above the axes, at the right: it covers nothing that is drawn."""
+    handles, _ = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), frameon=False,
+            borderaxespad=0.1, handlelength=1.2, columnspacing=0.9, fontsize="small",
+        )  # fmt: skip
 
 
 def _from_above(
@@ -140,7 +160,9 @@ def _from_above(
     axes.set_xlabel("east, nmi")
     axes.set_ylabel("north, nmi")
     axes.set_title("flights, and the volume where they are closest")
-    axes.legend(loc="best")
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, frameon=False, fontsize="small"
+    )
 
 
 def _volume(axes: Any, configuration: Configuration, encounter: Encounter) -> None:
@@ -153,7 +175,7 @@ def _volume(axes: Any, configuration: Configuration, encounter: Encounter) -> No
     )
     alerter = configuration.alerters[int(encounter.alerter[row, column])]
     level = configuration.corrective_level(alerter)
-    if level is None:
+    if level is None or not isinstance(level.volume, Volume):
         return
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     radius = level.volume.horizontal_m / NAUTICAL_MILE_M

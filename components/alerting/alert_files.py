@@ -1,5 +1,7 @@
 """``dsa-des alert``: tables and figures of recorded encounters."""
 
+import math
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,9 +11,11 @@ from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_figure import draw_alerts
 from components.alerting.alert_table import alert_table, without_memory
+from components.alerting.bands_over_time import bands_table
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.traffic.traffic_file import TrafficFileError
+from components.traffic.units import SPEED_MPS
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import check_file, write_file
@@ -38,6 +42,8 @@ def alert_files(
     out: str,
     no_hysteresis: bool,
     figure: str | None,
+    bands: str | None,
+    wind: tuple[float, float] | None,
     decimals: int,
 ) -> None:
     """Write the tables and figures that the command line asks for.
@@ -50,10 +56,11 @@ def alert_files(
         If a result cannot be written.
     """
     paths, several = _found(encounters)
-    names = {"--out": out, **({"--figure": figure} if figure is not None else {})}
-    places = {option: named(name, option) for option, name in names.items()}
-    if figure is not None and places["--out"].resolve() == places["--figure"].resolve():
-        raise UsageError("--figure and --out name the same place: each needs its own")
+    names = {"--out": out, "--figure": figure, "--bands": bands}
+    places = {option: named(name, option) for option, name in names.items() if name is not None}
+    for (option, place), (other, its) in combinations(places.items(), 2):
+        if place.resolve() == its.resolve():
+            raise UsageError(f"{other} and {option} name the same place: each needs its own")
     for option, place in places.items():
         if several:
             OutputFolder(place).check()
@@ -62,14 +69,13 @@ def alert_files(
     configuration = _read(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
-    done = _alerts(configuration, paths)
+    done = _alerts(configuration, paths, _wind_mps(wind))
     try:
         if several:
             _write_folders(configuration, done, places, decimals)
         else:
-            _write(configuration, done[0], places["--out"], decimals)
-            if "--figure" in places:
-                _draw(configuration, done[0], places["--figure"])
+            for option, place in places.items():
+                _WRITERS[option](configuration, done[0], place, decimals)
     except OSError as error:
         raise OutputError(f"{error.filename or out}: cannot be written: {reason_of(error)}") from (
             error
@@ -109,12 +115,14 @@ def _read(path: Path) -> Configuration:
         raise UsageError(*str(error).split("\n")) from error
 
 
-def _alerts(configuration: Configuration, paths: list[Path]) -> list[_Done]:
+def _alerts(
+    configuration: Configuration, paths: list[Path], wind_mps: tuple[float, float] | None
+) -> list[_Done]:
     """Return the alerts of all files, or one error about all that cannot be used."""
     done, problems = [], []
     for path in paths:
         try:
-            encounter = read_encounter(path, configuration)
+            encounter = read_encounter(path, configuration, wind_mps)
         except TrafficFileError as error:
             problems.append(str(error).split("\n"))
             continue
@@ -122,9 +130,8 @@ def _alerts(configuration: Configuration, paths: list[Path]) -> list[_Done]:
             configuration,
             encounter.time_s,
             encounter.present,
-            encounter.relative,
+            encounter.pairs,
             encounter.alerter,
-            encounter.bounds,
         )
         done.append(_Done(path, encounter, alerts))
     if problems:
@@ -135,24 +142,44 @@ def _alerts(configuration: Configuration, paths: list[Path]) -> list[_Done]:
     return done
 
 
+def _wind_mps(wind: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return the wind that the command line sets, towards the east and north."""
+    if wind is None:
+        return None
+    towards_deg, knots = wind
+    if not (math.isfinite(towards_deg) and math.isfinite(knots) and knots >= 0.0):
+        raise UsageError(
+            f"--wind is {towards_deg:g} {knots:g}: a direction and a speed that is not negative "
+            "are needed"
+        )
+    towards, speed = math.radians(towards_deg), knots * SPEED_MPS["knot"]
+    return speed * math.sin(towards), speed * math.cos(towards)
+
+
 def _write_folders(
     configuration: Configuration, done: list[_Done], places: dict[str, Path], decimals: int
 ) -> None:
-    with OutputFolder(places["--out"]).writing() as folder:
-        for one in done:
-            _write(configuration, one, folder / f"{one.path.stem}.csv", decimals)
-    if "--figure" in places:
-        with OutputFolder(places["--figure"]).writing() as folder:
+    for option, place in places.items():
+        suffix = ".png" if option == "--figure" else ".csv"
+        with OutputFolder(place).writing() as folder:
             for one in done:
-                _draw(configuration, one, folder / f"{one.path.stem}.png")
+                path = folder / f"{one.path.stem}{suffix}"
+                _WRITERS[option](configuration, one, path, decimals)
 
 
 def _write(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
     write_file(path, alert_table(configuration, one.encounter, one.alerts, decimals).encode())
 
 
-def _draw(configuration: Configuration, one: _Done, path: Path) -> None:
+def _write_bands(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
+    write_file(path, bands_table(configuration, one.encounter, one.alerts, decimals).encode())
+
+
+def _draw(configuration: Configuration, one: _Done, path: Path, decimals: int) -> None:
     draw_alerts(path, one.path.stem, configuration, one.encounter, one.alerts)
+
+
+_WRITERS = {"--out": _write, "--bands": _write_bands, "--figure": _draw}
 
 
 def _show(configuration: Configuration, done: list[_Done], places: dict[str, Path]) -> None:

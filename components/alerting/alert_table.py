@@ -9,6 +9,8 @@ from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.alerting.separation import separation
 from components.traffic.units import LENGTH_M, SPEED_MPS
+from components.well_clear.tcas import TcasAdvisory
+from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Decimals of numbers, unless said otherwise.
@@ -50,12 +52,13 @@ def alert_table(
         Of every number; trailing zeros are left out.
     """
     units = _units(configuration)
+    shown = _shown(configuration)
     names = ["Time", "Ownship", "Traffic", "Alerter", "Alert Level"]
     heading_units = ["[s]", "", "", "", ""]
     for number in range(1, configuration.most_levels + 1):
         names.append(f"Time to Volume of Alert({number})")
         heading_units.append(" [s]")
-    for name, _, kind in _SEPARATION:
+    for name, _, kind in shown:
         names.append(name)
         heading_units.append(f" [{units[kind][0]}]")
     lines = [" " + ", ".join(names), ",".join(heading_units)]
@@ -78,6 +81,13 @@ def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
     return found
 
 
+def _shown(configuration: Configuration) -> tuple[tuple[str, str, str], ...]:
+    """Return the columns of separation: without modified tau where the first alerter has none."""
+    first = configuration.corrective_level(configuration.alerters[0])
+    advisory = first is not None and isinstance(first.volume, TcasAdvisory)
+    return _SEPARATION[:-1] if advisory else _SEPARATION
+
+
 def _rows(
     configuration: Configuration,
     encounter: Encounter,
@@ -88,28 +98,29 @@ def _rows(
 ) -> list[str]:
     cells = row, column
     first = configuration.corrective_level(configuration.alerters[0])
-    distance_m = np.nan if first is None else first.volume.horizontal_m
+    volume = None if first is None else first.volume
+    distance_m = volume.horizontal_m if isinstance(volume, Volume) else np.nan
     found = separation(
         tuple(part[cells] for part in encounter.relative),
         configuration["lookahead_time"],
         np.full(len(row), distance_m),
     )._asdict()
     texts = [
-        _numbers(encounter.time_s[row], decimals),
+        number_texts(encounter.time_s[row], decimals),
         [encounter.ownship] * len(row),
         [encounter.targets[number] for number in column.tolist()],
         [str(number + 1) for number in encounter.alerter[cells].tolist()],
         [str(number) for number in alerts.level[cells].tolist()],
     ]
     for number in range(configuration.most_levels):
-        texts.append(_numbers(alerts.violation_s[cells][:, number], decimals))
+        texts.append(number_texts(alerts.violation_s[cells][:, number], decimals))
     units = _units(configuration)
-    for _, key, kind in _SEPARATION:
-        texts.append(_numbers(found[key] / units[kind][1], decimals))
+    for _, key, kind in _shown(configuration):
+        texts.append(number_texts(found[key] / units[kind][1], decimals))
     return [", ".join(parts) for parts in zip(*texts, strict=True)]
 
 
-def _numbers(values: FloatArray, decimals: int) -> list[str]:
+def number_texts(values: FloatArray, decimals: int) -> list[str]:
     """Return numbers as text: rounded, without trailing zeros; infinite ones as ``infty``."""
     found = []
     for value in values.tolist():

@@ -23,6 +23,18 @@ from dsa_des.commands.plain_errors import plain_errors
     help="Also draw levels, times and flights; of several encounters a folder.",
 )
 @click.option(
+    "--bands",
+    metavar="BANDS.csv",
+    help="Also write the bands of guidance; of several encounters a folder.",
+)
+@click.option(
+    "--wind",
+    type=(float, float),
+    metavar="DEG KNOT",
+    help="Where the wind blows to, and how fast; by default from the ownship's columns "
+    "heading and airspeed, else none.",
+)
+@click.option(
     "--decimals",
     default=6,
     show_default=True,

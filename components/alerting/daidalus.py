@@ -1,5 +1,6 @@
 """Alert levels in a scene, of tracks, fused lines of sight or the truth (``alerting.daidalus``)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,12 +9,13 @@ from pydantic import Field, field_validator
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_table import without_memory
-from components.alerting.levels import due_levels, memory_rule, violation_times_s
+from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import AlertMemory
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
+from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.targets import TrafficStates
@@ -25,6 +27,7 @@ from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
+_OWN_MOTION = ("alt_m", "east_mps", "north_mps", "climb_mps")
 # Poses of the ownship that are remembered beyond the last scan: for sights that come late.
 _KEPT_POSES = 10_000
 
@@ -172,12 +175,11 @@ class DaidalusAlerting(Component):
         known = np.stack([one for one, _ in fitted])
         # Positions count from the ownship: its own less theirs is the other way round.
         relative = [-np.ravel([state[i] for _, state in fitted]) for i in range(6)]
-        levels = self._configuration.alerters[self.p.alerter - 1].levels
         lookahead_s = self._configuration["lookahead_time"]
-        times_s = violation_times_s(levels, relative, lookahead_s, None)
-        due, early = (
-            part.reshape(*known.shape, len(levels)) for part in due_levels(levels, times_s)
-        )
+        pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape))
+        alerter = self._configuration.alerters[self.p.alerter - 1]
+        times_s, *both = levels_without_memory(self._configuration, alerter, pairs)
+        due, early = (part.reshape(*known.shape, len(alerter.levels)) for part in both)
         level = [
             self._memory.step(now_s, known[i], due[i], early[i]) for i, now_s in enumerate(times)
         ]
@@ -190,7 +192,10 @@ class DaidalusAlerting(Component):
             offsets_of(row, len(ticks)),
             target,
             np.concatenate(level)[place],
-            {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in range(1, len(levels) + 1)},
+            {
+                f"time_to_level_{k}_s": times_s[:, k - 1].copy()
+                for k in range(1, len(alerter.levels) + 1)
+            },
             found.time_to_closest_s[place],
             found.miss_horizontal_m[place],
             found.miss_vertical_m[place],
@@ -198,6 +203,13 @@ class DaidalusAlerting(Component):
             own,
             self._roster,
         )
+
+    def _own_flights(self, own: Mapping[str, FloatArray], shape: tuple[int, ...]) -> State:
+        """Return the ownship's flight beside every target, in its own plane."""
+        zero = np.zeros(shape)
+        motion = (np.nan_to_num(own[name]) for name in _OWN_MOTION)
+        alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
+        return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
 
     def _forget_poses(self, tick: int) -> None:
         """Drop poses of the ownship that neither its velocity nor a late sight asks for."""

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Configuration
+from components.alerting.levels import AlertPairs
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
+from components.guidance.situation import State
 from components.traffic.daa_file import EXTRA_HEADERS, read_daa_samples
 from components.traffic.traffic_file import Problems
 from components.well_clear.uncertainty import Bounds
@@ -40,6 +42,9 @@ class Encounter(NamedTuple):
         East and north of the ownship in the plane of its first sample, m, for figures.
     target_plane : (2, times, targets)
         The same of the targets.
+    wind : (2, times)
+        Of the air, towards the east and north, m/s; velocities are relative to the air, which
+        changes none of the differences.
     """
 
     ownship: str
@@ -52,9 +57,22 @@ class Encounter(NamedTuple):
     own_state: FloatArray
     own_plane: FloatArray
     target_plane: FloatArray
+    wind: FloatArray
+
+    @property
+    def pairs(self) -> AlertPairs:
+        """The pairs of ownship and target at all times."""
+        alt_m, *velocity = (part[:, np.newaxis] for part in self.own_state)
+        zero = np.zeros(1)
+        own = State(*np.broadcast_arrays(zero, zero, alt_m, *velocity, self.present)[:6])
+        return AlertPairs(self.relative, own, self.bounds)
 
 
-def read_encounter(path: str | PathLike[str], configuration: Configuration) -> Encounter:
+def read_encounter(
+    path: str | PathLike[str],
+    configuration: Configuration,
+    wind_mps: tuple[float, float] | None = None,
+) -> Encounter:
     """Read a `.daa` or `.xyz` file; the first aircraft is the ownship.
 
     Parameters
@@ -62,6 +80,9 @@ def read_encounter(path: str | PathLike[str], configuration: Configuration) -> E
     path : path-like
     configuration : Configuration
         Its alerters, and how the file's standard deviations count.
+    wind_mps : (towards the east, towards the north), optional
+        By default the wind that the ownship's columns `heading` and `airspeed` imply, where both
+        are given; else none.
 
     Raises
     ------
@@ -80,6 +101,10 @@ def read_encounter(path: str | PathLike[str], configuration: Configuration) -> E
     own = samples[names[0]]
     if "ve" not in own:
         problems.fail("there are no velocities: columns trk, gs, vs or vx, vy, vz are needed")
+    wind = _wind(own, wind_mps)
+    for aircraft in samples.values():
+        for key, part in zip(("ve", "vn"), wind, strict=True):
+            aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
     place, present = _latest(own["time"], others)
     targets = {key: _gather([o[key] for o in others], place) for key in own}
@@ -100,7 +125,20 @@ def read_encounter(path: str | PathLike[str], configuration: Configuration) -> E
         own_state,
         own_plane,
         target_plane,
+        wind,
     )
+
+
+def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
+    """Return the wind at the ownship's times, towards the east and north."""
+    count = len(own["time"])
+    if wind_mps is not None:
+        return np.repeat(np.asarray(wind_mps, dtype=np.float64)[:, np.newaxis], count, axis=1)
+    if not {"yaw", "airspeed"} <= own.keys():
+        return np.zeros((2, count))
+    nose = np.radians(own["yaw"])
+    through_air = own["airspeed"] * np.stack([np.sin(nose), np.cos(nose)])
+    return np.asarray(np.stack([own["ve"], own["vn"]]) - through_air)
 
 
 def _latest(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:

@@ -1,14 +1,17 @@
 """Alert levels over time and targets: times to violation, what is due, and the memory's pass."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.alerting.memory import AlertMemory, MemoryRule
+from components.alerting.spread import due_by_spread
+from components.guidance.situation import State
+from components.well_clear.detection import detection_span, some_bounds
 from components.well_clear.nearly import surely_less
-from components.well_clear.uncertainty import Bounds, uncertain_violation_span
-from components.well_clear.violation import Relative, violation_span
+from components.well_clear.uncertainty import Bounds
+from components.well_clear.violation import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # Pairs taken together: their intermediate arrays stay in the cache.
@@ -24,10 +27,13 @@ class Alerts(NamedTuple):
         0 without an alert, -1 where a target is absent.
     violation_s : (times, targets, levels)
         Time to violation of each level's volume, 0 inside, infinite if never.
+    early_level : (times, targets)
+        The level whose early alerting time counts for guidance; 0 for none.
     """
 
     level: IntArray
     violation_s: FloatArray
+    early_level: IntArray
 
 
 def memory_rule(configuration: Configuration) -> MemoryRule:
@@ -41,7 +47,11 @@ def memory_rule(configuration: Configuration) -> MemoryRule:
 
 
 def violation_times_s(
-    levels: tuple[Level, ...], relative: Relative, lookahead_s: float, bounds: Bounds | None
+    levels: tuple[Level, ...],
+    relative: Relative,
+    lookahead_s: float,
+    bounds: Bounds | None,
+    own_up_mps: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
     """Return the time to violation of each level, (n, levels).
 
@@ -53,6 +63,8 @@ def violation_times_s(
     lookahead_s : float
     bounds : Bounds or None
         How far the states may be wrong, for levels that heed it.
+    own_up_mps : (altitude in m, climb in m/s) of (n,), optional
+        Of the ownship, for levels of TCAS II.
     """
     count = len(relative[0])
     found = np.empty((count, len(levels)))
@@ -63,12 +75,13 @@ def violation_times_s(
         for number, level in enumerate(levels):
             key = level.volume, level.uncertain
             if key not in known:
-                if level.uncertain and bounds is not None:
-                    of_part = Bounds(*(bound[part] for bound in bounds))
-                    span = uncertain_violation_span(level.volume, states, of_part, 0.0, lookahead_s)
-                else:
-                    span = violation_span(level.volume, states, 0.0, lookahead_s)
-                known[key] = span.begin_s
+                vertical = (
+                    None if own_up_mps is None else (own_up_mps[0][part], own_up_mps[1][part])
+                )
+                of_part = some_bounds(bounds, part) if level.uncertain else None
+                known[key] = detection_span(
+                    level.volume, states, vertical, of_part, 0.0, lookahead_s
+                ).begin_s
             found[part, number] = known[key]
     return found
 
@@ -81,13 +94,70 @@ def due_levels(levels: tuple[Level, ...], violation_s: FloatArray) -> tuple[Bool
     return inside | surely_less(violation_s, ordinary), inside | surely_less(violation_s, early)
 
 
+class AlertPairs(NamedTuple):
+    """Pairs of ownship and target at one instant each, for their levels without memory.
+
+    Parameters
+    ----------
+    relative : six of (n,)
+        East, north, up in m and their rates in m/s, ownship less target.
+    own : State of (n,) or None
+        The ownship in its own plane: its altitude and velocity. Without it no level of TCAS II and
+        no spread can be told.
+    bounds : Bounds of (n,) or None
+        How far the relative states may be wrong.
+    """
+
+    relative: Relative
+    own: State | None = None
+    bounds: Bounds | None = None
+
+    def some(self, which: Any) -> "AlertPairs":
+        """Return some of the pairs."""
+        own = None if self.own is None else self.own.rows(which)
+        relative = tuple(part[which] for part in self.relative)
+        return AlertPairs(relative, own, some_bounds(self.bounds, which))
+
+
+def levels_without_memory(
+    configuration: Configuration, alerter: Alerter, pairs: AlertPairs
+) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Return the time to each level's volume, and whether it is due, at once and early.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    alerter : Alerter
+        Of all pairs.
+    pairs : AlertPairs
+
+    Returns
+    -------
+    (n, levels), thrice
+        As from `violation_times_s` and `due_levels`; spreads make a level due too.
+    """
+    own, levels = pairs.own, alerter.levels
+    found = violation_times_s(
+        levels,
+        pairs.relative,
+        configuration["lookahead_time"],
+        pairs.bounds,
+        None if own is None else (own.up_m, own.climb_mps),
+    )
+    due, early = due_levels(levels, found)
+    if own is not None and any(level.spreads for level in levels):
+        intruder = State(*(mine - part for mine, part in zip(own, pairs.relative, strict=True)))
+        by_spread = due_by_spread(configuration, levels, own, intruder, pairs.bounds)
+        due, early = due | by_spread[0], early | by_spread[1]
+    return found, due, early
+
+
 def alert_levels(
     configuration: Configuration,
     time_s: FloatArray,
     present: BoolArray,
-    relative: Relative,
+    pairs: AlertPairs,
     alerter: IntArray | None = None,
-    bounds: Bounds | None = None,
 ) -> Alerts:
     """Return the alert levels of targets over time, memory included.
 
@@ -97,12 +167,10 @@ def alert_levels(
     time_s : (times,)
         The ownship's.
     present : (times, targets) of bool
-    relative : six of (times, targets)
-        East, north, up in m and their rates in m/s, ownship less intruder; finite also where a
-        target is absent.
+    pairs : AlertPairs of (times, targets)
+        Finite also where a target is absent.
     alerter : (times, targets) of int, optional
         Place of each one's alerter in the configuration, from 0; the first for all by default.
-    bounds : Bounds of (times, targets), optional
 
     Returns
     -------
@@ -110,45 +178,25 @@ def alert_levels(
     """
     shape = present.shape
     most = configuration.most_levels
-    flat = tuple(np.ravel(np.asarray(part, dtype=np.float64)) for part in relative)
-    flat_bounds = None if bounds is None else Bounds(*(np.ravel(bound) for bound in bounds))
+    relative = tuple(np.asarray(part, dtype=np.float64) for part in pairs.relative)
+    pairs = AlertPairs(relative, pairs.own, pairs.bounds)
     which = np.zeros(shape, dtype=np.int64) if alerter is None else alerter
-    violation_s = np.full((present.size, most), np.inf)
-    due = np.zeros((present.size, most), dtype=bool)
-    early = np.zeros((present.size, most), dtype=bool)
+    violation_s = np.full((*shape, most), np.inf)
+    due = np.zeros((*shape, most), dtype=bool)
+    early = np.zeros((*shape, most), dtype=bool)
     for number, one in enumerate(configuration.alerters):
-        cells = np.flatnonzero((which == number) & present)
-        if len(cells) and one.levels:
-            _fill(configuration, one, cells, flat, flat_bounds, violation_s, due, early)
+        cells = np.nonzero((which == number) & present)
+        if len(cells[0]) and one.levels:
+            found = levels_without_memory(configuration, one, pairs.some(cells))
+            count = len(one.levels)
+            for whole, part in zip((violation_s, due, early), found, strict=True):
+                whole[cells[0], cells[1], :count] = part
     level = np.full(shape, -1, dtype=np.int64)
+    early_level = np.zeros(shape, dtype=np.int64)
     memory = AlertMemory(memory_rule(configuration), shape[1])
-    due, early = due.reshape(*shape, most), early.reshape(*shape, most)
     for row, now_s in enumerate(np.asarray(time_s).tolist()):
         level[row] = np.where(
             present[row], memory.step(now_s, present[row], due[row], early[row]), -1
         )
-    return Alerts(level, violation_s.reshape(*shape, most))
-
-
-def _fill(
-    configuration: Configuration,
-    alerter: Alerter,
-    cells: IntArray,
-    relative: tuple[FloatArray, ...],
-    bounds: Bounds | None,
-    violation_s: FloatArray,
-    due: BoolArray,
-    early: BoolArray,
-) -> None:
-    """Fill in times and what is due for the cells of one alerter."""
-    states = tuple(part[cells] for part in relative)
-    of_cells = None if bounds is None else Bounds(*(bound[cells] for bound in bounds))
-    found = violation_times_s(
-        alerter.levels,
-        states,
-        configuration["lookahead_time"],
-        of_cells,
-    )
-    count = len(alerter.levels)
-    violation_s[cells, :count] = found
-    due[cells, :count], early[cells, :count] = due_levels(alerter.levels, found)
+        early_level[row] = memory.early_levels(now_s, present[row])
+    return Alerts(level, violation_s, early_level)

@@ -100,6 +100,23 @@ class AlertMemory:
         self._last_s = np.where(present, now_s, self._last_s)
         return level
 
+    def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
+        """Return whose early alerting time counts for guidance: levels that rose before now.
+
+        Parameters
+        ----------
+        now_s : float
+            As in the last `step`.
+        present : (targets,) of bool
+
+        Returns
+        -------
+        (targets,) of int
+            The level; 0 for none.
+        """
+        counts = present & (self._rule.hysteresis_s > 0.0) & (self._risen_s < now_s)
+        return np.where(counts, np.maximum(self._output, 0), 0)
+
     def _raw(self, now_s: float, due: BoolArray, early: BoolArray) -> IntArray:
         """Return the highest level that is due; the one that is on may be so early."""
         levels = np.arange(1, due.shape[1] + 1)

@@ -119,6 +119,20 @@ def sample(**options: Any) -> None:
     metavar="LAT LON",
     help="Where the ownship is at the closest approach, deg [default: 0 0].",
 )
+@click.option(
+    "--horizontal",
+    nargs=2,
+    metavar="EDGES SHARES",
+    help="How often which signed horizontal miss distances (ft) are drawn: -6000,0,6000 1,1. "
+    "Weights undo it; none lies outside the edges [default: to 3 nmi, more within 500 ft].",
+)
+@click.option(
+    "--vertical",
+    nargs=2,
+    metavar="EDGES CHANCES",
+    help="With what chance which vertical miss distances (ft) are accepted: -300,300 1 [default: "
+    "to 1500 ft, more within 100 ft].",
+)
 @click.option("--out", required=True, metavar="SET.parquet", help="The set.")
 @plain_errors
 def generate(**options: Any) -> None:

@@ -1,11 +1,12 @@
 """``dsa-des encounters generate``: sets of encounters from encounter models."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from components.encounters.made_encounters import made_set, read_recipe
-from components.encounters.pair_densities import PairingRules
+from components.encounters.pair_densities import PairingRules, StepDensity
 from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
 from components.encounters.sample_command import open_model
@@ -25,6 +26,8 @@ def generate_set(
     first: int,
     seed: int,
     at: tuple[float, float],
+    horizontal: tuple[str, str] | None,
+    vertical: tuple[str, str] | None,
     out: str,
 ) -> None:
     """Write a set of paired encounters, or of those that a table describes.
@@ -40,6 +43,8 @@ def generate_set(
     if made is not None:
         if model is not None or intruder_model is not None or count is not None:
             raise UsageError("--made says all of its encounters: no --model and no --count with it")
+        if horizontal is not None or vertical is not None:
+            raise UsageError("--horizontal and --vertical belong to --model, not to --made")
         _write_made(made, out)
         return
     if model is None or count is None:
@@ -48,7 +53,7 @@ def generate_set(
     intruder = own if intruder_model is None else open_model(intruder_model)
     path = named(out)
     check_file(path)
-    rules = PairingRules()
+    rules = _rules(horizontal, vertical)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0
     try:
@@ -65,6 +70,31 @@ def generate_set(
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {count} encounters of {rules.duration_s} s")
     say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
+
+
+def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:
+    """Return the densities of miss distances that a command line asks for."""
+    changes: dict[str, Any] = {}
+    for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
+        if given is None:
+            continue
+        try:
+            edges, parts = (np.array([float(word) for word in text.split(",")]) for text in given)
+        except ValueError:
+            raise UsageError(
+                f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
+                "step between two, all with commas between them"
+            ) from None
+        # Shares of horizontal distances are of a step as a whole, those of heights its chance.
+        wide = np.diff(edges) if option == "--horizontal" and len(edges) == len(parts) + 1 else 1.0
+        try:
+            density = StepDensity(edges, parts / wide)
+        except ValueError as error:
+            raise UsageError(f"{option} {' '.join(given)}: {error}") from None
+        if edges[0] > 0.0 or edges[-1] < 0.0:
+            raise UsageError(f"{option} {' '.join(given)}: the edges must lie about 0")
+        changes["horizontal_ft" if option == "--horizontal" else "vertical_ft"] = density
+    return PairingRules(**changes)
 
 
 def _write_made(made: str, out: str) -> None:

@@ -159,7 +159,11 @@ def _draw(found: EncounterSet, places: list[int], c: Closest, path: Path) -> Non
         weight = c.weight / c.weight.sum() if c.weight.sum() > 0 else None
         for axis, (name, values) in zip(axes.flat, parts, strict=False):
             good = np.isfinite(values)
-            edges = np.histogram_bin_edges(values[good], 24)
+            middle = float(np.mean(values[good])) if good.any() else 0.0
+            near = bool(np.ptp(values[good]) < 1e-2) if good.any() else False
+            edges = np.histogram_bin_edges(
+                values[good], 24, (middle - 0.5, middle + 0.5) if near else None
+            )
             share = np.full(int(good.sum()), 1.0 / max(int(good.sum()), 1))
             axis.hist(values[good], edges, weights=share, color="#9ecae1", label="encounters")
             if weight is not None:

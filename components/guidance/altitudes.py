@@ -137,11 +137,19 @@ class AltitudeConflicts:
     intruder : State of (n, 1)
     detector : Detector
     lookahead_s : float
+    from_now : bool
+        Whether horizons count from time 0, not from the phases of a flight.
     """
 
     def __init__(
-        self, altitudes: Altitudes, intruder: State, detector: Detector, lookahead_s: float
+        self,
+        altitudes: Altitudes,
+        intruder: State,
+        detector: Detector,
+        lookahead_s: float,
+        from_now: bool = False,
     ) -> None:
+        self._from_now = from_now
         self._altitudes, self._intruder = altitudes, intruder
         self._detector, self._lookahead_s = detector, lookahead_s
         self._seconds: list[_Instants] = []
@@ -159,8 +167,8 @@ class AltitudeConflicts:
 
     def _over(self, begin_s: FloatArray) -> Span:
         begin_s = np.minimum(begin_s, self._lookahead_s)
-        relative = self._altitudes.flight_at(begin_s).less(self._intruder)
-        return self._detector.span(relative, begin_s, self._lookahead_s)
+        flight = self._altitudes.flight_at(begin_s)
+        return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s)
 
     def _at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
         """Find which flights are inside at the whole seconds of an interval."""
@@ -170,8 +178,9 @@ class AltitudeConflicts:
             time_s = first_s + number
             due = time_s <= last_s
             if due.any():
-                relative = self._altitudes.flight_at(time_s).less(self._intruder)
-                begin_s = self._detector.span(relative, time_s, time_s + 1.0).begin_s
+                flight = self._altitudes.flight_at(time_s)
+                span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
+                begin_s = span.begin_s
                 self._seconds.append(_Instants(time_s, due & nearly_equal(begin_s, time_s)))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
@@ -188,14 +197,17 @@ class AltitudeConflicts:
         -------
         (n, k) of bool
         """
-        end_s = np.minimum(horizon_s + self._level_s, self._lookahead_s)
+        end_s = np.minimum(self._after(horizon_s, self._level_s), self._lookahead_s)
         met = meets(self._level, np.maximum(from_s, self._level_s), end_s)
         if not self._altitudes.instantaneous:
-            end_s = np.minimum(horizon_s + self._held_s, self._held_until_s)
+            end_s = np.minimum(self._after(horizon_s, self._held_s), self._held_until_s)
             met |= meets(self._held, np.maximum(from_s, self._held_s), end_s)
         for instants in self._seconds:
             met |= instants.inside & (instants.time_s >= from_s)
         return self._altitudes.of_all(met & np.asarray(from_s <= horizon_s))
+
+    def _after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
+        return np.asarray(horizon_s if self._from_now else horizon_s + phase_s)
 
     soon = unsafe
 

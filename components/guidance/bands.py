@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
-from components.guidance.intervals import Band, Interval, painted
+from components.guidance.intervals import Band, Interval, named_recovery, painted
 from components.guidance.kinds import ManoeuvreKind, kind_of
-from components.guidance.recovery import Recovery, recover
+from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
-from dsa_des.arrays.types import BoolArray, IntArray
+from components.well_clear.detection import some_bounds
+from components.well_clear.uncertainty import Bounds
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _PAINTED = ("NEAR", "MID", "FAR")
 # States taken together: their arrays stay in the cache.
@@ -33,11 +35,19 @@ class Guidance(NamedTuple):
         In SI units and radians, from the lowest to the highest value.
     recovery : Recovery or None
         Where one was needed.
+    line : list of Band
+        The bands before NONE is called RECOVERY: what `components.guidance.band_memory` takes.
     """
 
     own_value: float
     bands: list[Band]
     recovery: Recovery | None
+    line: list[Band]
+
+    @property
+    def recovers(self) -> bool:
+        """Whether what is free is shown as RECOVERY."""
+        return self.recovery is not None and self.recovery.time_s >= 0.0
 
 
 @dataclass(frozen=True)
@@ -51,11 +61,14 @@ class GuidedIntruder:
     alerter : Alerter
     early_level : int
         The level whose early alerting time counts; 0 for none.
+    bounds : Bounds of (), optional
+        How far the relative state may be wrong.
     """
 
     state: State
     alerter: Alerter
     early_level: int = 0
+    bounds: Bounds | None = None
 
 
 def guidance(
@@ -71,7 +84,13 @@ def guidance(
     intruders : list of GuidedIntruder
     """
     alone = [
-        GuidedIntruders(_one(i.state), i.alerter, np.array([i.early_level])) for i in intruders
+        GuidedIntruders(
+            _one(i.state),
+            i.alerter,
+            np.array([i.early_level]),
+            bounds=None if i.bounds is None else some_bounds(i.bounds, np.newaxis),
+        )
+        for i in intruders
     ]
     return guidance_of_many(kind_name, configuration, _one(own), alone)[0]
 
@@ -132,7 +151,7 @@ def _guidance_of(
     at_once: IntArray = np.zeros(0, dtype=np.int64)
     if kind.instantaneous:
         at_once = np.flatnonzero(regions.inside_corrective())
-    painter = _Painter(configuration, kind, layers)
+    painter = _Painter(configuration, kind, layers, own.up_m)
     return [painter.guidance(row, recoveries.get(row), row in at_once) for row in range(len(on))]
 
 
@@ -144,12 +163,10 @@ class _Painter:
         configuration: Configuration,
         kind: ManoeuvreKind,
         layers: list[tuple[str, BoolArray, BoolArray]],
+        altitude_m: FloatArray,
     ) -> None:
         self._kind, self._layers = kind, layers
-        sizes = configuration["min_horizontal_recovery"], configuration["min_vertical_recovery"]
-        self._now = Recovery(0.0, sizes, 0)
-        # The bands of a state where all is clear, which most are.
-        self._free = [Band(kind.least, kind.most, "NONE")]
+        self._cylinder_m = recovery_cylinder(configuration, altitude_m)
         several = kind.there.sum(axis=1) > 1
         self._all_clear = several & np.logical_and.reduce(
             [~of_whom | (clear | ~kind.there).all(axis=1) for _, of_whom, clear in layers]
@@ -159,11 +176,14 @@ class _Painter:
         self, row: int, recovered: tuple[Recovery, list[Interval]] | None, inside_at_once: bool
     ) -> Guidance:
         own_value = float(self._kind.own_value[row])
+        least, most = float(self._kind.least[row]), float(self._kind.most[row])
         recovery, ways = recovered if recovered is not None else (None, [])
         if recovery is None and inside_at_once:
-            recovery = self._now
+            sizes = float(self._cylinder_m[0][row]), float(self._cylinder_m[1][row])
+            recovery = Recovery(0.0, sizes, 0)
         if self._all_clear[row] and recovery is None:
-            return Guidance(own_value, list(self._free), None)
+            free = [Band(least, most, "NONE")]
+            return Guidance(own_value, free, None, free)
         layers: list[tuple[str, list[Interval], bool]] = [
             (region, intervals_of(self._kind, row, clear), True)
             for region, of_whom, clear in reversed(self._layers)
@@ -171,19 +191,6 @@ class _Painter:
         ]
         if ways:
             layers.append(("RECOVERY", ways, False))
-        bands = painted(layers, self._kind.least, self._kind.most)
-        if recovery is not None and recovery.time_s >= 0.0:
-            bands = _named_recovery(bands)
-        return Guidance(own_value, bands, recovery)
-
-
-def _named_recovery(bands: list[Band]) -> list[Band]:
-    """Return the bands with NONE called RECOVERY, equal neighbours joined."""
-    found: list[Band] = []
-    for low, high, region in bands:
-        name = "RECOVERY" if region == "NONE" else region
-        if found and found[-1].region == name:
-            found[-1] = Band(found[-1].low, high, name)
-        else:
-            found.append(Band(low, high, name))
-    return found
+        line = painted(layers, least, most)
+        found = Guidance(own_value, line, recovery, line)
+        return found._replace(bands=named_recovery(line)) if found.recovers else found

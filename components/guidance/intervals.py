@@ -2,6 +2,7 @@
 
 import math
 import struct
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 #: `_TINY`.
 _DOUBLES_APART = 2**40
 _TINY = 1e-5
-_TURN = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi
 # Doubles of one sign are in the order of their bits read as whole numbers.
 _DOUBLES, _AS_WHOLE_NUMBERS = struct.Struct("=2d"), struct.Struct("=2q")
 
@@ -67,12 +68,14 @@ def clear_intervals(
 
 def _wrapped(interval: Interval) -> list[Interval]:
     """Return an interval of directions within [0, 2 pi], in two where it holds 0."""
-    if interval.high - interval.low >= _TURN or same_place(interval.high - interval.low, _TURN):
-        return [Interval(0.0, _TURN)]
-    low, high = interval.low % _TURN, interval.high % _TURN
-    low = 0.0 if same_place(low, _TURN) else low
-    high = _TURN if same_place(high, 0.0) else high
-    return [Interval(low, high)] if low < high else [Interval(low, _TURN), Interval(0.0, high)]
+    if interval.high - interval.low >= FULL_TURN or same_place(
+        interval.high - interval.low, FULL_TURN
+    ):
+        return [Interval(0.0, FULL_TURN)]
+    low, high = interval.low % FULL_TURN, interval.high % FULL_TURN
+    low = 0.0 if same_place(low, FULL_TURN) else low
+    high = FULL_TURN if same_place(high, 0.0) else high
+    return [Interval(low, high)] if low < high else [Interval(low, FULL_TURN), Interval(0.0, high)]
 
 
 class Band(NamedTuple):
@@ -102,15 +105,30 @@ def painted(
                 if not any(same_place(value, place) for place in places):
                     places.append(value)
     places.sort()
-    bands: list[Band] = []
+    bands = []
     for low, high in pairwise(places):
         middle, region = 0.5 * (low + high), "NONE"
         for name, intervals, outside in layers:
             within = any(one.low <= middle <= one.high for one in intervals)
             if within != outside:
                 region = name
-        if bands and bands[-1].region == region:
-            bands[-1] = Band(bands[-1].low, high, region)
+        bands.append(Band(low, high, region))
+    return joined(bands)
+
+
+def named_recovery(bands: list[Band]) -> list[Band]:
+    """Return the bands with NONE called RECOVERY, equal neighbours joined."""
+    return joined(
+        Band(low, high, "RECOVERY" if region == "NONE" else region) for low, high, region in bands
+    )
+
+
+def joined(bands: Iterable[Band]) -> list[Band]:
+    """Return bands from the lowest to the highest value with equal neighbours as one."""
+    found: list[Band] = []
+    for band in bands:
+        if found and found[-1].region == band.region:
+            found[-1] = Band(found[-1].low, band.high, band.region)
         else:
-            bands.append(Band(low, high, region))
-    return bands
+            found.append(band)
+    return found

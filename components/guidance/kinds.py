@@ -1,18 +1,17 @@
 """The four kinds of guidance: their values, limits, and manoeuvres, alike for whoever asks."""
 
-import math
 from typing import Any, Protocol
 
 import numpy as np
 
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
+from components.guidance.intervals import FULL_TURN
 from components.guidance.situation import Detector, State
 from components.guidance.step_bands import StepConflicts
-from components.guidance.steps import Steps, climb_steps, direction_steps, speed_steps
+from components.guidance.steps import Steps, climb_steps, direction_steps, limits_of, speed_steps
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 
 KINDS = ("hdir", "hs", "vs", "alt")
-FULL_TURN = 2.0 * math.pi
 
 
 class Conflicts(Protocol):
@@ -41,7 +40,7 @@ class ManoeuvreKind(Protocol):
     there : (n, k) of bool
         Whether an ownship has that value.
     own_value : (n,)
-    least, most : float
+    least, most : (n,)
     cyclic : bool
         Whether values a full turn apart are the same.
     instantaneous : bool
@@ -51,8 +50,8 @@ class ManoeuvreKind(Protocol):
     values: AnyArray
     there: BoolArray
     own_value: FloatArray
-    least: float
-    most: float
+    least: FloatArray
+    most: FloatArray
     cyclic: bool
     instantaneous: bool
 
@@ -66,10 +65,10 @@ class _StepKind:
         steps: Steps,
         own_value: FloatArray,
         step: float,
-        limits: tuple[float, float],
-        lookahead_s: float,
+        limits: tuple[FloatArray, FloatArray],
+        values: Any,
     ) -> None:
-        self._steps, self._lookahead_s = steps, lookahead_s
+        self._steps, self._values = steps, values
         self.own_value = own_value
         self.values: AnyArray = own_value[:, np.newaxis] + steps.number * step
         self.there = steps.there
@@ -78,22 +77,27 @@ class _StepKind:
         self.instantaneous = not steps.step_time_s.any()
 
     def against(self, intruder: State, detector: Detector) -> Conflicts:
-        return StepConflicts(self._steps, intruder, detector, self._lookahead_s)
+        from_now = self._values["bands_add_time_to_maneuver"]
+        lookahead_s = self._values["lookahead_time"]
+        return StepConflicts(self._steps, intruder, detector, lookahead_s, from_now)
 
 
 class _AltitudeKind:
     def __init__(self, own: State, values: Any) -> None:
         self._altitudes = Altitudes(own, values)
         self._lookahead_s = values["lookahead_time"]
+        self._from_now = values["bands_add_time_to_maneuver"]
         self.own_value = own.up_m
         self.values: AnyArray = self._altitudes.values
         self.there = np.ones(self.values.shape, dtype=bool)
-        self.least, self.most = values["min_alt"], values["max_alt"]
+        self.least, self.most = limits_of("alt", own.up_m, values)
         self.cyclic = False
         self.instantaneous = self._altitudes.instantaneous
 
     def against(self, intruder: State, detector: Detector) -> Conflicts:
-        return AltitudeConflicts(self._altitudes, intruder, detector, self._lookahead_s)
+        return AltitudeConflicts(
+            self._altitudes, intruder, detector, self._lookahead_s, self._from_now
+        )
 
 
 def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
@@ -110,16 +114,15 @@ def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
     """
     if name == "alt":
         return _AltitudeKind(own, values)
-    lookahead_s = values["lookahead_time"]
     if name == "hdir":
         track = np.arctan2(own.east_mps, own.north_mps) % FULL_TURN
-        steps, limits = direction_steps(own, values), (0.0, FULL_TURN)
-        made = _StepKind(steps, track, values["step_hdir"], limits, lookahead_s)
+        whole = np.zeros(track.shape), np.full(track.shape, FULL_TURN)
+        made = _StepKind(direction_steps(own, values), track, values["step_hdir"], whole, values)
         made.cyclic = True
         return made
     if name == "hs":
         speed = np.hypot(own.east_mps, own.north_mps)
-        limits = values["min_hs"], values["max_hs"]
-        return _StepKind(speed_steps(own, values), speed, values["step_hs"], limits, lookahead_s)
-    climb, limits = own.climb_mps, (values["min_vs"], values["max_vs"])
-    return _StepKind(climb_steps(own, values), climb, values["step_vs"], limits, lookahead_s)
+        limits = limits_of(name, speed, values)
+        return _StepKind(speed_steps(own, values), speed, values["step_hs"], limits, values)
+    limits = limits_of(name, own.climb_mps, values)
+    return _StepKind(climb_steps(own, values), own.climb_mps, values["step_vs"], limits, values)

@@ -10,6 +10,7 @@ from components.guidance.intervals import Interval
 from components.guidance.kinds import Conflicts, kind_of
 from components.guidance.regions import GuidedIntruders, Regions, any_interval, intervals_of
 from components.guidance.situation import Detector, State
+from components.well_clear.tcas import recovery_sizes_m
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 # The search for the earliest recovery ends when it is known this well, s.
@@ -50,6 +51,33 @@ def recover(
     return _Search(kind_name, configuration, own, intruders).run()
 
 
+Sizes = tuple[FloatArray, FloatArray]
+
+
+def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> Sizes:
+    """Return radius and half height that recovery keeps clear, before they are made smaller.
+
+    Where the configuration has 0, those of the resolution advisories of TCAS II count.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    altitude_m : (n,)
+        Of the ownships.
+    """
+    keys = "min_horizontal_recovery", "min_vertical_recovery"
+    given = (configuration[key] for key in keys)
+    found = [
+        np.full(np.shape(altitude_m), size) if size > 0.0 else table
+        for size, table in zip(given, recovery_sizes_m(altitude_m), strict=True)
+    ]
+    return found[0], found[1]
+
+
+def _of_row(sizes: Sizes, row: int) -> tuple[float, float]:
+    return float(sizes[0][row]), float(sizes[1][row])
+
+
 class _Search:
     """The search of r ownships; rows for whom it has ended are left as they are."""
 
@@ -64,9 +92,10 @@ class _Search:
         self._lookahead_s: float = configuration["lookahead_time"]
         self._kind = kind_of(kind_name, own, configuration)
         self._intruders = intruders
+        self._sizes = recovery_cylinder(configuration, own.up_m)
         regions = Regions(configuration, self._kind, own, intruders)
         _, self._concerned = regions.concerned(configuration["corrective_region"])
-        self._volumes = [regions.conflicts(one.place, one.volume) for one in self._concerned]
+        self._volumes = [regions.conflicts(one.place, one.level) for one in self._concerned]
         # Cylinder about each intruder that counts, of the sizes that are tried.
         self._cylinders: list[Conflicts] = []
 
@@ -76,11 +105,11 @@ class _Search:
         nmac = values["horizontal_nmac"], values["vertical_nmac"]
         count = len(self._kind.own_value)
         found: list[tuple[Recovery, list[Interval]] | None] = [None] * count
-        self._try(nmac)
+        self._try((np.full(count, nmac[0]), np.full(count, nmac[1])))
         on = self._leads(self._clear_of_cylinder())
         for row in np.flatnonzero(~on).tolist():
             found[row] = Recovery(-math.inf, nmac, 0), []
-        sizes = values["min_horizontal_recovery"], values["min_vertical_recovery"]
+        sizes = self._sizes
         shrinks = 0
         while on.any():
             self._try(sizes)
@@ -90,23 +119,26 @@ class _Search:
                 clear = self._clear_at(time_s[:, np.newaxis])
                 leads &= self._leads(clear)
                 for row in np.flatnonzero(leads).tolist():
-                    recovery = Recovery(float(time_s[row]), sizes, shrinks)
+                    recovery = Recovery(float(time_s[row]), _of_row(sizes, row), shrinks)
                     found[row] = recovery, intervals_of(self._kind, row, clear)
                 on &= ~leads
-            if not values["ca_bands"] or sizes == nmac:
-                for row in np.flatnonzero(on).tolist():
-                    found[row] = Recovery(-math.inf, sizes, shrinks), []
-                break
+            smallest = (sizes[0] == nmac[0]) & (sizes[1] == nmac[1])
+            ends = on & (smallest if values["ca_bands"] else True)
+            for row in np.flatnonzero(ends).tolist():
+                found[row] = Recovery(-math.inf, _of_row(sizes, row), shrinks), []
+            on &= ~ends
             factor = 1.0 - values["ca_factor"]
-            sizes = max(nmac[0], sizes[0] * factor), max(nmac[1], sizes[1] * factor)
+            sizes = tuple(
+                np.maximum(least, size * factor) for least, size in zip(nmac, sizes, strict=True)
+            )
             shrinks += 1
         return [one for one in found if one is not None]
 
-    def _try(self, sizes: tuple[float, float]) -> None:
+    def _try(self, sizes: Sizes) -> None:
+        """Look at cylinders of sizes (r,)."""
+        detector = Detector(cylinder_m=(sizes[0][:, np.newaxis], sizes[1][:, np.newaxis]))
         self._cylinders = [
-            self._kind.against(
-                self._intruders[one.place].state.columns(), Detector(cylinder_m=sizes)
-            )
+            self._kind.against(self._intruders[one.place].state.columns(), detector)
             for one in self._concerned
         ]
 

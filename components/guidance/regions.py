@@ -8,9 +8,15 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.guidance.intervals import Interval, clear_intervals
 from components.guidance.kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
+from components.well_clear.detection import some_bounds
 from components.well_clear.nearly import surely_less
+from components.well_clear.tcas import TcasAdvisory
+from components.well_clear.uncertainty import Bounds
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+
+# Which intruder, and what it is kept out of: levels often share a volume.
+_Key = tuple[int, Volume | TcasAdvisory, bool]
 
 
 class GuidedIntruders(NamedTuple):
@@ -26,18 +32,25 @@ class GuidedIntruders(NamedTuple):
         The level whose early alerting time counts; 0 for none.
     present : (n,) of bool, optional
         Where there is such an intruder; by default everywhere.
+    bounds : Bounds of (n,), optional
+        How far the relative states may be wrong, for levels that heed it.
     """
 
     state: State
     alerter: Alerter
     early_level: IntArray
     present: BoolArray | None = None
+    bounds: Bounds | None = None
 
     def rows(self, which: AnyArray) -> "GuidedIntruders":
         """Return those of some ownships."""
         present = None if self.present is None else self.present[which]
         return GuidedIntruders(
-            self.state.rows(which), self.alerter, self.early_level[which], present
+            self.state.rows(which),
+            self.alerter,
+            self.early_level[which],
+            present,
+            some_bounds(self.bounds, which),
         )
 
     def is_there(self) -> BoolArray:
@@ -54,14 +67,15 @@ class Concerned(NamedTuple):
     ----------
     place : int
         Which of the intruders.
-    volume : Volume
+    level : Level
+        Whose volume.
     of_whom : (n,) of bool
     horizon_s : (n, 1)
         How long after a manoeuvre.
     """
 
     place: int
-    volume: Volume
+    level: Level
     of_whom: BoolArray
     horizon_s: FloatArray
 
@@ -89,16 +103,19 @@ class Regions:
         self._intruders = intruders
         self._lookahead_s = configuration["lookahead_time"]
         # Levels often share a volume; what it is met by is found once.
-        self._conflicts: dict[tuple[int, Volume], Conflicts] = {}
-        self._begins: dict[tuple[int, Volume], FloatArray] = {}
+        self._conflicts: dict[_Key, Conflicts] = {}
+        self._begins: dict[_Key, FloatArray] = {}
         self._concerned: dict[str, tuple[BoolArray, list[Concerned]]] = {}
 
-    def conflicts(self, place: int, volume: Volume) -> Conflicts:
-        """Return when the manoeuvres meet a volume about an intruder."""
-        if (place, volume) not in self._conflicts:
-            state = self._intruders[place].state.columns()
-            self._conflicts[place, volume] = self._kind.against(state, Detector(volume))
-        return self._conflicts[place, volume]
+    def conflicts(self, place: int, level: Level) -> Conflicts:
+        """Return when the manoeuvres meet the volume of a level about an intruder."""
+        key = place, level.volume, level.uncertain
+        if key not in self._conflicts:
+            intruder = self._intruders[place]
+            bounds = some_bounds(intruder.bounds, (slice(None), np.newaxis))
+            detector = Detector(level.volume, bounds=bounds if level.uncertain else None)
+            self._conflicts[key] = self._kind.against(intruder.state.columns(), detector)
+        return self._conflicts[key]
 
     def concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
         """Return for whom any level has the region, and whose volumes count."""
@@ -111,7 +128,7 @@ class Regions:
         known, concerned = self.concerned(region)
         clear = self._kind.there.copy()
         for one in concerned:
-            unsafe = self.conflicts(one.place, one.volume).unsafe(0.0, one.horizon_s)
+            unsafe = self.conflicts(one.place, one.level).unsafe(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return known, clear
 
@@ -125,16 +142,20 @@ class Regions:
         for place, intruder in enumerate(self._intruders):
             level = self._configuration.corrective_level(intruder.alerter)
             if level is not None:
-                inside |= (self._begin_s(place, level.volume) == 0.0) & intruder.is_there()
+                inside |= (self._begin_s(place, level) == 0.0) & intruder.is_there()
         return inside
 
-    def _begin_s(self, place: int, volume: Volume) -> FloatArray:
-        """Return when the flights as they are meet a volume, within the lookahead."""
-        if (place, volume) not in self._begins:
-            relative = self._own.less(self._intruders[place].state)
-            span = Detector(volume).span(relative, 0.0, self._lookahead_s)
-            self._begins[place, volume] = span.begin_s
-        return self._begins[place, volume]
+    def _begin_s(self, place: int, level: Level) -> FloatArray:
+        """Return when the flights as they are meet the volume of a level, within the lookahead."""
+        key = place, level.volume, level.uncertain
+        if key not in self._begins:
+            intruder = self._intruders[place]
+            bounds = intruder.bounds if level.uncertain else None
+            span = Detector(level.volume, bounds=bounds).span(
+                self._own, intruder.state, 0.0, self._lookahead_s
+            )
+            self._begins[key] = span.begin_s
+        return self._begins[key]
 
     def _find_concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
         known = np.zeros(len(self._own.up_m), dtype=bool)
@@ -146,16 +167,16 @@ class Regions:
             number, level = numbered
             there = intruder.is_there()
             known |= there
-            begin_s = self._begin_s(place, level.volume)
+            begin_s = self._begin_s(place, level)
             early = intruder.early_level == number
             due_s = np.where(early, level.early_alerting_time_s, level.alerting_time_s)
             ahead = (begin_s == 0.0) | surely_less(begin_s, due_s)
             soon_s = min(level.alerting_time_s, self._lookahead_s)
             horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
-            met = self.conflicts(place, level.volume).soon(0.0, horizon_s).any(axis=1)
+            met = self.conflicts(place, level).soon(0.0, horizon_s).any(axis=1)
             of_whom = there & (ahead | met)
             if of_whom.any():
-                found.append(Concerned(place, level.volume, of_whom, horizon_s))
+                found.append(Concerned(place, level, of_whom, horizon_s))
         return known, found
 
 
@@ -163,8 +184,8 @@ def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     """Tell in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
-        low = np.maximum(kind.values[:, :-1], kind.least)
-        both &= low < np.minimum(kind.values[:, 1:], kind.most)
+        low = np.maximum(kind.values[:, :-1], kind.least[:, np.newaxis])
+        both &= low < np.minimum(kind.values[:, 1:], kind.most[:, np.newaxis])
     return np.asarray(both.any(axis=1))
 
 
@@ -172,7 +193,8 @@ def intervals_of(kind: ManoeuvreKind, row: int, clear: BoolArray) -> list[Interv
     """Return the intervals of values of one ownship that are clear."""
     there = kind.there[row]
     values = kind.values[row][there]
-    return clear_intervals(values, clear[row][there], kind.least, kind.most, kind.cyclic)
+    least, most = float(kind.least[row]), float(kind.most[row])
+    return clear_intervals(values, clear[row][there], least, most, kind.cyclic)
 
 
 def _level_of(alerter: Alerter, region: str) -> tuple[int, Level] | None:

@@ -4,9 +4,7 @@ import math
 from typing import NamedTuple
 
 from components.alert_configuration.configuration import REGIONS
-from components.guidance.intervals import Band, same_place
-
-_TURN = 2.0 * math.pi
+from components.guidance.intervals import FULL_TURN, Band, same_place
 
 
 class Resolution(NamedTuple):
@@ -43,7 +41,7 @@ def resolution(
     """
     least = REGIONS.index(corrective_region)
     red = [one.region != "RECOVERY" and REGIONS.index(one.region) >= least for one in bands]
-    turns = (-_TURN, 0.0, _TURN) if cyclic else (0.0,)
+    turns = (-FULL_TURN, 0.0, FULL_TURN) if cyclic else (0.0,)
     stretches: list[list[float]] = []
     for turn in turns:
         for band, is_red in zip(bands, red, strict=True):
@@ -75,10 +73,10 @@ def _direction(own_value: float, edge: float, none: float) -> float:
     away = abs(edge - own_value)
     if not math.isfinite(edge) or away >= math.pi or same_place(away, math.pi):
         return none
-    wrapped = edge % _TURN
-    return 0.0 if same_place(wrapped, _TURN) else wrapped
+    wrapped = edge % FULL_TURN
+    return 0.0 if same_place(wrapped, FULL_TURN) else wrapped
 
 
 def _away(own_value: float, edge: float, cyclic: bool) -> float:
     away = abs(edge - own_value)
-    return min(away, _TURN - away) if cyclic and math.isfinite(away) else away
+    return min(away, FULL_TURN - away) if cyclic and math.isfinite(away) else away

@@ -6,11 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.well_clear.cylinder import cylinder_span
+from components.well_clear.detection import detection_span
 from components.well_clear.nearly import surely_less
+from components.well_clear.tcas import TcasAdvisory
+from components.well_clear.uncertainty import Bounds
 from components.well_clear.vertical_interval import Span
-from components.well_clear.violation import Relative, violation_span
+from components.well_clear.violation import Relative
 from components.well_clear.volume import Volume
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 
 class State(NamedTuple):
@@ -34,7 +37,7 @@ class State(NamedTuple):
         """Return these states less others."""
         return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))
 
-    def rows(self, which: AnyArray) -> "State":
+    def rows(self, which: Any) -> "State":
         """Return the states of some of the aircraft."""
         return State(*(part[which] for part in self))
 
@@ -49,18 +52,23 @@ class Detector:
 
     Parameters
     ----------
-    volume : Volume or None
+    volume : Volume or TcasAdvisory or None
     cylinder_m : (radius, half height) or None
         Where there is no volume; of floats, or of arrays that broadcast against the flights.
+    bounds : Bounds or None
+        How far the relative states may be wrong, for the volume; arrays as the flights.
     """
 
-    volume: Volume | None = None
+    volume: Volume | TcasAdvisory | None = None
     cylinder_m: tuple[Any, Any] | None = None
+    bounds: Bounds | None = None
 
-    def span(self, relative: Relative, begin_s: Any, end_s: Any) -> Span:
+    def span(self, own: State, intruder: State, begin_s: Any, end_s: Any) -> Span:
         """Return from when to when flights meet it."""
+        relative = own.less(intruder)
         if self.volume is not None:
-            return violation_span(self.volume, relative, begin_s, end_s)
+            vertical = own.up_m, own.climb_mps
+            return detection_span(self.volume, relative, vertical, self.bounds, begin_s, end_s)
         assert self.cylinder_m is not None
         return cylinder_span(*self.cylinder_m, relative, begin_s, end_s)
 

@@ -23,17 +23,25 @@ class StepConflicts:
     intruder : State of (n, 1)
     detector : Detector
     lookahead_s : float
+    from_now : bool
+        Whether horizons count from time 0, not from the end of a manoeuvre.
     """
 
     def __init__(
-        self, steps: Steps, intruder: State, detector: Detector, lookahead_s: float
+        self,
+        steps: Steps,
+        intruder: State,
+        detector: Detector,
+        lookahead_s: float,
+        from_now: bool = False,
     ) -> None:
+        self._after_s = np.zeros((1, 1)) if from_now else steps.time_s
         self._steps = steps
         self._lookahead_s = lookahead_s
         self._count = np.abs(steps.number)
         begin_s = np.minimum(steps.time_s, lookahead_s)  # later ones are not asked for
         end_s = lookahead_s + steps.step_time_s
-        self._span = detector.span(steps.flight.less(intruder), begin_s, end_s)
+        self._span = detector.span(steps.flight, intruder, begin_s, end_s)
         self._takes_time = bool(steps.step_time_s.any())
         lasts_s = steps.time_s + steps.step_time_s
         self._while_flown = (
@@ -58,7 +66,7 @@ class StepConflicts:
         """
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
-        met = meets(self._span, begin_s, np.minimum(self._lookahead_s, horizon_s + time_s))
+        met = meets(self._span, begin_s, np.minimum(self._lookahead_s, horizon_s + self._after_s))
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:

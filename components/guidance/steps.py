@@ -76,9 +76,8 @@ def direction_steps(own: State, values: Any) -> Steps:
 def speed_steps(own: State, values: Any) -> Steps:
     """Return changes of ground speed along the track; it may pass through zero."""
     speed = np.hypot(own.east_mps, own.north_mps)
-    changed = _changes(
-        speed, values["min_hs"], values["max_hs"], values["step_hs"], values["horizontal_accel"]
-    )
+    limits = limits_of("hs", speed, values)
+    changed = _changes(speed, *limits, values["step_hs"], values["horizontal_accel"])
     own = own.columns()
     track = np.arctan2(own.east_mps, own.north_mps)
     east, north = np.sin(track), np.cos(track)
@@ -95,15 +94,33 @@ def speed_steps(own: State, values: Any) -> Steps:
 
 def climb_steps(own: State, values: Any) -> Steps:
     """Return changes of vertical speed."""
-    changed = _changes(
-        own.climb_mps, values["min_vs"], values["max_vs"], values["step_vs"],
-        values["vertical_accel"],
-    )  # fmt: skip
+    limits = limits_of("vs", own.climb_mps, values)
+    changed = _changes(own.climb_mps, *limits, values["step_vs"], values["vertical_accel"])
     own = own.columns()
     flight = State(
         own.east_m, own.north_m, own.up_m + changed.back, own.east_mps, own.north_mps, changed.rate
     )
     return Steps(changed.number, changed.there, changed.time_s, changed.step_time_s, flight)
+
+
+def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the least and most values of a kind, also relative to the own value where set.
+
+    Parameters
+    ----------
+    name : {"hs", "vs", "alt"}
+    own_value : (n,)
+    values : mapping
+        Values of a configuration, by key.
+    """
+    below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
+    least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
+    most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
+    if below > 0.0:
+        least = np.maximum(least, own_value - below)
+    if above > 0.0:
+        most = np.minimum(most, own_value + above)
+    return least, most
 
 
 def _turns(most_rad: float, step: float) -> int:
@@ -123,7 +140,7 @@ class _Changes(NamedTuple):
 
 
 def _changes(
-    own: FloatArray, least: float, most: float, step: float, acceleration: float
+    own: FloatArray, least: FloatArray, most: FloatArray, step: float, acceleration: float
 ) -> _Changes:
     down = np.maximum(np.ceil((own - least) / step), 0.0).astype(np.int64)[:, np.newaxis]
     up = np.maximum(np.ceil((most - own) / step), 0.0).astype(np.int64)[:, np.newaxis]

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
 from components.guidance.bands import GuidedIntruder, guidance
-from components.guidance.kinds import FULL_TURN
+from components.guidance.intervals import FULL_TURN
 from components.guidance.resolution import resolution
 from components.guidance.situation import State
 from dsa_des.arrays.types import FloatArray

@@ -153,6 +153,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
             f"own_{axis}_m": ("m", _FRAME, f"where the ownship believed to be then, {axis}")
             for axis in ("north", "east", "down")
         },
+        "nis": ("", "", "normalised innovation squared of this look; null where it did not update"),
+        "nis_freedom": ("", "", "how many measured quantities that is of; 0 without one"),
         "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
         "origin_lon_deg": ("deg", _WGS84, "its longitude"),
         "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),

@@ -65,6 +65,12 @@ class StateTracks(Message):
     extras : dict of (entries,)
         What some models have besides: `EXTRAS`.
     sensors : tuple of str
+    nis : (entries,)
+        Normalised innovation squared of the look that the state speaks of: how far the detection
+        that updated the track lay from what was expected, by the covariance of both. NaN where it
+        did not, or where several detections were weighed; by default.
+    nis_freedom : (entries,) of int
+        How many quantities it is of: angles 2, with range 3, with range rate 4; 0 without one.
     """
 
     described = DESCRIBED
@@ -107,6 +113,13 @@ class StateTracks(Message):
     )
     extras: dict[str, FloatArray] = per_entry(columns=EXTRAS)
     sensors: tuple[str, ...] = static()
+    nis: FloatArray = per_entry(column="float64", default=None, kw_only=True)
+    nis_freedom: IntArray = per_entry(column="int64", default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.nis is None:
+            self.nis = np.full(len(self.track), np.nan)
+            self.nis_freedom = np.zeros(len(self.track), dtype=np.int64)
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

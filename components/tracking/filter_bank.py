@@ -6,7 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from components.estimation import modes
-from components.estimation.batched import is_everything, symmetric
+from components.estimation.batched import (
+    cholesky,
+    is_everything,
+    product_transposed,
+    solve_lower,
+    squared_length,
+    symmetric,
+)
 from components.estimation.frame import Place
 from components.estimation.kalman import (
     Innovation,
@@ -160,6 +167,29 @@ class FilterBank:
         else:
             new = modes.reweighted(weights[:, track], pairs.log_likelihoods[:, which])
         return [x for x, _ in moved], [p for _, p in moved], new
+
+
+def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntArray) -> FloatArray:
+    """Return the normalised innovations squared of pairs; of several models that of their mixture.
+
+    Parameters
+    ----------
+    pairs : PairMeasurement
+    weights : (models, k)
+        Of each pair's track, before the look.
+    which : (k,)
+    """
+    if len(weights) == 1:
+        return pairs.distance[which]
+    residuals = [apart[:, which] for apart in pairs.residuals]
+    mean = residuals[0] * weights[0]
+    for weight, apart in zip(weights[1:], residuals[1:], strict=True):
+        mean = mean + weight * apart
+    spread = np.zeros((len(mean), *mean.shape))
+    for weight, apart, found in zip(weights, residuals, pairs.innovations, strict=True):
+        root, off = found.root[:, :, which], apart - mean
+        spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
+    return squared_length(solve_lower(cholesky(spread), mean))
 
 
 def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:

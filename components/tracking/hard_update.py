@@ -6,6 +6,7 @@ from components.association.assignment import global_nearest, nearest
 from components.association.clusters import alone
 from components.association.gates import gate_threshold
 from components.estimation.batched import log_determinant
+from components.tracking.filter_bank import innovation_squared
 from components.tracking.gated_pairs import GatedPairs, log_gain, named, put
 from components.tracking.rules import TrackerRules
 from components.tracking.track_store import TrackStore
@@ -32,13 +33,13 @@ def updated_by_one(
         taken = nearest(track, entry, distance)
     else:
         volume = np.concatenate([_log_volume(one) for one in kinds])
-        size = np.concatenate([np.full(len(one.track), len(one.said.residuals[0]))
-                               for one in kinds])  # fmt: skip
+        sizes = np.concatenate([np.full(len(one.track), len(one.said.residuals[0]))
+                                for one in kinds])  # fmt: skip
         limits = np.zeros(5)
         for many in range(2, 5):
             limits[many] = gate_threshold(rules.gate_probability, many)
         price = np.full(len(part), -np.inf)
-        np.maximum.at(price, track, limits[size] + volume)
+        np.maximum.at(price, track, limits[sizes] + volume)
         taken = global_nearest(track, entry, distance + volume, price[track])
     first = 0
     for one in kinds:
@@ -55,13 +56,16 @@ def updated_by_one(
         mask = sensors[one.detection[mine]]
         gain[which] = log_gain(rules, part, one, codes, sensors)[mine]
         hit[which] = True
-        ranged = len(one.said.residuals[0]) > 2
+        size = len(one.said.residuals[0])
+        ranged = size > 2
         new = {
             **named(states, covariances),
             "weights": weights,
             "contributors": part.contributors[which] | mask,
             "updated_by": mask,
             "ranged": part.ranged[which] | ranged,
+            "nis": innovation_squared(one.said, part.weights[:, which], mine),
+            "freedom": size,
         }
         part = put(part, which, new)
     return part, hit, gain

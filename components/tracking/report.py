@@ -128,6 +128,8 @@ def state_tracks(
         covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
         extras={} if models == 1 else store.extras(models, known),
         sensors=sensors,
+        nis=store.plain("nis"),
+        nis_freedom=store.plain("freedom"),
         **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
     )  # fmt: skip
 

@@ -74,6 +74,8 @@ def started(
             "contributors": mask,
             "updated_by": mask,
             "ranged": ranged,
+            "nis": np.nan * ones,
+            "freedom": 0 * whole,
             "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
             "weights": np.full((len(sizes), count), 1.0 / len(sizes)),
             **named(states, covariances),

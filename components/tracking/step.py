@@ -126,6 +126,7 @@ def looked_at(
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),
+        nis=np.where(hit, changed.nis, np.nan), freedom=np.where(hit, changed.freedom, 0),
     )  # fmt: skip
     spread = position_variance(changed)
     ended = changed.ranged & (spread > rules.delete_above_m**2)

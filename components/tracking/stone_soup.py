@@ -200,6 +200,7 @@ class StoneSoupTracker(Component):
         def column(name: str, kind: type = float) -> Any:
             return np.array([getattr(one, name) for one in told], dtype=kind)
 
+        moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(_STATE)}
         assert self._origin is not None
         lat, lon, alt = (np.full(count, value) for value in self._origin)
         return StateTracks(
@@ -218,13 +219,16 @@ class StoneSoupTracker(Component):
             updated_s=column("updated_s"),
             contributors=column("contributors", np.int64),
             updated_by=column("updated_by", np.int64),
+            own_north_m=at.position_m[0],
+            own_east_m=at.position_m[1],
+            own_down_m=at.position_m[2],
             origin_lat_deg=lat,
             origin_lon_deg=lon,
             origin_alt_m=alt,
             covariance={name: known(spread[place]) for place, name in COVARIANCE.items()},
             extras={},
             sensors=sensors,
-            **{name: known(state[i]) for i, name in enumerate(_STATE)},
+            **moments,
         )  # fmt: skip
 
     def report(self) -> dict[str, Any]:

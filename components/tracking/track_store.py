@@ -36,6 +36,10 @@ class TrackStore:
         "contributors": np.int64,
         "updated_by": np.int64,
         "ranged": np.bool_,
+        # Normalised innovation squared of the last look, and of how many quantities; NaN and 0
+        # where it did not update the track with one detection.
+        "nis": np.float64,
+        "freedom": np.int64,
     }
 
     def __init__(self, columns: dict[str, Any]) -> None:

@@ -50,6 +50,7 @@ HEADERS = {
 # roots of the covariances of east and north.
 EXTRA_HEADERS = {
     "yaw": ("heading", "hdg", "true_heading", "trueheading", "yaw"),
+    "airspeed": ("airspeed", "air_speed", "tas", "true_airspeed"),
     "alerter": ("alerter",),
     **{
         name: (name,)
@@ -73,12 +74,13 @@ DEFAULT_UNITS = {
     "vy": "knot",
     "vz": "fpm",
     "yaw": "deg",
+    "airspeed": "knot",
     "alerter": "",
     **{f"{name}_std": "m" for name in ("s_ew", "s_ns", "s_en", "sz")},
     **{f"{name}_std": "m/s" for name in ("v_ew", "v_ns", "v_en", "vz")},
 }
 # Extras that are no error where they cannot be read: files in the wild hold gaps there.
-_OPTIONAL = frozenset({"yaw"})
+_OPTIONAL = frozenset({"yaw", "airspeed"})
 _VELOCITIES = (("vx", "vy", "vz"), ("trk", "gs", "vs"))
 
 

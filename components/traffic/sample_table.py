@@ -35,6 +35,7 @@ UNITS = {
     "vy": SPEED_MPS,
     "vz": SPEED_MPS,
     "yaw": ANGLE_DEG,
+    "airspeed": SPEED_MPS,
     "pitch": ANGLE_DEG,
     "roll": ANGLE_DEG,
     "alerter": NO_UNIT,

@@ -1,5 +1,6 @@
 """TCAS II: the volumes of traffic and resolution advisories by sensitivity level."""
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,19 @@ class Thresholds(NamedTuple):
     distance_m: float
     height_m: float
     miss_m: float
+
+
+@dataclass(frozen=True)
+class TcasAdvisory:
+    """An advisory of TCAS II as the volume of an alert level; its sizes follow the altitude.
+
+    Parameters
+    ----------
+    resolution : bool
+        Resolution advisory; otherwise traffic advisory.
+    """
+
+    resolution: bool
 
 
 def _sizes(tau_s: float, nmi: float, height_ft: float, miss_ft: float = np.inf) -> Thresholds:
@@ -68,8 +82,32 @@ def sensitivity_level(altitude_m: FloatArray) -> IntArray:
     return FIRST_LEVEL + np.searchsorted(LEVEL_TOPS_M, np.asarray(altitude_m), side="left")
 
 
+def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the radius and half height that recovery keeps clear where no sizes are given.
+
+    They are the miss distance and the height of resolution advisories, of level 3 at least.
+
+    Parameters
+    ----------
+    altitude_m : (n,)
+        Of the ownship.
+    """
+    sizes = [one for one in RESOLUTION_ADVISORY if one is not None]
+    place = np.maximum(sensitivity_level(altitude_m) - FIRST_LEVEL - 1, 0)
+    return (
+        np.array([one.miss_m for one in sizes])[place],
+        np.array([one.height_m for one in sizes])[place],
+    )
+
+
 def tcas_span(
-    relative: Relative, altitude_m: Any, climb_mps: Any, *, resolution: bool, end_s: float
+    relative: Relative,
+    altitude_m: Any,
+    climb_mps: Any,
+    *,
+    resolution: bool,
+    begin_s: Any = 0.0,
+    end_s: Any = np.inf,
 ) -> Span:
     """Return from when to when an advisory is due in straight flight.
 
@@ -81,8 +119,8 @@ def tcas_span(
         Of the ownship: its climb changes the sensitivity level on the way.
     resolution : bool
         Resolution advisory; otherwise traffic advisory.
-    end_s : float
-        How far ahead is looked.
+    begin_s, end_s : float or (n,)
+        The times looked at.
 
     Returns
     -------
@@ -91,32 +129,39 @@ def tcas_span(
     """
     table = RESOLUTION_ADVISORY if resolution else TRAFFIC_ADVISORY
     altitude_m, climb_mps = np.asarray(altitude_m), np.asarray(climb_mps)
-    entry = np.full(np.shape(altitude_m), np.inf)
+    entry = np.full(np.broadcast(altitude_m, begin_s, end_s, *relative).shape, np.inf)
     leave = -entry
     bottoms = np.concatenate([[-np.inf], LEVEL_TOPS_M])
     tops = np.concatenate([LEVEL_TOPS_M, [np.inf]])
     for sizes, bottom_m, top_m in zip(table, bottoms, tops, strict=True):
         if sizes is None:
             continue
-        begin_s, till_s = _within(altitude_m, climb_mps, bottom_m, top_m, end_s)
-        span = _span(relative, sizes, begin_s, np.maximum(till_s, begin_s))
-        there = surely_less(begin_s, till_s)
+        first_s, till_s = _within(altitude_m, climb_mps, bottom_m, top_m, begin_s, end_s)
+        span = _span(relative, sizes, first_s, np.maximum(till_s, first_s))
+        there = surely_less(first_s, till_s)
         entry = np.where(there, np.minimum(entry, span.begin_s), entry)
         leave = np.where(there, np.maximum(leave, span.end_s), leave)
     return Span(entry, leave)
 
 
 def _within(
-    altitude_m: FloatArray, climb_mps: FloatArray, bottom_m: float, top_m: float, end_s: float
+    altitude_m: FloatArray,
+    climb_mps: FloatArray,
+    bottom_m: float,
+    top_m: float,
+    begin_s: Any,
+    end_s: Any,
 ) -> tuple[FloatArray, FloatArray]:
     """Return from when to when the ownship is between two altitudes, s."""
     level = climb_mps == 0.0
     rate = np.where(level, 1.0, climb_mps)
     one, other = (bottom_m - altitude_m) / rate, (top_m - altitude_m) / rate
     inside = (altitude_m > bottom_m) & (altitude_m <= top_m)
-    begin = np.where(level, np.where(inside, 0.0, end_s), np.minimum(one, other))
-    till = np.where(level, np.where(inside, end_s, 0.0), np.maximum(one, other))
-    return np.clip(begin, 0.0, end_s), np.clip(till, 0.0, end_s)
+    begin = np.where(level, np.where(inside, begin_s, end_s), np.minimum(one, other))
+    till = np.where(level, np.where(inside, end_s, begin_s), np.maximum(one, other))
+    # Not np.clip, whose bounds may be the wrong way round where nothing is looked at.
+    within = [np.minimum(np.maximum(time_s, begin_s), end_s) for time_s in (begin, till)]
+    return within[0], within[1]
 
 
 def _span(relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: FloatArray) -> Span:

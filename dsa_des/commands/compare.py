@@ -29,9 +29,10 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.figures import draw_scatter
 from dsa_des.studies.folder import STUDY_JSON, StudyFolder
 from dsa_des.studies.identity import record_of
+from dsa_des.studies.labels import short
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import interval_text, short, times
+from dsa_des.studies.printing import interval_text, times
 from dsa_des.studies.record import StudyRecord, results_of
 from dsa_des.studies.statistics import difference
 from dsa_des.studies.study import MetricSpec, Study

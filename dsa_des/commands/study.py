@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dsa_des.errors import UsageError, did_you_mean
+from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import claim_folder, named
 from dsa_des.scene.chosen_file import chosen_file
@@ -28,6 +28,8 @@ from dsa_des.text.safe_text import shortened
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
+#: Of so many runs and more the second that measuring the models' errors takes is little.
+_RUNS_TO_MEASURE = 100
 
 
 def study_command(
@@ -40,6 +42,7 @@ def study_command(
     out: str | None,
     metrics: bool,
     no_figures: bool,
+    measure: bool,
     quiet: bool,
 ) -> None:
     """Do what the command line asks for; exit code 1 if runs crashed, 130 on ctrl-C."""
@@ -48,7 +51,7 @@ def study_command(
     elif len(words) == 2 and words[0] == "show":
         show_study(Path(words[1]), draw=not no_figures)
     elif len(words) == 2 and words[0] == "report":
-        _report(Path(words[1]), out, draw=not no_figures)
+        _report(Path(words[1]), out, draw=not no_figures, measure=measure)
     elif len(words) == 1 and words[0] not in ("show", "report"):
         study = read_study(chosen_file(words[0], "study"), sets=sets)
 
@@ -59,6 +62,8 @@ def study_command(
         folder = run_into(study, target, workers, resume, executor, scheduler, again)
         try:
             tables = finish(study, folder, quiet=quiet, draw=not no_figures)
+            if measure or (_count(tables) >= _RUNS_TO_MEASURE and not no_figures):
+                _measure(folder)
         except KeyboardInterrupt:
             _stopped("interrupted", again(folder.path), 130)
         tell_crashed([tables], again(folder.path))
@@ -227,7 +232,19 @@ def show_study(
     finish(folder.record, folder, only=only or every, first=first, draw=draw)
 
 
-def _report(path: Path, out: str | None, *, draw: bool) -> None:
+def _measure(folder: StudyFolder) -> None:
+    """Measure the errors of the models of a study's first run, and keep them in its folder."""
+    from dsa_des.studies.measured_errors import measure_errors
+
+    try:
+        measure_errors(folder)
+    except (SceneError, BlockFailure) as error:
+        say(f"errors of the models were not measured: {error}", err=True)
+    except OSError as error:
+        raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
+
+
+def _report(path: Path, out: str | None, *, draw: bool, measure: bool) -> None:
     """Write one HTML page about a study's folder, into it or where `--out` says."""
     from dsa_des.studies.report import REPORT, study_report
 
@@ -235,6 +252,8 @@ def _report(path: Path, out: str | None, *, draw: bool) -> None:
     target = path / REPORT if out is None else named(out)
     if out is not None:
         check_file(target)
+    if measure:
+        _measure(folder)
     try:
         if draw:
             Tables(folder.record, folder).draw()

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.studies.labels import unit_of
+from dsa_des.studies.labels import short, unit_of
 from dsa_des.studies.metric import EVENT, Result
 from dsa_des.studies.output import Tables
-from dsa_des.studies.printing import short
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 

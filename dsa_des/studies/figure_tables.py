@@ -7,10 +7,12 @@ from typing import Any
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene_file import Key
 from dsa_des.studies.axes import Axis
+from dsa_des.studies.requirements import number_of
 
 FIGURES = {
     "axis": ("metric", "axis", "lines"),
     "heat": ("metric", "x", "y"),
+    "map": ("metric", "x", "y", "limit"),
     "polar": ("metric", "axis"),
     "histogram": ("metric", "axis"),
     "cdf": ("metric", "axis"),
@@ -68,15 +70,27 @@ def read_figures(
                     message = f"must be the number of a {name} of this study: 0 to {most[name] - 1}"
                     add((*key, name), message, value)
                 figure[name] = value
+            elif name == "limit":
+                figure["limits"] = _limits(value)
+                if not figure["limits"]:
+                    add((*key, name), "must be a finite number, or a list of them", value)
             elif name != "kind":
                 figure[name] = value
         if kind != "run" and "metric" not in figure:
             add(key, "needs a metric: the name of a result")
             figure["metric"] = ""
-        if kind == "heat" and len(axes) < 2:
-            add(key, f"a heat map needs two axes; the study has {len(axes)}")
+        if kind in ("heat", "map") and len(axes) < 2:
+            what = "heat map" if kind == "heat" else "map"
+            add(key, f"a {what} needs two axes; the study has {len(axes)}")
         chosen = [axis for axis in axes if figure.get("axis", axes[0].column) == axis.column]
         if kind == "polar" and chosen and not chosen[0].numeric:
             add(key, f"a polar figure needs an axis in degrees; {chosen[0].column} is no number")
         found.append(figure)
     return tuple(found)
+
+
+def _limits(value: Any) -> list[float]:
+    """Return the limits that a figure draws contours of; none where one is no finite number."""
+    numbers = [number_of(item) for item in (value if isinstance(value, list) else [value])]
+    found = [number for number in numbers if number is not None]
+    return found if len(found) == len(numbers) else []

@@ -3,6 +3,7 @@
 import re
 
 from dsa_des.record.drawing import figure_text
+from dsa_des.text.safe_text import shortened
 
 #: How units at the end of a name are written.
 _UNITS = {
@@ -46,6 +47,13 @@ def value_label(axis: str, value: object) -> str:
     words, unit = _split(axis)
     name = _spaced(words.replace(".", " "))
     return figure_text(f"{name} {value:g}{'' if unit in ('', '°') else ' '}{unit}", 40)
+
+
+def short(value: object) -> str:
+    """Return a value for a table: numbers to five digits."""
+    if isinstance(value, float):
+        return "-" if value != value else f"{value:.5g}"
+    return shortened(value)
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -11,13 +11,16 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
+from dsa_des.studies.cheapest import Answer, answers, one_sided
 from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
 from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
-from dsa_des.studies.labels import value_label
+from dsa_des.studies.labels import short, value_label
+from dsa_des.studies.map_figure import draw_map
 from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
+from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
@@ -31,6 +34,7 @@ _LONGEST_NAME = 200
 #: Letters of a figure's title.
 _LONGEST_TITLE = 200
 SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
+REQUIREMENTS = "requirements.parquet"
 
 
 class Tables:
@@ -56,6 +60,11 @@ class Tables:
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval, expected
         )
+        wanted = [Requirement(**vars(item)) for item in record.requirements]
+        #: What each requirement comes to, at every place of the other axes.
+        self.answers: list[Answer] = [
+            found for one in wanted for found in answers(one, self.rows.axes, self.lines)
+        ]
         self.compared: list[Compared] = []
         #: The axis along which values are compared, and with which.
         self.baseline: tuple[str, Any] | None = None
@@ -117,6 +126,8 @@ class Tables:
             self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
         if self.ratios():
             self.folder.write_table(RATIOS, _parquet(self._ratio_columns()))
+        if self.answers:
+            self.folder.write_table(REQUIREMENTS, _parquet(self._answer_columns()))
 
     def ratios(self) -> list[Line]:
         """Return the lines that are ratios of events."""
@@ -165,6 +176,29 @@ class Tables:
             "expected": [line.expected for line in self.lines],
         }
         return columns
+
+    def others_said(self, answer: Answer) -> str:
+        """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
+        names = [name for name in self.rows.axes if name != answer.requirement.axis]
+        return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
+
+    def _answer_columns(self) -> dict[str, list[Any]]:
+        found = self.answers
+        return {
+            "requirement": [item.requirement.said() for item in found],
+            "axis": [item.requirement.axis for item in found],
+            "others": [self.others_said(item) for item in found],
+            "cheapest": [None if item.value is None else short(item.value) for item in found],
+            "confidence": [one_sided(self.record.confidence)] * len(found),
+            "cheapest_by_estimate": [
+                None if item.estimated is None else short(item.estimated) for item in found
+            ],
+            "value": [item.line.estimate.value for item in found],
+            "low": [item.line.estimate.low for item in found],
+            "high": [item.line.estimate.high for item in found],
+            "few": [item.line.estimate.few for item in found],
+            "uneven": [item.uneven for item in found],
+        }
 
     def _difference_columns(self) -> dict[str, list[Any]]:
         assert self.baseline is not None
@@ -222,12 +256,15 @@ class Tables:
         metric = str(figure.metric)
         title = _shortened(self.record.title if figure.title is None else figure.title)
         axis = figure.axis or places.axes[0]
-        if figure.kind == "heat":
+        if figure.kind in ("heat", "map"):
             x = figure.x or places.axes[0]
             y = figure.y or next((a for a in places.axes if a != x), x)
             if x == y:
                 return False
-            draw_heat(target, places, metric, x, y, title)
+            if figure.kind == "heat":
+                draw_heat(target, places, metric, x, y, title)
+            else:
+                draw_map(target, places, metric, x, y, figure.limits, title, self.record.confidence)
         elif figure.kind == "polar":
             draw_polar(target, places, metric, axis, title)
         else:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
+from dsa_des.studies.cheapest import Answer, one_sided
+from dsa_des.studies.labels import short
 from dsa_des.studies.output import Tables, cut_off_text
 from dsa_des.studies.statistics import Estimate
 from dsa_des.studies.summary import Line
@@ -53,6 +55,9 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     if ratios:
         console.print()
         _show_ratios(console, tables, ratios)
+    if tables.answers:
+        console.print()
+        _show_answers(console, tables)
     if tables.compared:
         console.print()
         _show_differences(console, tables, {line.result.name for line in lines})
@@ -80,6 +85,35 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
             f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "
             "--resume tries them again"
         )
+
+
+#: Columns of the table of requirements.
+ANSWER_HEADS = (
+    "requirement", "along", "where", "cheapest", "value there", "interval", "by the estimate alone",
+    "note",
+)  # fmt: skip
+
+
+def answer_cells(tables: Tables, answer: Answer) -> list[str]:
+    """Return the cells of what a requirement comes to, as `ANSWER_HEADS` names them."""
+    estimate = answer.line.estimate
+    notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
+    notes += ["few"] if estimate.few else []
+    return [
+        answer.requirement.said(), answer.requirement.axis, tables.others_said(answer),
+        "none" if answer.value is None else short(answer.value), short(estimate.value),
+        interval_text(estimate), "none" if answer.estimated is None else short(answer.estimated),
+        "; ".join(notes),
+    ]  # fmt: skip
+
+
+def _show_answers(console: Any, tables: Tables) -> None:
+    """Print the cheapest value that meets each requirement, at every place of the other axes."""
+    rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_SHOWN]]
+    sure = f"{100 * one_sided(tables.record.confidence):g} %"
+    print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)
+    if any(answer.value is None for answer in tables.answers):
+        console.print("none: the interval of the dearest does not lie within the limit")
 
 
 #: Columns of the table of ratios, behind those of the axes.
@@ -169,10 +203,3 @@ _ROUNDING = 1e9
 def times(ratio: float) -> str:
     """Return how many times narrower for a table; empty where nothing but rounding differs."""
     return f"{ratio:.1f} times" if ratio < _ROUNDING else ""
-
-
-def short(value: Any) -> str:
-    """Return a value for a table: numbers to five digits."""
-    if isinstance(value, float):
-        return "-" if value != value else f"{value:.5g}"
-    return shortened(value)

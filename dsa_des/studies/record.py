@@ -85,15 +85,26 @@ class StopRecord(_Strict):
 class FigureRecord(_Strict):
     """A figure; see `read_figures`."""
 
-    kind: Literal["axis", "heat", "polar", "histogram", "cdf", "run"]
+    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "run"]
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
     lines: str | None = None
     x: str | None = None
     y: str | None = None
+    limits: list[float] = []
     cell: _Whole = 0
     replica: _Whole = 0
+
+
+class RequirementRecord(_Strict):
+    """A limit on a result; see `Requirement`."""
+
+    metric: str
+    axis: str
+    limit: float
+    below: bool = True
+    cheap_last: bool = False
 
 
 class StudyHead(_Strict):
@@ -129,6 +140,7 @@ class StudyRecord(StudyHead):
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)]
     interval: Literal["t", "bootstrap"]
     figures: list[FigureRecord]
+    requirements: list[RequirementRecord] = []
 
     @model_validator(mode="after")
     def _consistent(self) -> "StudyRecord":
@@ -151,10 +163,14 @@ class StudyRecord(StudyHead):
             for name in (figure.axis, figure.lines, figure.x, figure.y):
                 if name is not None and name not in axes:
                     raise ValueError("a figure names no axis")
+            if figure.kind == "map" and len(axes) < 2:
+                raise ValueError("a map needs two axes")
             if figure.kind == "polar" and figure.axis and not axes[figure.axis].numeric:
                 raise ValueError("a polar figure needs numbers")
             if figure.kind != "run" and figure.metric is None:
                 raise ValueError("a figure needs a metric")
+        if any(item.axis not in axes for item in self.requirements):
+            raise ValueError("a requirement names no axis")
         return self
 
     def schema_of_parts(self) -> "pa.Schema":
@@ -191,6 +207,12 @@ class StudyRecord(StudyHead):
         row : mapping
             Column → value of its row in the parts.
         """
+        return run_command(self.scene, int(row["seed"]), *self.changes(row))
+
+    def changes(
+        self, row: Mapping[str, Any]
+    ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+        """Return the swaps and the values that make the scene of a run."""
         swaps, sets = list(self.swaps), list(self.sets)
         place = int(row["cell"])
         places = []
@@ -201,7 +223,7 @@ class StudyRecord(StudyHead):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         sets += [(draw.key, set_text(row[draw.column])) for draw in self.draws]
-        return run_command(self.scene, int(row["seed"]), swaps, sets)
+        return swaps, sets
 
 
 def results_of(study: Study) -> list[Result]:
@@ -287,9 +309,10 @@ def record_text(study: Study, digest: str) -> str:
         "confidence": study.confidence,
         "interval": study.interval,
         "figures": [
-            {key: item if isinstance(item, int) else str(item) for key, item in figure.items()}
+            {k: v if isinstance(v, int | list) else str(v) for k, v in figure.items()}
             for figure in study.figures
         ],
+        "requirements": [vars(requirement) for requirement in study.requirements],
         "version": __version__,
         "tables": study.tables,
     }

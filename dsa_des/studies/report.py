@@ -6,33 +6,50 @@ code that it names. Pictures stand in the page itself, and it loads nothing.
 
 import base64
 import hashlib
-import platform
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from html import escape
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from dsa_des.record.version import __version__
+from dsa_des.studies.cheapest import one_sided
+from dsa_des.studies.explained import read_explained, versions
 from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.labels import short
+from dsa_des.studies.measured_errors import read_errors
 from dsa_des.studies.output import Tables, cut_off_text
-from dsa_des.studies.printing import interval_text, short
+from dsa_des.studies.printing import (
+    ANSWER_HEADS,
+    RATIO_HEADS,
+    answer_cells,
+    interval_text,
+    ratio_cells,
+)
+from dsa_des.studies.report_models import models_part
 from dsa_des.studies.safe_files import read_regular
 from dsa_des.studies.study import run_command
 from dsa_des.text.safe_text import printable, shortened
 
 REPORT = "report.html"
-_PACKAGES = ("numpy", "scipy", "pyarrow", "simpy", "networkx", "pydantic")
 _LARGEST_PICTURE = 20 * 2**20
 _MOST_PICTURES, _MOST_RUNS, _MOST_ROWS, _MOST_PARTS = 60, 50, 5000, 1000
 _LONGEST = 400
 _STYLE = """
-body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;color:#1a1a1a}
-h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid #ccc}
-table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .7em;border-bottom:1px solid #ddd;
-text-align:left;vertical-align:top}th{background:#f3f3f3}code,pre{background:#f3f3f3;
-font-size:.9em;white-space:pre-wrap;word-break:break-word}img{max-width:100%}.note{color:#555}
+:root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
+@media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
+--note:#a5abb3}figure img{background:#fff;border-radius:4px}}
+body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;
+color:var(--ink);background:var(--paper);overflow-wrap:break-word}
+h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid var(--line)}
+h3{font-size:1em;margin:1.2em 0 .2em}
+.wide{overflow-x:auto;max-width:100%}table{border-collapse:collapse;margin:.6em 0;
+width:max-content}
+td,th{padding:.15em .7em;border-bottom:1px solid var(--line);text-align:left;vertical-align:top;
+}td{max-width:34em}th{background:var(--soft)}code,pre{background:var(--soft);
+font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figure{margin:1em 0}
+img{max-width:100%;height:auto}.note{color:var(--note)}
+@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}}
+@media print{.wide{overflow:visible}}
 """
 
 
@@ -54,8 +71,13 @@ def study_report(folder: StudyFolder) -> bytes:
     parts = [
         _head(tables),
         _asked(tables),
-        _scene(tables),
+        _scene(tables, folder),
+        models_part(
+            read_explained(folder), read_errors(folder), _table, _text, _explain(tables.record)
+        ),
         _results(tables),
+        _ratios(tables),
+        _requirements(tables),
         _differences(tables),
         _pictures(folder),
         _troubles(tables, folder),
@@ -67,6 +89,7 @@ def study_report(folder: StudyFolder) -> bytes:
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
         "img-src data:; style-src 'unsafe-inline'\">"
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
         f"<title>{title}</title><style>{_STYLE}</style></head><body>\n"
     )
     return (page + "\n".join(filter(None, parts)) + "\n</body></html>\n").encode()
@@ -81,7 +104,9 @@ def _table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
         return "<tr>" + "".join(f"<{tag}>{_text(cell)}</{tag}>" for cell in cells) + "</tr>"
 
     body = "\n".join(line(row, "td") for row in rows)
-    return f"<table>{line(headings, 'th')}\n{body}</table>" if body else ""
+    if not body:
+        return ""
+    return f"<div class='wide'><table>{line(headings, 'th')}\n{body}</table></div>"
 
 
 def _head(tables: Tables) -> str:
@@ -122,16 +147,23 @@ def _asked(tables: Tables) -> str:
     )
 
 
-def _scene(tables: Tables) -> str:
+def _scene(tables: Tables, folder: StudyFolder) -> str:
     record = tables.record
     changes = [("set", f"{key} = {value}") for key, value in record.sets]
     changes += [("swap", f"{block} = {name}") for block, name in record.swaps]
-    command = _explain(record)
+    found = read_explained(folder)
+    whole = ""
+    if found is not None and found.scene:
+        lines = found.scene.splitlines()[:_MOST_ROWS]
+        whole = (
+            "<details><summary>The first run's scene, every default written out</summary><pre>"
+            + "\n".join(escape(printable(line)) for line in lines)
+            + "</pre></details>"
+        )
     return (
         f"<h2>The scene</h2><p><code>{_text(record.scene)}</code></p>"
         + _table(("in every cell", ""), changes)
-        + "<p>The page is made of the results alone. Which model each block uses, with its proven "
-        f"error, and which effects are left out and why:</p><pre>{_text(command)}</pre>"
+        + whole
     )
 
 
@@ -166,6 +198,29 @@ def _results(tables: Tables) -> str:
     return (
         "<h2>Results</h2><p class='note'>Cut off: values that the beginning or the end of a run "
         "censored; the mean holds them.</p>" + _table(headings, rows) + note
+    )
+
+
+def _ratios(tables: Tables) -> str:
+    rows = [(*map(short, line.at), *ratio_cells(line)) for line in tables.ratios()[:_MOST_ROWS]]
+    return (
+        "<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. "
+        "Below, above, induced: units with the event without and with the remedy, and with it "
+        "alone. Effective size: Kish's, of the weights.</p>"
+        + _table((*tables.rows.axes, *RATIO_HEADS), rows)
+        if rows
+        else ""
+    )
+
+
+def _requirements(tables: Tables) -> str:
+    if not tables.answers:
+        return ""
+    rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_ROWS]]
+    sure = f"{100 * one_sided(tables.record.confidence):g} %"
+    return (
+        f"<h2>Requirements</h2><p class='note'>The cheapest value whose interval, and that of all "
+        f"dearer ones, lies within the limit; {sure} sure.</p>" + _table(ANSWER_HEADS, rows)
     )
 
 
@@ -220,19 +275,19 @@ def _troubles(tables: Tables, folder: StudyFolder) -> str:
 
 def _origin(folder: StudyFolder) -> str:
     record = folder.record
-    rows = [("dsa_des (this page)", __version__), ("Python", platform.python_version())]
-    for name in _PACKAGES:
-        try:
-            rows.append((name, version(name)))
-        except PackageNotFoundError:
-            continue
+    found = read_explained(folder)
+    now = versions()
+    runs = {} if found is None else found.versions
+    rows = [(name, runs.get(name, ""), now.get(name, "")) for name in {**runs, **now}]
     hashes = [("study, with all that fixes its results", record.study_sha256)]
     for name in folder.part_names()[:_MOST_PARTS]:
         path: Path = folder.parts / f"{name}.parquet"
         hashes.append((path.name, hashlib.sha256(read_regular(path)).hexdigest()))
     return (
-        "<h2>Versions and hashes</h2>"
-        + _table(("package", "version"), rows)
+        "<h2>Seeds, versions and hashes</h2>"
+        f"<p>Seed of the study: <code>{record.seed}</code>. Every run's own seed is in the column "
+        "<code>seed</code> of the parts.</p>"
+        + _table(("package", "when the study was begun", "when this page was made"), rows)
         + _table(("", "SHA-256"), hashes)
     )
 
@@ -243,10 +298,13 @@ def _repeat(tables: Tables, folder: StudyFolder) -> str:
     lines = [
         f"dsa-des study {record.study}",
         f"dsa-des study show {folder.path}",
+        f"dsa-des study report {folder.path}",
+        _explain(record),
         f"{record.command(first)}    # cell {first['cell']}, replica {first['replica']}",
     ]
     shown = "\n".join(escape(printable(line)) for line in lines)
     return (
-        f"<h2>To repeat it</h2><pre>{shown}</pre><p class='note'>The column <code>command</code> "
-        "of the parts repeats each single run.</p>"
+        f"<h2>To repeat it</h2><pre>{shown}</pre><p class='note'>Any other run: the same "
+        "with the seed, axes and draws that stand in its row of the parts; rows of failed runs "
+        "hold it as <code>command</code>.</p>"
     )

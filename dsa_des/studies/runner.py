@@ -12,6 +12,7 @@ from dsa_des.errors import SceneError
 from dsa_des.replicas.replicas import why_apart
 from dsa_des.studies.chunk import CRASHED, Done, done_of, joined
 from dsa_des.studies.executors import Executor
+from dsa_des.studies.explained import keep_explained
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.record import results_of
 from dsa_des.studies.study import Chunk, Study
@@ -73,6 +74,10 @@ def run_study(
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(range(len(study.cells)))
     rounds = -(-study.replicas // study.batch)
+    try:
+        keep_explained(study, folder)
+    except OSError as error:
+        raise Stopped(f"results cannot be written: {error.strerror or error}") from error
     try:
         for number in range(rounds):
             if number and study.stop_when is not None:

@@ -23,6 +23,7 @@ from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, as_text, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
+from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.sample import member_seed
 from dsa_des.studies.study_tables import existing_file
 
@@ -140,6 +141,7 @@ class Study:
     confidence : float
     interval : {"t", "bootstrap"}
     figures : tuple of dict
+    requirements : tuple of Requirement
     runs_per_chunk : int
     base : SceneFile
         The scene's tables.
@@ -166,6 +168,7 @@ class Study:
     runs_per_chunk: int
     base: SceneFile
     tables: dict[str, Any]
+    requirements: tuple[Requirement, ...] = ()
 
     @property
     def cells(self) -> StudyCells:

@@ -44,7 +44,7 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
 
     _check_axes(study, add)
     scenes: list[Scene] = []
-    for cell in _one_per_value(study):
+    for cell in one_per_value(study):
         try:
             scenes.append(study.scene(cell))
         except SceneError as error:
@@ -115,6 +115,10 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
+    for number, wanted in enumerate(study.requirements):
+        if wanted.metric not in names:
+            message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
+            add(("requirements", number, "metric"), message, wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure["kind"] != "run" and figure["metric"] not in names:
             message = "no metric of the study gives it"
@@ -190,7 +194,7 @@ def _build_metrics(
     return built
 
 
-def _one_per_value(study: Study) -> list[int]:
+def one_per_value(study: Study) -> list[int]:
     """Return cells that together hold every value of every axis; the first cell comes first."""
     wanted = [(0,) * len(study.axes)]
     for place, axis in enumerate(study.axes):

@@ -22,13 +22,15 @@ from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
 from dsa_des.studies.figure_tables import read_figures
 from dsa_des.studies.metric import METRICS, find_metric
+from dsa_des.studies.requirements import read_requirements
 from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
 from dsa_des.studies.study_checks import cell_problems
 from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",
-    "figures", "stop_when", "compare", "over", "confidence", "interval", "runs_per_chunk",
+    "figures", "requirements", "stop_when", "compare", "over", "confidence", "interval",
+    "runs_per_chunk",
 )  # fmt: skip
 _MOST_RUNS = 100_000_000
 _MOST_CELLS = 1_000_000
@@ -154,6 +156,9 @@ class _StudyReader:
             interval=interval,
             figures=read_figures(
                 self.data.get("figures", []), axes, replicas, self.column, self.add
+            ),
+            requirements=read_requirements(
+                self.data.get("requirements", []), axes, self.column, self.add
             ),
             runs_per_chunk=self.whole("runs_per_chunk", max(1, min(128, -(-runs // 32))), low=1),
             base=base,

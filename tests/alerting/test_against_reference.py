@@ -26,9 +26,8 @@ def differences(configuration, path, wanted, decimals):
         configuration,
         encounter.time_s,
         encounter.present,
-        encounter.relative,
+        encounter.pairs,
         encounter.alerter,
-        encounter.bounds,
     )
     table = alert_table(configuration, encounter, found, decimals)
     assert table.splitlines()[:2] == wanted.splitlines()[:2]

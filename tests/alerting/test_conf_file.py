@@ -83,8 +83,8 @@ def test_keys_are_read_in_any_case_and_order(tmp_path):
         ("false", "maybe", "it must be true or false"),
         (
             "One_Two_alert_2_region",
-            "One_Two_alert_2_spread_hdir = 3 [deg]\nOne_Two_alert_2_region",
-            "One_Two_alert_2_spread_hdir is not 0",
+            "One_Two_alert_2_spread_hdir = -3 [deg]\nOne_Two_alert_2_region",
+            "One_Two_alert_2_spread_hdir is -3: it may not be negative",
         ),
     ],
 )

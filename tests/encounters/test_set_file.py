@@ -159,3 +159,34 @@ def test_generating_says_what_is_wrong(model: Path, tmp_path: Path) -> None:
     done = call("generate", "--model", model, "--count", 2, "--out", tmp_path / "s.parquet")
     assert done.exit_code == 2 and str(model) in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "s.parquet").exists()
+
+
+def test_miss_distances_are_drawn_as_the_command_line_says(model: Path, tmp_path: Path) -> None:
+    out = tmp_path / "s.parquet"
+    done = call("generate", "--model", model, "--count", 400, "--out", out, "--horizontal",
+                "-3000,0,1000", "1,3", "--vertical", "-300,100,300", "0.25,1")  # fmt: skip
+    assert done.exit_code == 0
+    found = read_set(out)
+    h, v = (found.extra[name] / 0.3048 for name in ("horizontal_miss_m", "vertical_miss_m"))
+    assert h.min() >= -3000 and h.max() <= 1000 and v.min() >= -300 and v.max() <= 300
+    assert abs((h > 0).mean() - 0.75) < 0.08
+    assert abs((v > 100).mean() - 200 / (200 + 0.25 * 400)) < 0.08
+    # Undone by the weights: uniform over all that is drawn. 4 standard errors of so uneven ones.
+    w = found.weights / found.weights.sum()
+    assert abs(w[h > 0].sum() - 0.25) < 0.09 and abs(w[v > 100].sum() - 1 / 3) < 0.11
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--horizontal", "0,low", "1"), "rising edges, ft, and the proportion"),
+        (("--horizontal", "-100,0,100", "1"), "3 edges need 2 proportions"),
+        (("--vertical", "100,-100", "1"), "edges must be rising"),
+        (("--vertical", "100,200", "1"), "must lie about 0"),
+        (("--vertical", "-100,100", "0"), "proportions must be numbers above 0"),
+    ],
+)
+def test_densities_that_are_none(words, said: str, model: Path, tmp_path: Path) -> None:
+    out = tmp_path / "s.parquet"
+    done = call("generate", "--model", model, "--count", 2, "--out", out, *words)
+    assert done.exit_code == 2 and said in done.stderr and not out.exists()

@@ -1,5 +1,6 @@
 """``dsa-des study report``: one page that holds all and loads nothing."""
 
+import json
 import re
 from pathlib import Path
 
@@ -65,3 +66,36 @@ def test_it_can_stand_elsewhere_and_says_what_is_no_study(folder: Path, tmp_path
     assert (tmp_path / "page.html").stat().st_size > 3000
     done = call("report", tmp_path)
     assert done.exit_code == 2 and "is not the folder of a study" in done.stderr
+
+
+def test_it_tells_the_models_their_errors_and_what_is_left_out(folder: Path) -> None:
+    call("report", folder, "--no-figures")
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for said in (
+        "Exact line of sight on the WGS-84 ellipsoid.", "the reference", "Left out, and why",
+        "[terrain] refraction is &#x27;none&#x27;", "--measure", "In the first cell",
+        "every default written out", "scan_rate_hz = 1", "when the study was begun",
+    ):  # fmt: skip
+        assert said in page, said
+    assert call("report", folder, "--no-figures", "--measure").exit_code == 0
+    measured = (folder / "report.html").read_text(encoding="utf-8")
+    assert "its own error, measured at" in measured and "earth: ellipsoid" in measured
+    # What is kept there is checked: damaged, it is as if it were not there.
+    (folder / "errors.json").write_text('{"rows": [1]}', encoding="utf-8")
+    (folder / "explained.json").unlink()
+    call("report", folder, "--no-figures")
+    bare = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Measured over" not in bare and "kept neither" in bare
+
+
+def test_a_strangers_words_are_text(folder: Path) -> None:
+    call("report", folder, "--no-figures", "--measure")
+    errors = json.loads((folder / "errors.json").read_text(encoding="utf-8"))
+    errors["notes"] = ["<img src=x onerror=alert(1)>"]
+    (folder / "errors.json").write_text(json.dumps(errors), encoding="utf-8")
+    (folder / "explained.json").write_text(
+        '{"versions": {"<script>": "1"}, "scene": "</pre><script>", "scenes": []}', encoding="utf-8"
+    )
+    call("report", folder, "--no-figures")
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in page and "&lt;script&gt;" in page and "<img src=x" not in page

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from components.metrics.set_distances import chi_square_bounds, set_distance
-from components.metrics.tracking import _changes
+from components.metrics.track_tally import changes
 
 
 def enumerated(distance, cutoff, order):
@@ -46,5 +46,5 @@ def test_bounds_are_quantiles_of_chi_square():
 
 
 def test_identities_break_and_swap():
-    assert _changes({0: [1, 1, 3, 3], 1: [2, 2]}) == (1.0, 0.0)
-    assert _changes({0: [1, 2, 2], 1: [2, 1, 1]}) == (0.0, 2.0)
+    assert changes({0: [1, 1, 3, 3], 1: [2, 2]}) == (1.0, 0.0)
+    assert changes({0: [1, 2, 2], 1: [2, 1, 1]}) == (0.0, 2.0)

@@ -85,6 +85,13 @@ def test_drawn_pilots_differ_and_each_is_the_same_again(tmp_path):
     assert all(told["time_s"] - began >= 4.0 for began, told in drawn)
 
 
+def test_what_is_drawn_is_by_the_decision_not_by_how_often_an_alert_was_seen(tmp_path):
+    """The first decision of a pilot who waits longer to see it is drawn alike, so much later."""
+    keys = {"deterministic": False, "coordination_s": 0.0}
+    told = [first(tmp_path, held_s=held_s, **keys)[1]["time_s"] for held_s in (0.0, 1.0, 3.0)]
+    assert [time_s - told[0] for time_s in told] == [0.0, 1.0, 3.0]
+
+
 def test_an_alert_that_ends_is_not_acted_on(tmp_path):
     found = scene(tmp_path, initial_delay_s=200.0)
     assert rows(run(found), "manoeuvres") == []

@@ -1,0 +1,234 @@
+"""What is added up of tracks and targets over the instants of one run, and what it comes to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from components.metrics.set_distances import assigned, chi_square_bounds, set_distance
+from dsa_des.arrays.types import FloatArray, IntArray
+
+_AXES = ("north", "east", "down")
+_SETS = (
+    "track_ospa_m", "track_gospa_m", "track_gospa_localisation_m", "track_gospa_missed_m",
+    "track_gospa_false_m",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ToldTracks:
+    """Confirmed tracks that have a range, as they were told at one instant.
+
+    Parameters
+    ----------
+    time_s : float
+    number : (tracks,) of int
+    state : (6, tracks)
+        Position and velocity, north, east, down.
+    covariance : (tracks, 6, 6)
+    confirmed_s : (tracks,)
+        When each was first told as confirmed.
+    """
+
+    time_s: float
+    number: IntArray
+    state: FloatArray
+    covariance: FloatArray
+    confirmed_s: FloatArray
+
+
+@dataclass
+class TrackTally:
+    """Sums over the instants of one run.
+
+    At every instant tracks and targets are assigned one to one so that the sum of distances is
+    least. A track that is left over belongs to the nearest target, as one too many, if that is near
+    enough; otherwise it is spurious.
+
+    Parameters
+    ----------
+    within_m : float
+        So near a target a track may be its own; cut-off of OSPA and GOSPA.
+    order : float
+        Their power.
+    step_s : float
+        From one instant to the next.
+    """
+
+    within_m: float
+    order: float
+    step_s: float
+    nees: list[float] = field(default_factory=list)
+    error: list[FloatArray] = field(default_factory=list)
+    accuracy: list[tuple[float, float]] = field(default_factory=list)
+    sets: list[tuple[float, ...]] = field(default_factory=list)
+    present: int = 0
+    tracked: int = 0
+    tracks: int = 0
+    spurious: int = 0
+    numbers: dict[int, list[int]] = field(default_factory=dict)
+    since: dict[int, float] = field(default_factory=dict)
+    confirmed: set[int] = field(default_factory=set)
+    owned: set[int] = field(default_factory=set)
+    steps_present: dict[int, int] = field(default_factory=dict)
+    before_s: float = 0.0
+
+    def add(self, told: ToldTracks, true: FloatArray, present: IntArray) -> None:
+        """Compare the tracks of an instant with the targets.
+
+        Parameters
+        ----------
+        told : ToldTracks
+        true : (targets, 6, tracks)
+            Where each target was at the instant that each track's state speaks of.
+        present : (n,) of int
+            Targets that are there.
+        """
+        count = len(told.number)
+        apart = np.empty((count, len(present)))
+        for k, target in enumerate(present.tolist()):
+            apart[:, k] = np.sqrt(((told.state[:3] - true[target, :3]) ** 2).sum(axis=0))
+        found = set_distance(apart, self.within_m, self.order)
+        self.sets.append(
+            (found.ospa_m, found.gospa_m, found.localisation_m, found.missed_m, found.false_m)
+        )
+        self.present += len(present)
+        self.tracks += count
+        self.confirmed |= set(told.number.tolist())
+        for target in present.tolist():
+            self.steps_present[target] = self.steps_present.get(target, 0) + 1
+        left = set(range(count))
+        for track, k in zip(*assigned(np.minimum(apart, self.within_m)), strict=True):
+            if apart[track, k] >= self.within_m:
+                continue
+            left.discard(int(track))
+            self._pair(told, true, int(track), int(present[k]))
+        for track in left:
+            near = int(np.argmin(apart[track])) if len(present) else -1
+            if near < 0 or apart[track, near] >= self.within_m:
+                self.spurious += 1
+                continue
+            self.owned.add(int(told.number[track]))
+            self._accuracy(told.state[:, track] - true[present[near], :, track])
+        self.before_s = told.time_s
+
+    def _pair(self, told: ToldTracks, true: FloatArray, track: int, target: int) -> None:
+        error = told.state[:, track] - true[target, :, track]
+        self.tracked += 1
+        self.nees.append(float(error @ np.linalg.solve(told.covariance[track], error)))
+        self.error.append(error)
+        self._accuracy(error)
+        number = int(told.number[track])
+        self.numbers.setdefault(target, []).append(number)
+        # Between two instants a track was confirmed when it was told so, not at the next instant.
+        self.since.setdefault(target, max(float(told.confirmed_s[track]), self.before_s))
+        self.owned.add(number)
+
+    def _accuracy(self, error: FloatArray) -> None:
+        self.accuracy.append((float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))))
+
+    def results(
+        self,
+        names: list[str],
+        detected_s: Mapping[str, float],
+        covered_s: Mapping[str, float],
+        duration_s: float,
+    ) -> dict[str, float]:
+        """Return what it comes to.
+
+        Parameters
+        ----------
+        names : list of str
+            Of the targets.
+        detected_s, covered_s : mapping
+            When each was first detected, and entered the sensors' coverage.
+        duration_s : float
+        """
+        found = self._errors()
+        sets = np.array(self.sets).reshape(-1, len(_SETS))
+        found |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
+        associated = len(self.accuracy)
+        found["track_completeness"] = _ratio(self.tracked, self.present)
+        found["track_ambiguity"] = _ratio(associated, self.tracked)
+        found["track_spuriousness"] = _ratio(self.spurious, self.tracks)
+        accuracy = np.array(self.accuracy).reshape(-1, 2)
+        found["track_positional_accuracy_m"] = mean_of(accuracy[:, 0])
+        found["track_velocity_accuracy_m_s"] = mean_of(accuracy[:, 1])
+        longest = sum(max(own.count(n) for n in set(own)) for own in self.numbers.values())
+        found["track_longest_share"] = _ratio(longest, sum(self.steps_present.values()))
+        broken, swapped = changes(self.numbers)
+        found["track_broken"], found["track_swapped"] = broken, swapped
+        found["track_number_changes_per_s"] = _ratio(broken + swapped, self.tracked * self.step_s)
+        since = {names[t]: value for t, value in self.since.items()}
+        found["track_confirmation_s"] = _delay(since, detected_s)
+        found["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
+        there = [name for name in covered_s if names.index(name) in self.steps_present]
+        found["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
+        found["track_false_per_hour"] = 3600.0 * len(self.confirmed - self.owned) / duration_s
+        return found
+
+    def _errors(self) -> dict[str, float]:
+        low, high = chi_square_bounds(6)
+        nees = np.array(self.nees)
+        square = np.array(self.error).reshape(-1, 6) ** 2
+        parts = {
+            "track_position_error_m": square[:, :3].sum(axis=1),
+            "track_horizontal_error_m": square[:, :2].sum(axis=1),
+            "track_vertical_error_m": square[:, 2],
+            "track_velocity_error_m_s": square[:, 3:].sum(axis=1),
+        }
+        for i, axis in enumerate(_AXES):
+            parts[f"track_{axis}_error_m"] = square[:, i]
+            parts[f"track_{axis}_error_m_s"] = square[:, 3 + i]
+        found = {name: mean_of(values) ** 0.5 for name, values in parts.items()}
+        found["track_nees_mean"] = mean_of(nees)
+        found["track_nees_inside"] = mean_of((nees >= low) & (nees <= high))
+        return found
+
+
+def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:
+    """Return how honest expected measurements are.
+
+    Parameters
+    ----------
+    nis : (n,)
+        Normalised innovations squared.
+    freedom : (n,) of int
+        How many quantities each is of.
+    """
+    inside = np.zeros(len(nis), dtype=bool)
+    for many in np.unique(freedom).tolist():
+        low, high = chi_square_bounds(many)
+        mine = freedom == many
+        inside[mine] = (nis[mine] >= low) & (nis[mine] <= high)
+    return {
+        "track_nis_per_freedom": _ratio(float(nis.sum()), float(freedom.sum())),
+        "track_nis_inside": mean_of(inside),
+    }
+
+
+def changes(numbers: Mapping[int, list[int]]) -> tuple[float, float]:
+    """Return how often tracks of targets go on under new numbers, and under another's."""
+    broken = swapped = 0
+    for target, own in numbers.items():
+        others = {n for other, theirs in numbers.items() if other != target for n in theirs}
+        for before, after in pairwise(own):
+            if before != after:
+                swapped += after in others
+                broken += after not in others
+    return float(broken), float(swapped)
+
+
+def _delay(since: Mapping[str, float], begin_s: Mapping[str, float]) -> float:
+    return mean_of(np.array([since[name] - begin_s[name] for name in since if name in begin_s]))
+
+
+def mean_of(values: Any) -> float:
+    """Return the mean, NaN of nothing."""
+    return float(np.mean(values)) if len(values) else float("nan")
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")

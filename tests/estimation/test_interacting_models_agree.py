@@ -1,0 +1,55 @@
+"""Interacting models after every look, against frozen values at 40 digits (`make_imm_vectors`)."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from components.estimation import modes
+from components.estimation.frame import Place
+from components.estimation.measurement import Kind
+from components.estimation.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn
+from components.tracking.filter_bank import FilterBank
+
+VECTORS = json.loads(Path(__file__).with_name("imm_vectors.json").read_text())
+
+
+def apart(covariance, known):
+    """Return the largest difference, in units of the deviations."""
+    deviation = np.sqrt(np.diag(known))
+    return np.abs((covariance - known) / np.outer(deviation, deviation)).max()
+
+
+def test_every_update_of_three_models_agrees_with_40_digits():
+    velocity, turn, rate, jerk = VECTORS["intensities"]
+    bank = FilterBank(
+        (ConstantVelocity(velocity), CoordinatedTurn(turn, rate), ConstantAcceleration(jerk)),
+        np.array(VECTORS["rates"]),
+    )
+    own = [[], [VECTORS["turn"]], [VECTORS["acceleration"]] * 3]
+    states = [np.array([*VECTORS["mean"], *(m for m, _ in more)])[:, None] for more in own]
+    covariances = [np.diag([*VECTORS["spread"], *(v for _, v in more)])[:, :, None] for more in own]
+    weights = np.array(VECTORS["probabilities"])[:, None]
+    one, last_s = np.zeros(1, dtype=np.int64), 0.0
+    for (time_s, *values, sensor), known in zip(VECTORS["looks"], VECTORS["after"], strict=True):
+        kind = Kind(values[-1] is not None)
+        place = Place(np.array(sensor, dtype=float)[:, None], np.eye(3)[:, :, None])
+        measured = np.array([v for v in values if v is not None])[:, None]
+        variance = np.array(VECTORS["variances"][: kind.size])[:, None]
+        before = bank.predict(states, covariances, weights, np.array([time_s - last_s]))
+        last_s = time_s
+        pairs = bank.measure(bank.moments(kind, *before[:2], place), one, measured, variance)
+        states, covariances, weights = bank.update(*before, one, pairs, one)
+        np.testing.assert_allclose(weights[:, 0], known["probabilities"], rtol=1e-9)
+        for m in range(3):
+            np.testing.assert_allclose(states[m][:, 0], known["states"][m], rtol=1e-9)
+            assert apart(covariances[m][:, :, 0], np.array(known["covariances"][m])) < 1e-9
+        mean, spread = modes.combined(states, covariances, weights)
+        np.testing.assert_allclose(mean[:, 0], known["state"], rtol=1e-9)
+        assert apart(spread[:, :, 0], np.array(known["covariance"])) < 1e-9
+
+
+def test_the_frozen_looks_ask_every_model():
+    """Otherwise agreement would say little: each is the likeliest, or nearly, at some look."""
+    odds = np.array([known["probabilities"] for known in VECTORS["after"]])
+    assert (odds.max(axis=0) > 0.5).all() and (odds.min(axis=0) < 0.2).all()

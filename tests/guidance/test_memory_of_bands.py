@@ -1,0 +1,185 @@
+"""Bands and resolutions over time: by hand on made-up lines, and as the reference recorded them."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from components.alert_configuration.conf_file import default_values, read_conf
+from components.alerting.alert_table import without_memory
+from components.alerting.bands_over_time import TABLE_UNITS
+from components.alerting.encounter import read_encounter
+from components.alerting.levels import AlertPairs, alert_levels
+from components.guidance.band_memory import BandMemory
+from components.guidance.bands import guidance_of_many
+from components.guidance.intervals import Band
+from components.guidance.recovery import Recovery
+from components.guidance.regions import GuidedIntruders
+from components.guidance.remembered import GuidanceMemory
+from components.guidance.resolution import Resolution
+from components.guidance.resolution_memory import ResolutionMemory
+from components.guidance.situation import State
+from tests.alerting.reference_data import reference_file
+
+VALUES = {
+    **default_values()[0], "hysteresis_time": 5.0, "persistence_time": 3.0, "alerting_m": 2,
+    "alerting_n": 3, "bands_persistence": False, "persistence_preferred_vs": 2.0,
+    "corrective_region": "MID",
+}  # fmt: skip
+FREE = [Band(-10.0, 10.0, "NONE")]
+OUT = Recovery(4.0, (900.0, 100.0), 2)
+
+
+def red(low, high, region="MID"):
+    return [Band(-10.0, low, "NONE"), Band(low, high, region), Band(high, 10.0, "NONE")]
+
+
+def shown(memory, *lines, own=0.0, start=0.0, recovery=None):
+    return [
+        memory.step(start + number, line, own, recovery) for number, line in enumerate(lines)
+    ]  # fmt: skip
+
+
+def test_two_of_three_lines_make_a_band():
+    """The first line counts at once; later ones when they are the second of the last three."""
+    memory = BandMemory(VALUES, cyclic=False)
+    found = shown(memory, FREE, red(2, 5), red(2, 5), FREE, FREE)
+    assert found == [FREE, FREE, red(2, 5), red(2, 5), FREE]
+    assert shown(BandMemory(VALUES, cyclic=False), red(2, 5), FREE)[0] == red(2, 5)
+
+
+def test_overlapping_lines_count_place_by_place():
+    memory = BandMemory(VALUES, cyclic=False)
+    found = shown(memory, FREE, red(1, 5), red(3, 7, "NEAR"))
+    assert found[-1] == red(3, 5)  # MID and NEAR there: the second largest is MID
+
+
+def test_a_pause_forgets_the_lines():
+    memory = BandMemory(VALUES, cyclic=False)
+    assert memory.step(0.0, red(2, 5), 0.0, None) == red(2, 5)
+    assert memory.step(5.1, FREE, 0.0, None) == FREE
+    assert memory.step(5.1, red(2, 5), 0.0, None) == red(2, 5)  # time stands still
+
+
+def test_what_is_remembered_as_recovery_is_free_when_none_is_needed():
+    memory = BandMemory({**VALUES, "alerting_m": 1}, cyclic=False)
+    way = [Band(-10.0, 4.0, "NEAR"), Band(4.0, 10.0, "RECOVERY")]
+    assert memory.step(0.0, way, 0.0, OUT) == way
+    assert memory.step(1.0, red(-10, 4, "NEAR")[1:], 0.0, None)[-1] == Band(4.0, 10.0, "NONE")
+
+
+def test_a_band_around_the_own_value_persists():
+    """For 3 s after it rose; the band that is not around the own value goes at once."""
+    values = {**VALUES, "alerting_m": 0, "bands_persistence": True}
+    memory = BandMemory(values, cyclic=False)
+    found = shown(memory, red(-2, 5), FREE, FREE, FREE)
+    assert found == [red(-2, 5)] * 3 + [FREE]
+    assert shown(BandMemory(values, cyclic=False), red(2, 5), FREE)[1] == FREE
+
+
+def test_a_band_of_directions_persists_across_north():
+    values = {**VALUES, "alerting_m": 0, "bands_persistence": True}
+    turn = 2 * math.pi
+    line = [Band(0.0, 0.5, "MID"), Band(0.5, 6.0, "NONE"), Band(6.0, turn, "MID")]
+    found = shown(BandMemory(values, cyclic=True), line, [Band(0.0, turn, "NONE")], own=6.2)
+    assert found == [line, line]
+
+
+def test_a_way_out_is_kept_while_it_is_near_or_young():
+    memory = ResolutionMemory(VALUES, "vs")
+
+    def step(now_s, low, high, line=None):
+        found = Resolution(low, high, high <= -low)
+        return memory.step(now_s, found, line or red(low, high), 0.0, None)
+
+    assert step(0.0, -4.0, 6.0)[:2] == (-4.0, 6.0)
+    assert step(1.0, -2.0, 5.0)[:2] == (-4.0, 6.0)  # nearer ways, but the old ones are young
+    assert step(2.0, -5.0, 5.0)[:2] == (-5.0, 6.0)  # the old way down has become red
+    assert step(3.5, -3.5, 3.0)[:2] == (-5.0, 3.0)  # the way up is old, and 3 away
+    assert step(6.0, -3.5, 3.0)[:2] == (-5.0, 3.0)  # old too, but within 2
+
+
+def test_the_preferred_side_changes_late():
+    memory = ResolutionMemory({**VALUES, "persistence_preferred_vs": 0.5}, "vs")
+    sides = []
+    for now_s, low, high in [(0, -4, 3), (2, -2, 3), (4, -2, 3)]:
+        found = Resolution(float(low), float(high), high <= -low)
+        sides.append(memory.step(float(now_s), found, red(low, high), 0.0, None).prefers_high)
+    assert sides == [True, True, False]
+
+
+@pytest.fixture(scope="module")
+def flown():
+    configuration = read_conf(reference_file("alerting/do365b.conf"))
+    path = reference_file("nrc_intercepts/NRC_Intercept3.daa")
+    return configuration, read_encounter(path, configuration)
+
+
+def remembered(flown, rows):
+    """What is shown by (time, kind), of a run over some rows from an empty memory."""
+    configuration, encounter = flown
+    relative = [part[rows] for part in encounter.relative]
+    times, present = encounter.time_s[rows], encounter.present[rows]
+    alerts = alert_levels(configuration, times, present, AlertPairs(relative))
+    zero = np.zeros(len(rows))
+    own = State(zero, zero, *encounter.own_state[:, rows])
+    other = State(*(mine - part[:, 0] for mine, part in zip(own, relative, strict=True)))
+    intruder = GuidedIntruders(
+        other, configuration.alerters[0], alerts.early_level[:, 0], present[:, 0]
+    )
+    found = {}
+    for kind in TABLE_UNITS:
+        memory = GuidanceMemory(configuration, kind)
+        guided = guidance_of_many(kind, configuration, own, [intruder])
+        for now_s, one in zip(times.tolist(), guided, strict=True):
+            found[round(now_s, 3), kind] = memory.step(now_s, one)
+    return found
+
+
+def table(name):
+    with reference_file(f"alerting/{name}.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "lists", "ways", "count"),
+    [
+        ("_rows290-359", range(290, 360), 0, 5, 280),
+        ("_rows1375-1434", range(1375, 1435), 0, 0, 240),
+        # One list, where nothing avoids a collision; the resolutions' memory is not all known.
+        ("_hysteresis", range(1484), 1, 50, 240),
+    ],
+)
+def test_remembered_bands_and_resolutions(flown, name, rows, lists, ways, count):
+    found = remembered(flown, np.array(rows))
+    wanted = {}
+    for line in table(f"NRC_Intercept3{name}_bands"):
+        key = round(float(line["time_s"]), 3), line["kind"]
+        wanted.setdefault(key, []).append((line["region"], float(line["low"]), float(line["up"])))
+    assert len(wanted) == count
+    other_lists = other_ways = 0
+    for key, lines in wanted.items():
+        unit = TABLE_UNITS[key[1]]
+        got = [(b.region, b.low / unit, b.high / unit) for b in found[key].bands]
+        alike = [g[0] for g in got] == [w[0] for w in lines] and np.allclose(
+            [g[1:] for g in got], [w[1:] for w in lines], rtol=0, atol=1e-8
+        )
+        other_lists += not alike
+    for line in table(f"NRC_Intercept3{name}_info"):
+        key = round(float(line["time_s"]), 3), line["kind"]
+        way, unit = found[key].resolution, TABLE_UNITS[line["kind"]]
+        if not line["resolution_low"]:
+            other_ways += way is not None
+            continue
+        want = [float(line[f"resolution_{side}"]) for side in ("low", "up")]
+        got = [way.low / unit, way.high / unit] if way else [math.nan, math.nan]
+        same_side = way is not None and str(way.prefers_high).lower() == line["preferred_up"]
+        other_ways += not (same_side and np.allclose(got, want, rtol=0, atol=1e-8))
+    assert (other_lists, other_ways) == (lists, ways)
+
+
+def test_without_hysteresis_nothing_is_remembered(flown):
+    values = without_memory(read_conf(reference_file("alerting/do365b.conf")))
+    memory = BandMemory(values, cyclic=False)
+    assert shown(memory, red(-2, 5), FREE, own=0.0) == [red(-2, 5), FREE]
