@@ -64,7 +64,8 @@ class FilterBank:
     sigma : SigmaPoints, optional
         Take moments from sigma points; otherwise by linearisation.
     fresh : (models,) of float
-        Variance of what each has besides position and velocity, in a target that enters it.
+        Variance of what each has besides position and velocity, in a target that enters it; empty
+        where that is what the model's own filter thinks.
     """
 
     models: tuple[Motion, ...]
