@@ -116,6 +116,8 @@ class Recorder:
 
     def advance(self, tick: int) -> None:
         """Hand on every row before `tick`; no more of them will come."""
+        if tick <= 0:
+            return
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
