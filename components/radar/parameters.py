@@ -101,6 +101,13 @@ class LinkBudgetParameters(SignalErrorParameters, RadarParameters, TimeBudgetPar
         check_signal_errors(self)
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to false alarms that there are not."""
+        said = super().without_effect()
+        if not self.false_alarms:
+            said += self.idle("cell_false_alarm_probability", because="false_alarms is false")
+        return said
+
     @property
     def pulses_summed(self) -> int:
         """Pulses of a look that are summed non-coherently."""

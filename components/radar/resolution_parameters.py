@@ -5,6 +5,14 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from components.sensor.parameters import SensorParameters
+from dsa_des.errors import Disagreements
+
+#: Keys of a cell's size: the beamwidth, which comes before the grid step.
+CELL_SIZES = (
+    ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
+    ("elevation_beamwidth_deg", "elevation_resolution_deg"),
+    ("", "range_resolution_m"),
+)
 
 
 class ResolutionParameters(SensorParameters):
@@ -28,14 +36,9 @@ class ResolutionParameters(SensorParameters):
 
     @model_validator(mode="after")
     def _cells_have_a_size(self) -> Self:
-        for beam, step in (
-            ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
-            ("elevation_beamwidth_deg", "elevation_resolution_deg"),
-            ("", "range_resolution_m"),
-        ):
-            if self.resolution_cells and not (getattr(self, beam, None) or getattr(self, step)):
-                raise ValueError(
-                    f"{step} is 0 and resolution_cells is true: a cell has a size, it must be "
-                    "above 0"
-                )
+        Disagreements.refuse(
+            f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
+            for beam, step in CELL_SIZES
+            if self.resolution_cells and not (getattr(self, beam, None) or getattr(self, step))
+        )
         return self
