@@ -15,24 +15,30 @@ from dsa_des.block.component import Component, NonNegativeRational
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
-_KINDS = {"turn": "hdir", "climb": "alt"}
-# Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min.
+_KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
+# Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
+# 2 m/s² and a quarter of gravity.
 _TURN_RATE_RAD_S = math.radians(3.0)
 _VERTICAL_RATE_MPS = 500.0 * 0.3048 / 60.0
+_ACCELERATION_MPS2, _VERTICAL_ACCELERATION_MPS2 = 2.0, 0.25 * 9.80665
 
 
 class TurnOutParameters(ConfParameters):
     """Parameters of turning out of a band."""
 
     level: int = Field(default=2, ge=1, description="Turn when an alert is of this level or above.")
-    manoeuvre: Literal["turn", "climb"] = Field(
-        default="turn", description="Whether to change direction, or altitude."
+    manoeuvre: Literal["turn", "climb", "speed", "vertical_speed"] = Field(
+        default="turn",
+        description="Whether to change direction, altitude, ground speed or vertical speed.",
     )
     beyond_deg: float = Field(
         default=0.0, ge=0, le=90, description="Turn so much beyond the edge of the band, deg."
     )
     beyond_m: float = Field(
         default=0.0, ge=0, le=3000, description="Climb or descend so much beyond its edge, m."
+    )
+    beyond_mps: float = Field(
+        default=0.0, ge=0, le=50, description="Change speeds so much beyond their edge, m/s."
     )
     pause_s: NonNegativeRational = Field(
         default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
@@ -42,22 +48,25 @@ class TurnOutParameters(ConfParameters):
 class TurnOut(Component):
     """Steers the ownship by the smallest change that leads clear, when an alert is due.
 
-    The change is one of direction or of altitude. The bands are those of DAIDALUS, each instant by
-    itself, over all targets whose flights the alerting knows. Where no value is clear it goes
-    towards the recovery band; without one it leaves the ownship alone.
+    The change is one of direction, altitude, ground speed or vertical speed. The bands are those of
+    DAIDALUS, each instant by itself, over all targets whose flights the alerting knows. Where no
+    value is clear it goes towards the recovery band; without one it leaves the ownship alone.
     """
 
     inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
-    outputs = {"manoeuvres": Output(Manoeuvres, "Turns or climbs that the ownship is told to fly.")}
+    outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
     Parameters = TurnOutParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
-        self._free_from = 0
+        #: By replica, from when on it may turn again.
+        self._free_from: dict[int, int] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look at every instant with an alert."""
@@ -65,16 +74,17 @@ class TurnOut(Component):
         if alerts is None:
             return None
         ticks, told = [], []
-        for place, tick in enumerate(wake.ticks.tolist()):
-            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-            highest = int(np.max(alerts.level[entries], initial=0))
-            if highest < self.p.level or tick < self._free_from:
+        replica = wake.replica
+        for place in np.flatnonzero(alerts.highest() >= self.p.level).tolist():
+            tick, run = int(wake.ticks[place]), int(replica[place])
+            if tick < self._free_from.get(run, 0):
                 continue
+            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
             manoeuvre = self._manoeuvre(alerts, place, entries)
             if manoeuvre is not None:
                 ticks.append(tick)
                 told.append(manoeuvre)
-                self._free_from = tick + self._pause_ticks
+                self._free_from[run] = tick + self._pause_ticks
         return Manoeuvres.of(ticks, told) if ticks else None
 
     def _manoeuvre(self, alerts: AlertLevels, place: int, entries: slice) -> Manoeuvre | None:
@@ -82,8 +92,9 @@ class TurnOut(Component):
         conf = self._configuration
         kind = _KINDS[self.p.manoeuvre]
         changes = changes_out(
-            kind, conf, self._alerter, alerts.own_motion, alerts.relative, place, entries
-        )
+            kind, conf, self._alerter, alerts.own_motion, alerts.relative, place, entries,
+            alerts.deviations,
+        )  # fmt: skip
         change = None if changes is None else smaller(changes)
         if change is None:
             return None
@@ -91,6 +102,13 @@ class TurnOut(Component):
             beyond_m = math.copysign(self.p.beyond_m, change)
             rate_mps = conf["vertical_rate"] or _VERTICAL_RATE_MPS
             return Manoeuvre(climb_m=change + beyond_m, climb_rate_mps=rate_mps)
+        if self.p.manoeuvre in ("speed", "vertical_speed"):
+            beyond = change + math.copysign(self.p.beyond_mps, change)
+            if self.p.manoeuvre == "speed":
+                acceleration = conf["horizontal_accel"] or _ACCELERATION_MPS2
+                return Manoeuvre(speed_mps=beyond, acceleration_mps2=acceleration)
+            acceleration = conf["vertical_accel"] or _VERTICAL_ACCELERATION_MPS2
+            return Manoeuvre(vertical_speed_mps=beyond, vertical_acceleration_mps2=acceleration)
         away = min(abs(change) + math.radians(self.p.beyond_deg), math.pi)
         rate_rad_s = conf["turn_rate"] or _TURN_RATE_RAD_S
         return Manoeuvre(turn_rad=math.copysign(away, change), rate_rad_s=rate_rad_s)

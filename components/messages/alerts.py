@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from components.aircraft.aircraft import Roster
 from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -32,6 +34,12 @@ class AlertLevels(Message):
         met within the lookahead.
     time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
         The projected closest approach, in straight flight.
+    numbers : dict of (entries,)
+        ``track``: the tracker's own number, where tracks with states are believed. Their `target`
+        is the one they are nearest to, for whoever evaluates; -1 for none.
+    deviations : dict of (entries,)
+        Standard deviations of the state, where they are known: ``position_m``, ``height_m``,
+        ``velocity_mps``, ``climb_mps``.
     relative : dict of (entries,)
         What the levels rest on, ownship less target: ``east_m``, ``north_m``, ``up_m`` and
         ``east_mps``, ``north_mps``, ``climb_mps``.
@@ -50,6 +58,14 @@ class AlertLevels(Message):
     time_to_closest_s: FloatArray = per_entry(column="float64")
     closest_horizontal_m: FloatArray = per_entry(column="float64")
     closest_vertical_m: FloatArray = per_entry(column="float64")
+    numbers: dict[str, IntArray] = per_entry(columns={"track": "int64"})
+    deviations: dict[str, FloatArray] = per_entry()
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
+
+    def highest(self) -> IntArray:
+        """Return the highest level of each row, 0 where there is no target, (rows,)."""
+        found = np.zeros(len(self), dtype=np.int64)
+        np.maximum.at(found, np.repeat(np.arange(len(self)), np.diff(self.offsets)), self.level)
+        return found

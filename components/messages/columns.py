@@ -198,7 +198,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "pixels": ("pixels", "", "pixels that the target covers in a camera"),
     },
     "alerts": {
-        "target": ("", "", "name of the target"),
+        "target": ("", "", "name of the target; of a track, the nearest one, null if far from all"),
+        "track": ("", "", "the tracker's number; null where tracks have none"),
         "level": ("", "", "alert level, 0 without an alert"),
         **{
             f"time_to_level_{level}_s": (
@@ -218,6 +219,10 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "rate_rad_s": ("rad/s", "", "rate of that turn"),
         "climb_m": ("m", "", "commanded change of altitude, positive upward"),
         "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
+        "speed_mps": ("m/s", "", "commanded change of ground speed"),
+        "acceleration_mps2": ("m/s²", "", "acceleration of that change"),
+        "vertical_speed_mps": ("m/s", "", "commanded change of vertical speed, positive upward"),
+        "vertical_acceleration_mps2": ("m/s²", "", "acceleration of that change"),
     },
     "decisions": {
         "decision": (

@@ -18,7 +18,7 @@ from dsa_des.arrays.types import AnyArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, Group, Metric, Result
 
-_TOLD = ("turn_rad", "rate_rad_s", "climb_m", "climb_rate_mps")
+_TOLD = Manoeuvre._fields
 
 
 class RiskParameters(SizeParameters):

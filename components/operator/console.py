@@ -24,7 +24,7 @@ class ConsoleParameters(ClockedParameters):
     """Parameters of a console."""
 
     scan_rate_hz: PositiveRational = Field(
-        default=Fraction(20), description="How often decisions are taken in, 1/s."
+        default=Fraction(50), description="How often decisions are taken in, 1/s."
     )
     turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
     vertical_rate_mps: float = Field(

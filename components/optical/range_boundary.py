@@ -34,6 +34,7 @@ class OpticalRangeBoundary(Sensor):
     mark = EO
     Parameters = CameraBoundaryParameters
     lockstep = True
+    side_by_side = True
     ladders = (VISIBLE,)
 
     def look(self, cells: Cells) -> Look:

@@ -104,6 +104,7 @@ class RangeBoundary(Radar):
 
     Parameters = RangeBoundaryParameters
     lockstep = True
+    side_by_side = True
     hooks = {
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",

@@ -70,6 +70,7 @@ class InteractingModels(Tracker):
 
     Parameters = InteractingParameters
     lockstep = True
+    side_by_side = True
 
     def bank(self) -> FilterBank:
         """Return a filter for each model."""

@@ -190,11 +190,10 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/operator/stochastic.py", "wiring/test_operator.py",
-        ("coordinates-every-time", "if self._has_acted:\n", "if False:\n"),
-        ("never-waits", "tick >= self._free_from", "tick >= 0"),
+        ("coordinates-every-time", "if mind.has_acted:\n", "if False:\n"),
+        ("never-waits", "tick >= mind.free_from", "tick >= 0"),
         ("has-acted-for-good",
-         "self._since, self._acts_at, self._has_acted = None, None, False",
-         "self._since, self._acts_at = None, None"),
+         "since=None, acts_at=None, has_acted=False", "since=None, acts_at=None"),
     ),
     *in_file(
         _GROUP, "components/fusion/carried.py", _CARRIED,
