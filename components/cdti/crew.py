@@ -159,8 +159,10 @@ class SessionCrew:
         why = ""
         if self._console is None:
             why = "nobody decides in this scene"
-        elif name is None:
+        elif name is None or self.scope is None:
             why = "there is no such target"
+        elif isinstance(message, Climbed) and self.scope.alt_m + message.value < 0.0:
+            why = "that leads below the ground"
         elif not self._lay(message, name):
             why = "the run is over, or too much was decided at once"
         if why:

@@ -55,6 +55,7 @@ class LivePacer(Pacer):
 
     def __call__(self, time_s: float) -> None:
         """Wait for the instant up to which the simulation has come, and while the run is held."""
+        self.time_s = time_s
         due = self._started + time_s / self.factor
         while not self.stopped and (ahead_s := due - self.now()) > 0.0:
             self._changed.wait(min(ahead_s, _LOOK_AGAIN_S))

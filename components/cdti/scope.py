@@ -128,6 +128,11 @@ class Scope:
 
     # -- any thread ------------------------------------------------------------------------------
 
+    @property
+    def alt_m(self) -> float:
+        """The ownship's altitude; infinite before it is known."""
+        return math.inf if self._own.now is None else self._own.now.alt_m
+
     def name_of(self, target: int) -> str | None:
         """Return a target's name as the scene has it; empty for none, None if there is none."""
         if target < 0:

@@ -16,8 +16,9 @@ from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
-#: What the ownship may be told at once.
+#: What the ownship may be told at once, and below what there is nothing to fly.
 MOST_TURN_RAD, MOST_CLIMB_M = math.pi, 3000.0
+_LEAST_TURN_RAD, _LEAST_CLIMB_M = 1e-4, 0.01
 
 
 class ConsoleParameters(ClockedParameters):
@@ -111,7 +112,7 @@ class Console(Component):
             np.array([d.wall_time_s for _, d, _ in made]),
             self._targets,
         )
-        told = [(tick, self._told(d)) for tick, d, _ in made if d.kind in (TURN, CLIMB)]
+        told = [(tick, self._told(d)) for tick, d, _ in made if _is_flown(d)]
         if not told:
             return {"decisions": decisions}
         manoeuvres = Manoeuvres.of([tick for tick, _ in told], [one for _, one in told])
@@ -122,3 +123,9 @@ class Console(Component):
             rate_rad_s = math.radians(self.p.turn_rate_deg_s)
             return Manoeuvre(turn_rad=decision.turn_rad, rate_rad_s=rate_rad_s)
         return Manoeuvre(climb_m=decision.climb_m, climb_rate_mps=self.p.vertical_rate_mps)
+
+
+def _is_flown(decision: Decision) -> bool:
+    if decision.kind == TURN:
+        return abs(decision.turn_rad) >= _LEAST_TURN_RAD
+    return decision.kind == CLIMB and abs(decision.climb_m) >= _LEAST_CLIMB_M

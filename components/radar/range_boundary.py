@@ -19,6 +19,7 @@ from components.radar.range_effects import BlindRange
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_budget import unambiguous_range_m
+from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 
@@ -95,6 +96,7 @@ class RangeBoundary(Radar):
     """
 
     Parameters = RangeBoundaryParameters
+    inputs = CUED_INPUTS
     lockstep = True
     side_by_side = True
     hooks = {
@@ -121,6 +123,7 @@ class RangeBoundary(Radar):
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""
         super().setup()
+        refuse_cues(self)
         (self._clutter_rcs_m2,) = self.built("clutter") or [None]
         (self._cfar,) = self.built("threshold from reference cells") or [None]
 

@@ -61,8 +61,8 @@ def updated_by_one(
             "contributors": part.contributors[which] | mask,
             "updated_by": mask,
             "ranged": part.ranged[which] | ranged,
-            "nis": innovation_squared(one.said, part.weights[:, which], mine),
-            "freedom": size,
+            "nis": part.nis[which] + innovation_squared(one.said, part.weights[:, which], mine),
+            "freedom": part.freedom[which] + size,
         }
         part = put(part, which, new)
     return part, hit, gain

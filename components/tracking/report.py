@@ -105,6 +105,7 @@ def state_tracks(
     tick, score = store.plain("tick"), store.plain("score")
     begin = (wake.replica * wake.span_ticks)[row]
     per_s = wake.ticks_per_s
+    freedom = store.plain("freedom")
     return StateTracks(
         tick=ticks,
         offsets=offsets_of(np.searchsorted(rows, row), len(ticks)),
@@ -130,8 +131,8 @@ def state_tracks(
         covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
         extras={} if models == 1 else store.extras(models, known),
         sensors=sensors,
-        nis=store.plain("nis"),
-        nis_freedom=store.plain("freedom"),
+        nis=np.where(freedom > 0, store.plain("nis"), np.nan),
+        nis_freedom=freedom,
         **{name: known(state[i]) for i, name in enumerate(_COMPONENTS)},
     )  # fmt: skip
 

@@ -82,7 +82,11 @@ def _predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackSt
     states, covariances, weights = rules.bank.predict(
         part.states(), part.covariances(), part.weights, dt_s
     )
-    return part.with_columns(tick=tick, weights=weights, **named(states, covariances))
+    again = dt_s == 0.0  # innovations of one instant add up
+    return part.with_columns(
+        tick=tick, weights=weights, nis=part.nis * again, freedom=part.freedom * again,
+        **named(states, covariances),
+    )  # fmt: skip
 
 
 def looked_at(
@@ -125,7 +129,6 @@ def looked_at(
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),
-        nis=np.where(hit, changed.nis, np.nan), freedom=np.where(hit, changed.freedom, 0),
     )  # fmt: skip
     spread = position_variance(changed)
     ended = changed.ranged & (spread > rules.delete_above_m**2)

@@ -58,8 +58,9 @@ class Pacer:
     windows: int = 0
     max_lag_s: float = 0.0
     total_lag_s: float = 0.0
-    #: Whether the run is to end at the instant up to which it has come.
+    #: Whether the run is to end at the instant up to which it has come, and that instant, s.
     stopped: bool = False
+    time_s: float = 0.0
 
     def __post_init__(self) -> None:
         self._started = self.now()
@@ -75,6 +76,7 @@ class Pacer:
 
     def __call__(self, time_s: float) -> None:
         """Wait for the instant up to which the simulation has come."""
+        self.time_s = time_s
         due = self._started + time_s / self.factor
         while (ahead_s := due - self.now()) > 0.0:
             self.sleep(min(ahead_s, LONGEST_SLEEP_S))

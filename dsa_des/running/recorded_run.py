@@ -126,6 +126,8 @@ def record_run(
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
+        if pacer is not None and pacer.stopped:
+            info["duration_s"], info["stopped"] = pacer.time_s, True
         if warnings:
             info["warnings"] = warnings
         if notes:

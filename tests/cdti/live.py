@@ -33,6 +33,9 @@ class Session:
 
     def __init__(self, monkeypatch, out, **options):
         self.out, self.said, self.error = out, [], None
+        self._pacers = []
+        made = session_module.LivePacer
+        monkeypatch.setattr(session_module, "LivePacer", lambda *a: self._noted(made(*a)))
         for module in (session_module, crew_module):
             monkeypatch.setattr(module, "say", lambda text="", err=False: self.said.append(text))
         given = {
@@ -52,6 +55,14 @@ class Session:
         except BaseException as error:
             self.error = error
             self.said.append(f"http://failed/?token={error}")
+
+    def _noted(self, pacer):
+        self._pacers.append(pacer)
+        return pacer
+
+    def stop(self):
+        """End it as ctrl-C does."""
+        self._pacers[0].stop()
 
     def _address(self, number):
         found = re.findall(r"http\S+", " ".join(self.said))

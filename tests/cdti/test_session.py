@@ -94,6 +94,8 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
         verified = hear(socket, "taken")
         say(socket, **{**TURN, "target": 5}, id=ident(3))
         assert hear(socket, "refused")["why"] == "there is no such target"
+        say(socket, **{**TURN, "decision": "climb", "value": -2000}, id=ident(5))
+        assert hear(socket, "refused")["why"] == "that leads below the ground"
         say(socket, **TURN, id=ident(4))
         taken = hear(socket, "taken")
         assert hear(other, "taken")["id"] == ident(2)  # who watches sees what is decided

@@ -95,8 +95,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py", _IN_CELL,
-        ("ground-taken-for-the-target", "if cnr is not None:\n            pfa = np.empty",
-         "if False:\n            pfa = np.empty"),
+        ("ground-taken-for-the-target",
+         "if cnr is not None or self._cued_detector(cells) is not None:", "if False:"),
     ),
     *in_file(
         _GROUP, "components/radar/fading.py",

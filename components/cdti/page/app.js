@@ -9,7 +9,7 @@ const App = (() => {
   const state = { role: "", frame: null, dirty: false, chosen: -1, order: [], over: false,
     ended: "", began: false, lost: false };
   const levels = new Map(), rejected = new Map(), said = [];
-  const shown = new Set();
+  const shown = new Map();  // by target: until when alerts on it have been told of, s
   let drawn = {};
   const frames = { count: 0, spent_ms: 0 };
   const trips = [];
@@ -51,9 +51,8 @@ const App = (() => {
       if (one.level > (rejected.get(one.target) || 0)) rejected.delete(one.target);
       if (one.level > before && !rejected.has(one.target)) Sound.alert(one.level);
       levels.set(one.target, one.level);
-      const number = `${one.target}@${one.since}`;
-      if (!shown.has(number)) {
-        shown.add(number);
+      if (!(shown.get(one.target) >= one.since)) {
+        shown.set(one.target, frame.t);
         if (may()) Link.decide({ decision: "shown", target: one.target });
       }
     }
@@ -125,7 +124,10 @@ const App = (() => {
     get("title").textContent = content.title;
     document.title = `${content.title}: traffic display`;
     get("log").replaceChildren();
-    content.log.forEach((one) => Panel.decided(one, scene));
+    for (const one of content.log) {
+      Panel.decided(one, scene);
+      if (one.decision === "shown") shown.set(one.target, one.time);
+    }
     get("start").hidden = content.began || content.role !== "operator";
     if (!get("start").hidden) get("ready").focus();
     Scope.fit(content.sensors);
