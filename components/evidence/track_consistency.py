@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -256,7 +257,7 @@ def _tracks(scenes: list[Any]) -> list[Any]:
     table = sink.tables()["state_tracks"].combine_chunks()
     replica = table["replica"].to_numpy()
     cuts = np.searchsorted(replica, np.arange(len(scenes) + 1))
-    return [table.slice(a, b - a) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+    return [table.slice(a, b - a) for a, b in pairwise(cuts.tolist())]
 
 
 def nees_of(case: Case, replicas: int) -> FloatArray:
