@@ -26,6 +26,11 @@ class KnownTraffic:
         self._envelope = envelope
         self._asked = False
 
+    @property
+    def asked(self) -> bool:
+        """Whether a block went by where the targets can be."""
+        return self._asked
+
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
         """Return the run's envelope for a reach, or None."""
         self._asked = True

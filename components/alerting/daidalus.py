@@ -8,9 +8,14 @@ from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
+from components.alert_configuration.margins import Deviations, margins
 from components.alerting.alert_table import without_memory
+from components.alerting.believed_flights import BelievedFlights
+from components.alerting.followed_tracks import FollowedTracks
+from components.alerting.lasting_memory import LastingMemory
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import AlertMemory
+from components.alerting.own_poses import OwnPoses
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
@@ -18,6 +23,7 @@ from components.geometry.daidalus_sphere import east_north_m
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels
 from components.messages.fused import WITHOUT_POSE, FusedDetections
+from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -28,8 +34,7 @@ from dsa_des.block.wake import Arrivals, Wake
 
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _OWN_MOTION = ("alt_m", "east_mps", "north_mps", "climb_mps")
-# Poses of the ownship that are remembered beyond the last scan: for sights that come late.
-_KEPT_POSES = 10_000
+_SOURCES = ("tracks", "fused", "estimates")
 
 
 class DaidalusParameters(ClockedParameters):
@@ -60,19 +65,23 @@ class DaidalusAlerting(Component):
     """Alert levels of all targets by the rules of DAIDALUS (RTCA DO-365), at scans of its own.
 
     It believes tracks if it gets them, else fused lines of sight, else the truth: where the
-    aircraft are. A target's flight is a straight line through its positions of the last seconds,
-    in the ownship's east, north and up; positions at two instants are needed. What has no range is
-    left out.
+    aircraft are. Tracks with states (`StateTracks`) are carried on straight from their last
+    estimate; their covariances count for levels that heed uncertainty. Otherwise a target's flight
+    is a straight line through its positions of the last seconds, in the ownship's east, north and
+    up; positions at two instants are needed. What has no range is left out.
     """
 
     inputs = {
         "states": Input(TrafficStates, "queued", "Where all aircraft are: the ownship at least."),
         "tracks": Input(Tracks, "queued", "What is held of every target.", required=False),
         "fused": Input(FusedDetections, "queued", "Fused lines of sight.", required=False),
+        "estimates": Input(StateTracks, "queued", "Tracks with states.", required=False),
     }
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
 
     def request(self, port: str) -> Any:
         """Ask for no poses beside what is fused: the ownship's own come with the states."""
@@ -89,44 +98,51 @@ class DaidalusAlerting(Component):
                 f"the number of alerters of {self.p.conf}"
             )
         ports = {producer.port for producer in self.context.producers}
-        if {"tracks", "fused"} <= ports:
-            raise ValueError("both tracks and fused are wired: alerting believes one of them")
-        self._source = next((port for port in ("tracks", "fused") if port in ports), "")
+        wired = [port for port in _SOURCES if port in ports]
+        if len(wired) > 1:
+            raise ValueError(
+                f"both {wired[0]} and {wired[1]} are wired: alerting believes one of them"
+            )
+        self._source = wired[0] if wired else ""
         self._configuration: Configuration = configuration
+        self._alerter = configuration.alerters[self.p.alerter - 1]
         self._roster: Any = None
-        self._own_came: IntArray = np.empty(0, dtype=np.int64)
-        self._own_tick: IntArray = np.empty(0, dtype=np.int64)
-        self._own_place: FloatArray = np.empty((0, 3))
-        self._attitude: FloatArray = np.empty((0, 3))
+        self._own = OwnPoses(self.context.ticks_per_s)
+        self._followed = FollowedTracks(self._configuration["hysteresis_time"])
+
+    def serves_replicas(self) -> bool:
+        """Say no where tracks are followed by their numbers, which belong to a run."""
+        return super().serves_replicas() and self._source != "estimates"
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
         for arrived in wake.arrivals("states"):
-            self._take_states(arrived)
+            self._take_states(arrived, wake)
         if self._roster is None:
             return None
         if self._source:
             for arrived in wake.arrivals(self._source):
-                self._take_sights(arrived)
+                if self._source == "estimates":
+                    self._followed.add(arrived.tick, arrived.message)
+                else:
+                    self._take_sights(arrived, wake)
         ticks = wake.ticks[wake.scans >= 0]
-        return self._levels(ticks) if len(ticks) else None
+        # Before the first state of a run has come, it has no levels.
+        ticks = ticks[self._own.have_come(ticks, _begins(ticks, wake))]
+        return self._levels(ticks, wake) if len(ticks) else None
 
-    def _take_states(self, arrived: Arrivals) -> None:
-        """Remember the ownship's attitude, and where the targets are if that is believed."""
+    def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
+        """Remember the ownship's pose, and where the targets are if that is asked for."""
         states: TrafficStates = arrived.message
         if self._roster is None:
             self._roster = states.roster
-            self._fit = StraightFit(self.p.fit_s, len(states.roster))
-            self._memory = AlertMemory(memory_rule(self._configuration), len(states.roster))
-        place = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
-        self._own_came = np.concatenate([self._own_came, arrived.tick])
-        # Of those that overtook each other on the way, the newest counts.
-        ticks = np.concatenate([self._own_tick, states.tick])
-        self._own_tick = np.maximum.accumulate(ticks)
-        self._own_place = np.concatenate([self._own_place, np.stack(place, axis=1)])
-        if self._source:
-            angles = (states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad)
-            self._attitude = np.concatenate([self._attitude, np.stack(angles, axis=1)])
+            count = len(states.roster)
+            self._fit = StraightFit(self.p.fit_s, count)
+            rule = memory_rule(self._configuration)
+            self._memory = LastingMemory(rule, count)
+            self._of_tracks = AlertMemory(rule, 0)
+        self._own.add(arrived.tick, states, wake)
+        if self._source in ("tracks", "fused"):
             return
         own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
         east, north = east_north_m(np.radians(states.lat_deg), np.radians(states.lon_deg), *own)
@@ -134,9 +150,12 @@ class DaidalusAlerting(Component):
         position = np.full((len(states), len(self._roster), 3), np.nan)
         there = np.where(states.present[:, :, np.newaxis], np.stack([east, north, up], -1), np.nan)
         position[:, states.columns] = there
-        self._fit.add(arrived.tick, states.tick / self.context.ticks_per_s, position)
+        if self._source:
+            self._followed.add_truth(arrived.tick, position)
+        else:
+            self._fit.add(arrived.tick, wake.own_ticks(states.tick) / wake.ticks_per_s, position)
 
-    def _take_sights(self, arrived: Arrivals) -> None:
+    def _take_sights(self, arrived: Arrivals, wake: Wake) -> None:
         """Turn what was measured in body axes into positions east, north and up."""
         sights = arrived.message
         row = np.repeat(np.arange(len(sights)), np.diff(sights.offsets))
@@ -144,13 +163,11 @@ class DaidalusAlerting(Component):
         if self._source == "tracks":
             new &= sights.updated  # others came with an earlier row
         # The attitude of when it was measured, of those that have arrived.
-        place = np.minimum(
-            np.searchsorted(self._own_tick, sights.measured_tick, side="right"),
-            np.searchsorted(self._own_came, arrived.tick[row], side="right"),
-        )
-        new &= place > 0
-        row, place = row[new], place[new] - 1
-        yaw, pitch, roll = self._attitude[place].T
+        came = arrived.tick[row]
+        place = self._own.pose_of(sights.measured_tick, came, _begins(came, wake), new)
+        new &= place >= 0
+        row = row[new]
+        yaw, pitch, roll = self._own.attitude_rad(place[new])
         azimuth, elevation = sights.azimuth_rad[new], sights.elevation_rad[new]
         range_m = sights.range_m[new]
         level = range_m * np.cos(elevation)
@@ -160,49 +177,75 @@ class DaidalusAlerting(Component):
         line, came, made = _by_instant(sights.tick, arrived.tick, row, sights.measured_tick[new])
         position = np.full((len(made), len(self._roster), 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
-        self._fit.add(came, made / self.context.ticks_per_s, position)
+        self._fit.add(came, wake.own_ticks(made) / wake.ticks_per_s, position)
 
-    def _levels(self, ticks: IntArray) -> AlertLevels:
+    def _levels(self, ticks: IntArray, wake: Wake) -> AlertLevels:
         """Return the levels at some scans."""
-        times = (ticks / self.context.ticks_per_s).tolist()
-        fitted = [
-            self._fit.states(int(tick), now_s)
-            for tick, now_s in zip(ticks.tolist(), times, strict=True)
-        ]
-        self._fit.forget_before(times[-1])
-        own = self._own_states(ticks)
-        self._forget_poses(int(ticks[-1]))
-        known = np.stack([one for one, _ in fitted])
-        # Positions count from the ownship: its own less theirs is the other way round.
-        relative = [-np.ravel([state[i] for _, state in fitted]) for i in range(6)]
-        lookahead_s = self._configuration["lookahead_time"]
-        pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape))
-        alerter = self._configuration.alerters[self.p.alerter - 1]
-        times_s, *both = levels_without_memory(self._configuration, alerter, pairs)
-        due, early = (part.reshape(*known.shape, len(alerter.levels)) for part in both)
-        level = [
-            self._memory.step(now_s, known[i], due[i], early[i]) for i, now_s in enumerate(times)
-        ]
-        row, target = np.nonzero(known)
+        times = wake.own_ticks(ticks) / wake.ticks_per_s
+        begins = _begins(ticks, wake)
+        estimated = self._source == "estimates"
+        own = self._own.states(ticks, begins, 0.0 if estimated else self.p.fit_s)
+        if estimated:
+            places = self._own.place(ticks)
+            flights = self._followed.flights(ticks, times.tolist(), own, places)
+            self._of_tracks.grow(flights.known.shape[1])
+            self._of_tracks.forget(flights.new)
+            self._own.forget_before(int(ticks[-1]))
+        else:
+            known, state = self._fit.states(begins, ticks, times)
+            # Positions count from the ownship: its own less theirs is the other way round.
+            flights = BelievedFlights(known, tuple(-state))
+            self._forget(ticks, times, wake)
+        known, relative = flights.known, [np.ravel(part) for part in flights.relative]
+        bounds = None
+        if flights.deviations is not None:
+            deviations = Deviations(*(np.ravel(part) for part in flights.deviations))
+            bounds = margins(self._configuration, deviations, np.hypot(*relative[:2]))
+        pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape), bounds)
+        times_s, *both = levels_without_memory(self._configuration, self._alerter, pairs)
+        due, early = (part.reshape(*known.shape, len(self._alerter.levels)) for part in both)
+        level = (
+            self._of_tracks.levels(times, known, due, early)
+            if estimated
+            else self._memory.levels(wake.replica_of(ticks), times, known, due, early)
+        )
+        row, column = np.nonzero(known)
         place = np.flatnonzero(known.ravel())
+        lookahead_s = self._configuration["lookahead_time"]
         found = separation(relative, lookahead_s, np.full(known.size, np.nan))
         times_s = np.where(np.isfinite(times_s), times_s, np.nan)[place]
+        numbered = range(1, len(self._alerter.levels) + 1)
+        told = {} if flights.deviations is None else flights.deviations._asdict()
         return AlertLevels(
             ticks,
             offsets_of(row, len(ticks)),
-            target,
-            np.concatenate(level)[place],
-            {
-                f"time_to_level_{k}_s": times_s[:, k - 1].copy()
-                for k in range(1, len(alerter.levels) + 1)
-            },
+            column if flights.target is None else flights.target[row, column],
+            level[place],
+            {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
             found.time_to_closest_s[place],
             found.miss_horizontal_m[place],
             found.miss_vertical_m[place],
+            {} if flights.number is None else {"track": flights.number[column]},
+            {name: np.ravel(part)[place] for name, part in told.items()},
             {name: part[place] for name, part in zip(_RELATIVE, relative, strict=True)},
             own,
             self._roster,
         )
+
+    def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
+        """Drop what no later scan asks for."""
+        span = round(self.p.fit_s * self.context.ticks_per_s)
+        if wake.side_by_side:
+            # The scans of the next stretch of time come after all of these.
+            self._fit.forget_before(float(times.min()))
+            self._own.set_aside(int(wake.own_ticks(ticks).min()) - span, wake)
+            return
+        last = ticks[-1:]
+        begin = int(_begins(last, wake)[0])  # what was before is of runs that have passed
+        self._fit.forget_ticks_before(begin)
+        self._fit.forget_before(float(times[-1]))
+        self._memory.forget_before(int(wake.replica_of(last)[0]))
+        self._own.forget_before(int(last[0]) - span, begin)
 
     def _own_flights(self, own: Mapping[str, FloatArray], shape: tuple[int, ...]) -> State:
         """Return the ownship's flight beside every target, in its own plane."""
@@ -211,30 +254,10 @@ class DaidalusAlerting(Component):
         alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
         return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
 
-    def _forget_poses(self, tick: int) -> None:
-        """Drop poses of the ownship that neither its velocity nor a late sight asks for."""
-        span = round(self.p.fit_s * self.context.ticks_per_s)
-        old = int(np.searchsorted(self._own_tick, tick - span, side="left"))
-        keep = max(min(old, len(self._own_tick) - _KEPT_POSES), 0)
-        for name in ("_own_came", "_own_tick", "_own_place", "_attitude"):
-            setattr(self, name, getattr(self, name)[keep:])
 
-    def _own_states(self, ticks: IntArray) -> dict[str, FloatArray]:
-        """Return the ownship's altitude and its mean velocity over the last seconds."""
-        per_s = self.context.ticks_per_s
-        span = round(self.p.fit_s * per_s)
-        last = np.maximum(np.searchsorted(self._own_came, ticks, side="right") - 1, 0)
-        first = np.minimum(np.searchsorted(self._own_tick, ticks - span, side="left"), last)
-        now, then = self._own_place[last], self._own_place[first]
-        time_s = (self._own_tick[last] - self._own_tick[first]) / per_s
-        time_s = np.where(time_s > 0.0, time_s, np.nan)
-        east, north = east_north_m(then[:, 0], then[:, 1], now[:, 0], now[:, 1])
-        return {
-            "alt_m": now[:, 2],
-            "east_mps": -east / time_s,
-            "north_mps": -north / time_s,
-            "climb_mps": (now[:, 2] - then[:, 2]) / time_s,
-        }
+def _begins(ticks: IntArray, wake: Wake) -> IntArray:
+    """Return when the runs of some instants begin."""
+    return ticks - wake.own_ticks(ticks) if wake.span_ticks else np.zeros_like(ticks)
 
 
 def _by_instant(

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Configuration
+from components.alert_configuration.margins import Deviations, largest, margins
 from components.alerting.levels import AlertPairs
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
 from components.guidance.situation import State
@@ -240,23 +241,15 @@ def _bounds(
         theirs = [targets[key] for key in keys]
         return np.asarray(find(*mine) + find(*theirs))
 
-    position = configuration["h_pos_z_score"] * both(_largest, "s_ew_std", "s_ns_std", "s_en_std")
-    east, north = relative[0], relative[1]
-    least, most = configuration["h_vel_z_score_min"], configuration["h_vel_z_score_max"]
-    distance_m = configuration["h_vel_z_distance"]
-    range_m = np.maximum(np.hypot(east, north) - position, 0.0)
-    share = np.minimum(range_m / distance_m, 1.0) if distance_m > 0.0 else 1.0
-    score = most - (most - least) * share
-    return Bounds(
-        position,
-        configuration["v_pos_z_score"] * both(np.abs, "sz_std"),
-        score * both(_largest, "v_ew_std", "v_ns_std", "v_en_std"),
-        configuration["v_vel_z_score"] * both(np.abs, "vz_std"),
+    deviations = Deviations(
+        both(_longest, "s_ew_std", "s_ns_std", "s_en_std"),
+        both(np.abs, "sz_std"),
+        both(_longest, "v_ew_std", "v_ns_std", "v_en_std"),
+        both(np.abs, "vz_std"),
     )
+    return margins(configuration, deviations, np.hypot(relative[0], relative[1]))
 
 
-def _largest(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
-    """Return the standard deviation along the longest axis of a 2 by 2 covariance."""
-    covariance = np.sign(signed_root) * signed_root**2
-    mean, half = 0.5 * (east**2 + north**2), 0.5 * (east**2 - north**2)
-    return np.asarray(np.sqrt(mean + np.hypot(half, covariance)))
+def _longest(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
+    """Return the deviation along the longest axis; files give signed roots of covariances."""
+    return largest(east, north, np.sign(signed_root) * signed_root**2)

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
 # The time of what has not been yet.
 _LONG_AGO_S = -np.inf
+_COLUMNS = ("_last_s", "_output", "_risen_s", "_queue", "_own_time_s")
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class MemoryRule:
 
 
 class AlertMemory:
-    """The remembered state of targets 0 ... count - 1 of one ownship.
+    """The remembered state of targets 0 ... count - 1, of one ownship or of several.
 
     Parameters
     ----------
@@ -43,23 +44,53 @@ class AlertMemory:
     def __init__(self, rule: MemoryRule, count: int) -> None:
         self._rule = rule
         self._count = count
-        self._clear()
-        self._own_time_s = np.nan
-
-    def _clear(self) -> None:
-        count, rule = self._count, self._rule
         self._last_s = np.full(count, _LONG_AGO_S)
         self._output = np.full(count, _NONE, dtype=np.int64)
         self._risen_s = np.full(count, _LONG_AGO_S)
         self._queue = np.full((count, max(rule.n, 1)), _NONE, dtype=np.int64)
+        self._own_time_s = np.full(count, np.nan)
 
-    def step(self, now_s: float, present: BoolArray, due: BoolArray, early: BoolArray) -> IntArray:
+    def _forget(self, which: BoolArray) -> None:
+        self._last_s[which] = self._risen_s[which] = _LONG_AGO_S
+        self._output[which] = _NONE
+        self._queue[which] = _NONE
+
+    def grow(self, count: int) -> None:
+        """Remember so many targets from now on; those that come in addition are new."""
+        more = count - self._count
+        self._count = count
+        self._last_s = np.concatenate([self._last_s, np.full(more, _LONG_AGO_S)])
+        self._output = np.concatenate([self._output, np.full(more, _NONE)])
+        self._risen_s = np.concatenate([self._risen_s, np.full(more, _LONG_AGO_S)])
+        empty = np.full((more, self._queue.shape[1]), _NONE)
+        self._queue = np.concatenate([self._queue, empty])
+        self._own_time_s = np.concatenate([self._own_time_s, np.full(more, np.nan)])
+
+    def forget(self, which: IntArray) -> None:
+        """Take some targets as new ones."""
+        self._last_s[which] = _LONG_AGO_S
+
+    def take(self, which: IntArray) -> "AlertMemory":
+        """Return the memory of some targets, to be put back with `put`."""
+        part = AlertMemory(self._rule, len(which))
+        for name in _COLUMNS:
+            setattr(part, name, getattr(self, name)[which])
+        return part
+
+    def put(self, which: IntArray, part: "AlertMemory") -> None:
+        """Take over what `part` remembers as that of some targets."""
+        for name in _COLUMNS:
+            getattr(self, name)[which] = getattr(part, name)
+
+    def step(
+        self, now_s: float | FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
+    ) -> IntArray:
         """Take in one instant and return the level of each target.
 
         Parameters
         ----------
-        now_s : float
-            The ownship's time.
+        now_s : float or (targets,)
+            The time of the ownship, or of each target's ownship.
         present : (targets,) of bool
             Who has a state now.
         due : (targets, levels) of bool
@@ -74,9 +105,10 @@ class AlertMemory:
         """
         rule = self._rule
         step_s = now_s - self._own_time_s
-        if step_s < 0.0 or step_s > rule.hysteresis_s:
-            self._clear()
-        self._own_time_s = now_s
+        gap = (step_s < 0.0) | (step_s > rule.hysteresis_s)
+        if gap.any():
+            self._forget(gap)
+        self._own_time_s[:] = now_s
         raw = self._raw(now_s, due, early)
         gap_s = now_s - self._last_s
         known = (gap_s > 0.0) & (gap_s <= rule.hysteresis_s)
@@ -94,11 +126,19 @@ class AlertMemory:
         young = (since_s >= 0.0) & (since_s < rule.persistence_s)
         held = (self._output > 0) & (counted < self._output) & young
         rises = ~held & (counted > 0) & (counted > self._output) & present
-        self._risen_s[rises] = now_s
+        self._risen_s = np.where(rises, now_s, self._risen_s)
         level = np.where(held, self._output, np.maximum(counted, 0))
         self._output = np.where(present, level, self._output)
         self._last_s = np.where(present, now_s, self._last_s)
         return level
+
+    def levels(
+        self, times_s: FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
+    ) -> IntArray:
+        """Take in some instants in order and return all levels, (instants * targets,)."""
+        rows = enumerate(times_s.tolist())
+        found = [self.step(now_s, present[i], due[i], early[i]) for i, now_s in rows]
+        return np.concatenate(found)
 
     def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
         """Return whose early alerting time counts for guidance: levels that rose before now.
@@ -117,7 +157,7 @@ class AlertMemory:
         counts = present & (self._rule.hysteresis_s > 0.0) & (self._risen_s < now_s)
         return np.where(counts, np.maximum(self._output, 0), 0)
 
-    def _raw(self, now_s: float, due: BoolArray, early: BoolArray) -> IntArray:
+    def _raw(self, now_s: float | FloatArray, due: BoolArray, early: BoolArray) -> IntArray:
         """Return the highest level that is due; the one that is on may be so early."""
         levels = np.arange(1, due.shape[1] + 1)
         before = self._last_s < now_s

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.messages.steering import Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.block.component import Component, NonNegativeRational, Parameters
 from dsa_des.block.ports import Input, Output
@@ -20,7 +20,9 @@ class TurnAwayParameters(Parameters):
     turn_deg: float = Field(
         default=30.0, gt=0, le=180, description="Change of heading, away from the nearest, deg."
     )
-    rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turn, deg/s.")
+    rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turn, deg/s."
+    )
     pause_s: NonNegativeRational = Field(
         default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
     )
@@ -37,12 +39,15 @@ class TurnAway(Component):
     outputs = {"manoeuvres": Output(Manoeuvres, "Turns that the ownship is told to fly.")}
     Parameters = TurnAwayParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
         """Start free to turn."""
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
-        self._free_from = 0
+        #: By replica, from when on it may turn again.
+        self._free_from: dict[int, int] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Look for the nearest track at every instant."""
@@ -52,16 +57,18 @@ class TurnAway(Component):
         near = tracks.range_m <= 1000.0 * self.p.range_km
         row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))
         ticks, turns = [], []
+        replica = wake.replica
         for place in np.unique(row[near]).tolist():
             tick = int(wake.ticks[place])
-            if tick < self._free_from:
+            run = int(replica[place])
+            if tick < self._free_from.get(run, 0):
                 continue
             entries = np.flatnonzero(near & (row == place))
             nearest = entries[np.argmin(tracks.range_m[entries])]
             to_the_right = tracks.azimuth_rad[nearest] <= 0.0
             ticks.append(tick)
             turns.append(math.radians(self.p.turn_deg) * (1.0 if to_the_right else -1.0))
-            self._free_from = tick + self._pause_ticks
+            self._free_from[run] = tick + self._pause_ticks
         if not ticks:
             return None
         rate = np.full(len(ticks), math.radians(self.p.rate_deg_s))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 def draw(
     simulation: "Simulation", folder: Path, summary: dict[str, Any], sensors: Sequence[str]
 ) -> list[Path]:
-    """Draw ``plan.png``, ``timeline.png`` and ``tracks.png`` into a run's folder.
+    """Draw ``plan.png``, ``timeline.png``, ``tracks.png`` and ``consistency.png`` into a folder.
 
     Parameters
     ----------
@@ -25,8 +25,10 @@ def draw(
     Returns
     -------
     list of Path
-        Of what was drawn: ``tracks.png`` only where a tracker confirmed tracks with a range.
+        Of what was drawn: the last two only where a tracker confirmed tracks with a range.
     """
+    from components.display.consistency import draw_consistency
+    from components.display.drawn_tracks import DrawnTracks
     from components.display.flights import Flights
     from components.display.marks import Detected
     from components.display.plan import draw_plan
@@ -41,7 +43,9 @@ def draw(
     if flights is not None:
         paths.append(draw_plan(folder / "plan.png", simulation, flights, detected, summary))
     paths.append(draw_timeline(folder / "timeline.png", simulation, flights, detected, folder))
-    tracks = draw_tracks(folder / "tracks.png", simulation, folder)
-    if tracks is not None:
-        paths.append(tracks)
+    told = DrawnTracks.read(simulation, folder)
+    if told is not None:
+        paths.append(draw_tracks(folder / "tracks.png", told))
+        consistency = draw_consistency(folder / "consistency.png", told)
+        paths += [] if consistency is None else [consistency]
     return paths

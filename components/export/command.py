@@ -6,7 +6,7 @@ import click
 
 from dsa_des.commands.plain_errors import plain_errors
 
-FORMATS = ("csv", "kml", "czml", "daa", "mat")
+FORMATS = ("csv", "kml", "czml", "daa", "mat", "operator-csv")
 
 
 @click.command()
@@ -18,7 +18,8 @@ def export(**options: Any) -> None:
     """Write a run's folder in another format.
 
     csv is a folder with a file for each table; mat a MATLAB file with all of them; kml and czml the
-    flights and what was detected, for globes; daa the flights, as DAIDALUS reads them.
+    flights and what was detected, for globes; daa the flights, as DAIDALUS reads them;
+    operator-csv a row for each alert, with what the operator did about it and when.
     """
     from components.export.exported import export_run
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from components.export.globe import czml_text, kml_text
+from components.export.operator_answers import operator_csv
 from components.export.plain_tables import csv_files, mat_bytes
 from components.export.recorded import RecordedTables, read_tables
 from components.export.traffic import daa_text
@@ -16,7 +17,9 @@ _OF_ONE_FILE = {
     "czml": lambda tables: czml_text(tables).encode("utf-8"),
     "daa": lambda tables: daa_text(tables).encode("utf-8"),
     "mat": lambda tables: mat_bytes(tables),
+    "operator-csv": operator_csv,
 }
+_ENDINGS = {"operator-csv": "-operator.csv"}
 
 
 def export_run(run: str, to: str, out: str | None) -> None:
@@ -28,7 +31,11 @@ def export_run(run: str, to: str, out: str | None) -> None:
     """
     tables = read_tables(run)
     folder = tables.folder.resolve()
-    target = named(out) if out is not None else folder.with_name(f"{folder.name}.{to}")
+    target = (
+        named(out)
+        if out is not None
+        else folder.with_name(f"{folder.name}{_ENDINGS.get(to, f'.{to}')}")
+    )
     if to == "csv":
         _write_folder(tables, target if out is not None else folder.with_name(f"{folder.name}-csv"))
         return

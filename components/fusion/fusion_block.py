@@ -13,7 +13,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
-from dsa_des.block.wake import Arrivals
+from dsa_des.block.wake import Arrivals, Wake
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
@@ -89,17 +89,28 @@ class Fusion(Component):
         """Return how old a detection may be and still be put together with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
 
-    def with_recent(self, arrivals: dict[str, Arrivals]) -> dict[str, Arrivals]:
+    def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
         for name, new in arrivals.items():
             old = self._recent.get(name)
             if old is not None:
                 message = Detections.concatenate([old.message, new.message])
-                new = Arrivals(name, np.concatenate([old.tick, new.tick]), message)
+                ticks = np.concatenate([old.tick, new.tick])
+                if wake.side_by_side:  # those of each replica together
+                    order = np.argsort(ticks, kind="stable")
+                    ticks, message = ticks[order], message.take(order)
+                new = Arrivals(name, ticks, message)
             self._recent[name] = new
-        latest = max(int(new.tick[-1]) for new in arrivals.values())
+        if wake.side_by_side:
+            latest = max(int(wake.own_ticks(new.tick).max()) for new in arrivals.values())
+        else:
+            latest = max(int(new.tick[-1]) for new in arrivals.values())
         together = dict(self._recent)
         for name, seen in together.items():
+            if wake.side_by_side:
+                young = np.flatnonzero(wake.own_ticks(seen.tick) >= latest - self.keep_ticks)
+                self._recent[name] = Arrivals(name, seen.tick[young], seen.message.take(young))
+                continue
             keep = slice(int(np.searchsorted(seen.tick, latest - self.keep_ticks)), len(seen.tick))
             self._recent[name] = Arrivals(name, seen.tick[keep], seen.message.take(keep))
         return dict(sorted(together.items()))

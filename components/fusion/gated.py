@@ -48,6 +48,7 @@ class Gated(Fusion):
 
     Parameters = GatedParameters
     lockstep = True
+    side_by_side = True
     ladders = (FUSION,)
 
     def window_s(self) -> Any:
@@ -65,8 +66,10 @@ class Gated(Fusion):
         reported = {new.source: new for new in wake.arrivals("detections")}
         if not reported:
             return None
-        new_ticks = {name: new.tick for name, new in reported.items()}
-        arrivals = self.with_recent(reported)
+        since = {name: int(wake.own_ticks(new.tick).min()) for name, new in reported.items()}
+        if not wake.side_by_side:
+            since = {name: int(new.tick[0]) for name, new in reported.items()}
+        arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
         came = {name: _entry_ticks(arrivals[name]) for name in order}
@@ -74,8 +77,8 @@ class Gated(Fusion):
         pose = {name: poses(arrivals[name].message) for name in order}
         # What came before this wake was reported then; it can only be gathered now.
         free = {
-            name: came[name] >= new_ticks[name][0]
-            if name in new_ticks
+            name: (wake.own_ticks(came[name]) if wake.side_by_side else came[name]) >= since[name]
+            if name in since
             else np.zeros(len(came[name]), dtype=bool)
             for name in order
         }

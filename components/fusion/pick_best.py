@@ -39,6 +39,7 @@ class PickBest(Fusion):
 
     Parameters = PickBestParameters
     lockstep = True
+    side_by_side = True
     ladders = (FUSION,)
 
     def left_out(self) -> list[str]:
@@ -68,7 +69,7 @@ class PickBest(Fusion):
         union = _union(keys, width) if len(wake) == 1 else sorted_union(keys)
         row, target = np.divmod(union, width)
         if self.gate_ticks:
-            arrivals = self.with_recent(arrivals)
+            arrivals = self.with_recent(arrivals, wake)
             entries = {
                 name: latest_in_gate(new, wake.ticks[row], target, self.gate_ticks)
                 for name, new in arrivals.items()

@@ -67,6 +67,7 @@ class Transform(Component):
     Parameters = TransformParameters
     windowed = True
     lockstep = True
+    side_by_side = True
     rewindable = True
     hooks = {
         "ownship": "(states) -> what the ownship believes of itself, by name",
@@ -204,6 +205,7 @@ class FlatEarth(Transform):
 
     earth = "flat_earth"
     lockstep = True
+    side_by_side = True
 
 
 class LocalRadii(Transform):
@@ -211,6 +213,7 @@ class LocalRadii(Transform):
 
     earth = "local_radii"
     lockstep = True
+    side_by_side = True
 
 
 class DaidalusSphere(Transform):
@@ -218,6 +221,7 @@ class DaidalusSphere(Transform):
 
     earth = "daidalus_sphere"
     lockstep = True
+    side_by_side = True
 
 
 class Geodesic(Transform):
@@ -225,6 +229,7 @@ class Geodesic(Transform):
 
     earth = "geodesic"
     lockstep = True
+    side_by_side = True
 
 
 class Ellipsoid(Transform):
@@ -232,3 +237,4 @@ class Ellipsoid(Transform):
 
     earth = "ellipsoid"
     lockstep = True
+    side_by_side = True

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from components.aircraft.aircraft import Roster
 from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -10,6 +12,8 @@ from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
 MOST_LEVELS = 4
+#: A tracker's own numbers stand above those of the scene's targets, where both name contacts.
+TRACKS_FROM = 1_000_000
 _TIMES = {f"time_to_level_{level}_s": "float64" for level in range(1, MOST_LEVELS + 1)}
 
 
@@ -32,6 +36,12 @@ class AlertLevels(Message):
         met within the lookahead.
     time_to_closest_s, closest_horizontal_m, closest_vertical_m : (entries,)
         The projected closest approach, in straight flight.
+    numbers : dict of (entries,)
+        ``track``: the tracker's own number, where tracks with states are believed. Their `target`
+        is the one they are nearest to, for whoever evaluates; -1 for none.
+    deviations : dict of (entries,)
+        Standard deviations of the state, where they are known: ``position_m``, ``height_m``,
+        ``velocity_mps``, ``climb_mps``.
     relative : dict of (entries,)
         What the levels rest on, ownship less target: ``east_m``, ``north_m``, ``up_m`` and
         ``east_mps``, ``north_mps``, ``climb_mps``.
@@ -50,6 +60,34 @@ class AlertLevels(Message):
     time_to_closest_s: FloatArray = per_entry(column="float64")
     closest_horizontal_m: FloatArray = per_entry(column="float64")
     closest_vertical_m: FloatArray = per_entry(column="float64")
+    numbers: dict[str, IntArray] = per_entry(columns={"track": "int64"})
+    deviations: dict[str, FloatArray] = per_entry()
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
+
+    def highest(self) -> IntArray:
+        """Return the highest level of each row, 0 where there is no target, (rows,)."""
+        found = np.zeros(len(self), dtype=np.int64)
+        np.maximum.at(found, np.repeat(np.arange(len(self)), np.diff(self.offsets)), self.level)
+        return found
+
+    def contacts(self) -> IntArray:
+        """Return whom each entry is about, as those who look at a display know them, (entries,).
+
+        The place of the target; where a tracker's states are believed, which know no targets,
+        `TRACKS_FROM` and the track's number.
+        """
+        return TRACKS_FROM + self.numbers["track"] if "track" in self.numbers else self.target
+
+
+def contact_name(names: tuple[str, ...], contact: int) -> str | None:
+    """Return the name of a contact: of a target as the scene has it, else "track 7".
+
+    Empty for -1, none; None where there is no such target.
+    """
+    if contact >= TRACKS_FROM:
+        return f"track {contact - TRACKS_FROM}"
+    if contact < 0:
+        return ""
+    return names[contact] if contact < len(names) else None

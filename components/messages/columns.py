@@ -104,6 +104,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         ),
         "pixels": ("pixels", "", "pixels that the target covers in a camera"),
         "declared": ("", "", "whether there are enough detections; true without a rule"),
+        "cued": ("", "", "whether the target lay in a cue cone; false where no cues come"),
         "illuminated_s": ("s", "", "when a sweeping beam lit the target"),
         "ned_azimuth_rad": ("rad", _NED, "azimuth from north, by the believed attitude"),
         "ned_elevation_rad": ("rad", _NED, "elevation, by the believed attitude"),
@@ -153,8 +154,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
             f"own_{axis}_m": ("m", _FRAME, f"where the ownship believed to be then, {axis}")
             for axis in ("north", "east", "down")
         },
-        "nis": ("", "", "normalised innovation squared of this look; null where it did not update"),
-        "nis_freedom": ("", "", "how many measured quantities that is of; 0 without one"),
+        "nis": ("", "", "normalised innovations squared at that instant, added up; null without"),
+        "nis_freedom": ("", "", "how many measured quantities they are of"),
         "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
         "origin_lon_deg": ("deg", _WGS84, "its longitude"),
         "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
@@ -174,6 +175,23 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "probability_velocity": ("", "", "of the model of constant velocity"),
         "probability_turn": ("", "", "of the model of a coordinated turn"),
         "probability_acceleration": ("", "", "of the model of constant acceleration"),
+    },
+    "cues": {
+        "track": ("", "", "number of the track that it comes from"),
+        "azimuth_rad": ("rad", _FRAME, "axis of the cone as seen from the ownship, from north"),
+        "elevation_rad": ("rad", _FRAME, "its elevation, upward"),
+        "half_angle_rad": ("rad", "", "half angle of the cone"),
+        "has_range": ("", "", "whether the track has a range"),
+        **{
+            f"{axis}_m{per_s}": (unit, _FRAME, f"{what} that it speaks of; null without a range")
+            for per_s, unit, what in (("", "m", "position"), ("_s", "m/s", "velocity"))
+            for axis in ("north", "east", "down")
+        },
+        "origin_lat_deg": ("deg", _WGS84, "origin of the frame: latitude"),
+        "origin_lon_deg": ("deg", _WGS84, "its longitude"),
+        "origin_alt_m": ("m", _WGS84, "its height above the ellipsoid"),
+        "state_s": ("s", "", "the instant that it speaks of"),
+        "until_s": ("s", "", "the last instant at which it counts"),
     },
     "truth": {
         "target": ("", "", "name of the target; null for the ownship"),
@@ -198,7 +216,8 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "pixels": ("pixels", "", "pixels that the target covers in a camera"),
     },
     "alerts": {
-        "target": ("", "", "name of the target"),
+        "target": ("", "", "name of the target; of a track, the nearest one, null if far from all"),
+        "track": ("", "", "the tracker's number; null where tracks have none"),
         "level": ("", "", "alert level, 0 without an alert"),
         **{
             f"time_to_level_{level}_s": (
@@ -218,6 +237,10 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "rate_rad_s": ("rad/s", "", "rate of that turn"),
         "climb_m": ("m", "", "commanded change of altitude, positive upward"),
         "climb_rate_mps": ("m/s", "", "vertical speed of that climb or descent"),
+        "speed_mps": ("m/s", "", "commanded change of ground speed"),
+        "acceleration_mps2": ("m/s²", "", "acceleration of that change"),
+        "vertical_speed_mps": ("m/s", "", "commanded change of vertical speed, positive upward"),
+        "vertical_acceleration_mps2": ("m/s²", "", "acceleration of that change"),
     },
     "decisions": {
         "decision": (

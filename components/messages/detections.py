@@ -34,6 +34,7 @@ EXTRAS = {
     "pixels": "float64",
     "declared": "bool",
     "illuminated_s": "float64",
+    "cued": "bool",
     "ned_azimuth_rad": "float64",
     "ned_elevation_rad": "float64",
 }
@@ -150,7 +151,8 @@ class Detections(Message):
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
         ``detection_probability``, ``pixels``; and ``declared``, whether the target has enough
         detections to be declared (recorded as true where no rule is in force). A sweeping radar
-        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. Where the
+        has ``illuminated_s``, when its beam passed; all of the entry is of that instant. A sensor
+        that is cued has ``cued``, whether the target lay in a cone. Where the
         ownship's navigation errs, there is the line of sight in NED by what it believes of its
         attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``.
     own_lat_deg, own_lon_deg, own_alt_m : (rows,), or None

@@ -66,11 +66,11 @@ class StateTracks(Message):
         What some models have besides: `EXTRAS`.
     sensors : tuple of str
     nis : (entries,)
-        Normalised innovation squared of the look that the state speaks of: how far the detection
-        that updated the track lay from what was expected, by the covariance of both. NaN where it
-        did not, or where several detections were weighed; by default.
+        Normalised innovations squared of the looks at the instant that the state speaks of, added
+        up: how far the detections that updated the track lay from what was expected, by the
+        covariance of both. NaN where none did, or where several were weighed; by default.
     nis_freedom : (entries,) of int
-        How many quantities it is of: angles 2, with range 3, with range rate 4; 0 without one.
+        How many quantities they are of: for each look 2 angles, 3 with range, 4 with range rate.
     """
 
     described = DESCRIBED

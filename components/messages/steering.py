@@ -7,12 +7,15 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from components.messages.columns import DESCRIBED
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message, per_row
+
+#: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
+SLOWEST_TURN_DEG_S = 0.1
 
 
 class Manoeuvre(NamedTuple):
-    """One manoeuvre: a turn, or a climb or descent; what is not changed is 0.
+    """One manoeuvre: a turn, a climb or descent, or another speed; what is not changed is 0.
 
     Parameters
     ----------
@@ -24,17 +27,29 @@ class Manoeuvre(NamedTuple):
         Change of altitude, positive upward.
     climb_rate_mps : float
         Vertical speed of it, above 0 where there is one.
+    speed_mps : float
+        Change of ground speed.
+    acceleration_mps2 : float
+        Of that change, above 0 where there is one.
+    vertical_speed_mps : float
+        Change of vertical speed, which is kept then.
+    vertical_acceleration_mps2 : float
+        Of that change, above 0 where there is one.
     """
 
     turn_rad: float = 0.0
     rate_rad_s: float = 0.0
     climb_m: float = 0.0
     climb_rate_mps: float = 0.0
+    speed_mps: float = 0.0
+    acceleration_mps2: float = 0.0
+    vertical_speed_mps: float = 0.0
+    vertical_acceleration_mps2: float = 0.0
 
 
 @dataclass(eq=False)
 class Manoeuvres(Message):
-    """Turns and climbs that the ownship is told to fly, one per row.
+    """Turns, climbs and changes of speed that the ownship is told to fly, one per row.
 
     Parameters
     ----------
@@ -46,6 +61,10 @@ class Manoeuvres(Message):
         Change of altitude, positive upward; 0 for a turn, and by default.
     climb_rate_mps : (rows,), optional
         Vertical speed, above 0 where there is a climb or descent.
+    speed_mps, acceleration_mps2 : (rows,), optional
+        Change of ground speed, and how fast.
+    vertical_speed_mps, vertical_acceleration_mps2 : (rows,), optional
+        Change of vertical speed, and how fast.
     """
 
     described = DESCRIBED
@@ -55,10 +74,14 @@ class Manoeuvres(Message):
     rate_rad_s: FloatArray = per_row(column="float64")
     climb_m: FloatArray = per_row(column="float64", default=None)
     climb_rate_mps: FloatArray = per_row(column="float64", default=None)
+    speed_mps: FloatArray = per_row(column="float64", default=None)
+    acceleration_mps2: FloatArray = per_row(column="float64", default=None)
+    vertical_speed_mps: FloatArray = per_row(column="float64", default=None)
+    vertical_acceleration_mps2: FloatArray = per_row(column="float64", default=None)
 
     def __post_init__(self) -> None:
         """Fill in what is not changed."""
-        for name in ("climb_m", "climb_rate_mps"):
+        for name in Manoeuvre._fields[2:]:
             if getattr(self, name) is None:
                 setattr(self, name, np.zeros(len(self.tick)))
 
@@ -67,6 +90,15 @@ class Manoeuvres(Message):
         """Return the message of manoeuvres, each told at an instant."""
         parts = np.array(told, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
         return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
+
+    @classmethod
+    def at_rows(cls, ticks: IntArray, told: Mapping[int, Manoeuvre]) -> Self | None:
+        """Return the message of manoeuvres told at some of the instants `ticks`, by their places.
+
+        None without any.
+        """
+        rows = sorted(told)
+        return cls.of(ticks[rows].tolist(), [told[row] for row in rows]) if told else None
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

@@ -49,7 +49,7 @@ class Coverage:
         self._source: Any = block.cls(block.name, block.parameters, context)
         duration = scene.duration_s or self._source.natural_duration_s() or Fraction(0)
         context.duration_s = duration
-        self._duration_s = float(duration)
+        self.duration_s = float(duration)
         self._reaches = reaches_of(scene)
 
     def holds(self, target: Any, time_s: FloatArray) -> BoolArray:
@@ -80,7 +80,7 @@ class Coverage:
         step_s : float
             A stay that is shorter may be missed; entries are found to a millisecond.
         """
-        grid = np.append(np.arange(0.0, self._duration_s, step_s), self._duration_s)
+        grid = np.append(np.arange(0.0, self.duration_s, step_s), self.duration_s)
         found = {}
         for target in self._source.targets:
             inside = self.holds(target, grid)

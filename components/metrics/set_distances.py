@@ -73,12 +73,3 @@ def assigned(cost: FloatArray) -> tuple[IntArray, IntArray]:
 
     row, column = linear_sum_assignment(cost)
     return row, column
-
-
-def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float]:
-    """Return the interval that holds a chi-square variable with a probability, tails alike."""
-    from scipy.special import gammaincinv
-
-    tail = 0.5 * (1.0 - share)
-    low, high = (2.0 * float(gammaincinv(0.5 * freedom, p)) for p in (tail, 1.0 - tail))
-    return low, high

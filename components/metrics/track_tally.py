@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from components.metrics.set_distances import assigned, chi_square_bounds, set_distance
+from components.metrics.set_distances import assigned, set_distance
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.studies.statistics import chi_square_bounds
 
 _AXES = ("north", "east", "down")
 _SETS = (
@@ -62,6 +63,7 @@ class TrackTally:
     step_s: float
     nees: list[float] = field(default_factory=list)
     error: list[FloatArray] = field(default_factory=list)
+    paired_s: list[float] = field(default_factory=list)
     accuracy: list[tuple[float, float]] = field(default_factory=list)
     sets: list[tuple[float, ...]] = field(default_factory=list)
     present: int = 0
@@ -119,6 +121,7 @@ class TrackTally:
         self.tracked += 1
         self.nees.append(float(error @ np.linalg.solve(told.covariance[track], error)))
         self.error.append(error)
+        self.paired_s.append(told.time_s)
         self._accuracy(error)
         number = int(told.number[track])
         self.numbers.setdefault(target, []).append(number)
@@ -168,6 +171,14 @@ class TrackTally:
         found["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
         found["track_false_per_hour"] = 3600.0 * len(self.confirmed - self.owned) / duration_s
         return found
+
+    def last_nees(self, after_s: float, up_to_s: float) -> float:
+        """Return the mean normalised error squared at the last instant of a stretch with any."""
+        time_s = np.array(self.paired_s)
+        inside = (time_s > after_s) & (time_s <= up_to_s)
+        if not inside.any():
+            return float("nan")
+        return float(np.mean(np.array(self.nees)[time_s == time_s[inside].max()]))
 
     def _errors(self) -> dict[str, float]:
         low, high = chi_square_bounds(6)

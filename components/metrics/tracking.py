@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from components.messages.state_tracks import COVARIANCE, STATUSES
 from components.metrics.coverage import Coverage
@@ -20,6 +20,7 @@ from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _TABLE = "state_tracks"
+_MOST_STRETCHES = 400
 
 _RESULTS = {
     "track_nees_mean": "mean normalised error squared of tracks' states; 6 where they are honest",
@@ -78,6 +79,20 @@ class TrackingParameters(Parameters):
         description="Distance up to which a track may be a target's; cut-off of OSPA and GOSPA, m.",
     )  # fmt: skip
     order: float = Field(default=2.0, ge=1, le=10, description="Power p of OSPA and GOSPA.")
+    series_s: float | None = Field(
+        default=None, gt=0,
+        description="Length of stretches of the run, s: the normalised error squared at the last "
+        "comparison in each is a result of its own, for a figure over time.",
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _steps(self) -> Any:
+        if self.series_s is not None and self.series_s < self.step_s:
+            raise ValueError(
+                f"series_s = {self.series_s:g} is shorter than step_s = {self.step_s:g}, the time "
+                "from one comparison to the next; allowed: at least as long"
+            )
+        return self
 
 
 class Tracking(Metric):
@@ -103,17 +118,30 @@ class Tracking(Metric):
         known, block = recorded_by(scene, _TABLE), self.p.block
         if block is not None and block not in known:
             raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")
+        self._ends_s: list[float] = []
+        if self.p.series_s is not None:
+            many = int(Coverage(scene).duration_s / self.p.series_s)
+            if not 1 <= many <= _MOST_STRETCHES:
+                raise ValueError(
+                    f"series_s: {self.p.series_s:g} s makes {many} stretches of the run; allowed: "
+                    f"1 to {_MOST_STRETCHES}"
+                )
+            self._ends_s = [(k + 1) * self.p.series_s for k in range(many)]
 
     def results(self) -> list[Result]:
         """Return errors, honesty, distances of sets, and identities."""
         of = "" if self.p.block is None else f".{self.p.block}"
-        return [Result(name + of, NUMBER, says) for name, says in _RESULTS.items()]
+        series = [
+            Result(_at(end, of), NUMBER, f"normalised error squared up to {end:g} s")
+            for end in self._ends_s
+        ]
+        return [*(Result(name + of, NUMBER, says) for name, says in _RESULTS.items()), *series]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all of every replica."""
         columns: Any = group.tables[_TABLE]
         of = "" if self.p.block is None else f".{self.p.block}"
-        found = {name + of: np.full(len(group), np.nan) for name in _RESULTS}
+        found = {result.name: np.full(len(group), np.nan) for result in self.results()}
         held = np.isin(columns["track_status"].codes, _codes(columns["track_status"].names))
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
@@ -126,6 +154,8 @@ class Tracking(Metric):
             values |= innovation_results(*self._innovations(columns, mine[held[mine]]))
             for name, value in values.items():
                 found[name + of][number] = value
+            for end in self._ends_s:
+                found[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
         return found
 
     def _tally(
@@ -165,6 +195,10 @@ class Tracking(Metric):
         same = (np.diff(track[order]) == 0) & (np.diff(when[order]) == 0)
         rows = rows[order[np.append(~same, np.ones(min(len(rows), 1), dtype=bool))]]
         return columns["nis"][rows], columns["nis_freedom"][rows]
+
+
+def _at(end_s: float, of: str) -> str:
+    return f"track_nees.time_s{of}.{end_s:g}"
 
 
 def _told_by(column: Any, scene: Scene, block: str | None) -> Any:

@@ -8,25 +8,28 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.messages.alerts import AlertLevels
+from components.messages.alerts import AlertLevels, contact_name
 from components.messages.decisions import CLIMB, TURN, Decision, Decisions
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import ClockedParameters, Component, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
 
-#: What the ownship may be told at once.
+#: What the ownship may be told at once, and below what there is nothing to fly.
 MOST_TURN_RAD, MOST_CLIMB_M = math.pi, 3000.0
+_LEAST_TURN_RAD, _LEAST_CLIMB_M = 1e-4, 0.01
 
 
 class ConsoleParameters(ClockedParameters):
     """Parameters of a console."""
 
     scan_rate_hz: PositiveRational = Field(
-        default=Fraction(20), description="How often decisions are taken in, 1/s."
+        default=Fraction(50), description="How often decisions are taken in, 1/s."
     )
-    turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
@@ -85,9 +88,9 @@ class Console(Component):
     def _after(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
         """Return the alerts that are on once a row of levels has come."""
         now = {}
-        level = alerts.level[entries]
+        level, contacts = alerts.level[entries], alerts.contacts()[entries]
         for place in np.flatnonzero(level > 0).tolist():
-            name = alerts.roster.names[int(alerts.target[entries][place])]
+            name = contact_name(alerts.roster.names, int(contacts[place])) or ""
             began = self._alerts.get(name)
             now[name] = _Alert(int(level[place]), tick if began is None else began.tick)
         return now
@@ -111,7 +114,7 @@ class Console(Component):
             np.array([d.wall_time_s for _, d, _ in made]),
             self._targets,
         )
-        told = [(tick, self._told(d)) for tick, d, _ in made if d.kind in (TURN, CLIMB)]
+        told = [(tick, self._told(d)) for tick, d, _ in made if _is_flown(d)]
         if not told:
             return {"decisions": decisions}
         manoeuvres = Manoeuvres.of([tick for tick, _ in told], [one for _, one in told])
@@ -122,3 +125,9 @@ class Console(Component):
             rate_rad_s = math.radians(self.p.turn_rate_deg_s)
             return Manoeuvre(turn_rad=decision.turn_rad, rate_rad_s=rate_rad_s)
         return Manoeuvre(climb_m=decision.climb_m, climb_rate_mps=self.p.vertical_rate_mps)
+
+
+def _is_flown(decision: Decision) -> bool:
+    if decision.kind == TURN:
+        return abs(decision.turn_rad) >= _LEAST_TURN_RAD
+    return decision.kind == CLIMB and abs(decision.climb_m) >= _LEAST_CLIMB_M

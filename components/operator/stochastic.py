@@ -1,7 +1,8 @@
 """An operator who answers alerts as pilots were measured to (``operator.stochastic``)."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -9,11 +10,12 @@ from pydantic import Field
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
+from dsa_des.time.timeline import first_scan
 
 
 class StochasticParameters(ConfParameters):
@@ -39,10 +41,38 @@ class StochasticParameters(ConfParameters):
     turn_share: float = Field(
         default=0.65, ge=0, le=1, description="Probability of a turn instead of a climb or descent."
     )
-    turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
+
+
+class Mind(NamedTuple):
+    """What an operator has in mind, in one replica.
+
+    Parameters
+    ----------
+    replica : int
+    decisions : int
+        How many there were.
+    since : int or None
+        Tick from which on there was an alert.
+    acts_at : float or None
+        Tick from which on the latest decision is acted on.
+    free_from : float
+        Tick from which on there may be a next decision.
+    has_acted : bool
+        Whether this alert was acted on already.
+    """
+
+    replica: int
+    decisions: int = 0
+    since: int | None = None
+    acts_at: float | None = None
+    free_from: float = 0.0
+    has_acted: bool = False
 
 
 class Stochastic(Component):
@@ -58,6 +88,8 @@ class Stochastic(Component):
     outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
     Parameters = StochasticParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
@@ -66,81 +98,90 @@ class Stochastic(Component):
         self._response, self._steering, self._pause = map(
             self.stream, ("response", "steering", "pause")
         )
-        self._decisions = 0
-        self._since: int | None = None
-        self._acts_at: float | None = None
-        self._free_from = 0.0
-        self._has_acted = False
+        #: By replica.
+        self._minds: dict[int, Mind] = {}
 
     def run(self, wake: Wake) -> Manoeuvres | None:
         """Follow the alerts, instant by instant."""
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        ticks, told = [], []
-        for place, tick in enumerate(wake.ticks.tolist()):
-            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-            highest = int(np.max(alerts.level[entries], initial=0))
-            if not self._acts_now(tick, highest):
-                continue
-            manoeuvre = self._manoeuvre(alerts, place, entries)
-            if manoeuvre is not None:
-                ticks.append(tick)
-                told.append(manoeuvre)
-        return Manoeuvres.of(ticks, told) if ticks else None
+        highest, replica = alerts.highest(), wake.replica
+        own_ticks = wake.own_ticks(wake.ticks)
+        # Without an alert, now or before, there is nothing to do.
+        alerted = highest >= self.p.level
+        busy = [run for run, mind in self._minds.items() if mind.since is not None]
+        followed = np.isin(replica, np.union1d(replica[alerted], np.array(busy, dtype=np.int64)))
+        acting: list[tuple[int, Mind]] = []
+        for place in np.flatnonzero(followed).tolist():
+            run = int(replica[place])
+            mind = self._minds.get(run, Mind(run))
+            mind, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
+            self._minds[run] = mind
+            if acts:
+                acting.append((place, mind))
+        told = self._told_at(alerts, acting)
+        return Manoeuvres.at_rows(wake.ticks, told)
 
-    def _acts_now(self, tick: int, highest: int) -> bool:
-        """Take in the highest level of an instant, and tell whether the operator acts at it."""
+    def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
+        """Take in the highest level of an instant; return also whether the operator acts at it."""
         per_s = self.context.ticks_per_s
         if highest < self.p.level:
-            self._since, self._acts_at, self._has_acted = None, None, False
-            return False
-        if self._since is None:
-            self._since = tick
-        held = tick - self._since >= self.p.held_s * per_s
-        if self._acts_at is None and held and tick >= self._free_from:
-            self._decisions += 1
-            self._acts_at = tick + self._response_s(highest) * per_s
-        if self._acts_at is None or tick < self._acts_at:
-            return False
-        self._acts_at, self._has_acted = None, True
+            return mind._replace(since=None, acts_at=None, has_acted=False), False
+        since = tick if mind.since is None else mind.since
+        mind = mind._replace(since=since)
+        held = tick - since >= self.p.held_s * per_s
+        if mind.acts_at is None and held and tick >= mind.free_from:
+            mind = mind._replace(decisions=mind.decisions + 1)
+            mind = mind._replace(acts_at=tick + self._response_s(mind, highest) * per_s)
+        if mind.acts_at is None or tick < mind.acts_at:
+            return mind, False
         wait_s = mean_pause_s(highest)
         if not self.p.deterministic:
-            wait_s = pause_s(highest, self._draw(self._pause, 0))
-        self._free_from = tick + wait_s * per_s
-        return True
+            wait_s = pause_s(highest, self._draw(mind, self._pause, 0))
+        return mind._replace(acts_at=None, has_acted=True, free_from=tick + wait_s * per_s), True
 
-    def _draw(self, stream: Any, number: int) -> float:
+    def _draw(self, mind: Mind, stream: Any, number: int) -> float:
         """Return the draw of a number, of the latest decision."""
-        return float(stream.uniform(np.uint64(0), np.int64(self._decisions), number))
+        decision = np.int64(first_scan(mind.replica) + mind.decisions)
+        return float(stream.uniform(np.uint64(0), decision, number))
 
-    def _response_s(self, highest: int) -> float:
+    def _response_s(self, mind: Mind, highest: int) -> float:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s
-        if self._has_acted:
+        if mind.has_acted:
             initial_s = coordination_s = 0.0
         elif highest >= self.p.warning_level:
             coordination_s = 0.0
         draws = None
         if not self.p.deterministic:
-            draws = np.array([self._draw(self._response, k) for k in range(3)])
+            draws = np.array([self._draw(mind, self._response, k) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
-    def _manoeuvre(self, alerts: AlertLevels, place: int, entries: slice) -> Manoeuvre | None:
-        draws, turns = None, self.p.turn_share >= 0.5
-        if not self.p.deterministic:
-            turns = self._draw(self._steering, 0) < self.p.turn_share
-            draws = Draws(*(self._draw(self._steering, k) for k in (1, 2, 3)))
+    def _told_at(
+        self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
+    ) -> dict[int, Manoeuvre]:
+        """Return what operators who act at some rows of the alerts steer, by row."""
+        by_turn: dict[int, bool] = {}
+        draws: dict[int, Draws | None] = {}
+        for place, mind in acting:
+            by_turn[place], draws[place] = self.p.turn_share >= 0.5, None
+            if not self.p.deterministic:
+                by_turn[place] = self._draw(mind, self._steering, 0) < self.p.turn_share
+                draws[place] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
+        found: dict[int, Manoeuvre] = {}
         # Who finds no way out by one kind tries the other.
-        for by_turn in (turns, not turns):
-            if 0.0 < self.p.turn_share < 1.0 or by_turn == turns:
-                changes = changes_out(
-                    "hdir" if by_turn else "alt", self._configuration, self._alerter,
-                    alerts.own_motion, alerts.relative, place, entries,
-                )  # fmt: skip
-                change = 0.0 if changes is None else steering(changes, by_turn, draws)
-                if change != 0.0:
-                    return self._told(change, by_turn)
-        return None
+        for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
+            for turns in (True, False):
+                rows = [n for n, it in by_turn.items() if n not in found and (it == turns) == first]
+                if not rows:
+                    continue
+                kind = "hdir" if turns else "alt"
+                every = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+                for row, changes in zip(rows, every, strict=True):
+                    change = 0.0 if changes is None else steering(changes, turns, draws[row])
+                    if change != 0.0:
+                        found[row] = self._told(change, turns)
+        return found
 
     def _told(self, change: float, by_turn: bool) -> Manoeuvre:
         if by_turn:

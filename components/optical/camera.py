@@ -17,6 +17,7 @@ from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
+from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
@@ -32,6 +33,11 @@ class CameraParameters(SensorParameters):
     azimuth_pixels: int = Field(gt=0, description="Pixels across the field of view.")
     elevation_pixels: int = Field(gt=0, description="Pixels from its lower to its upper edge.")
     threshold: float = Field(default=1.0, description="Signature needed for a detection (eq. 19).")
+    cued_threshold: float | None = Field(
+        default=None,
+        ge=0,
+        description="Signature needed within a cue cone; by default the same.",
+    )
     static_weight: float = Field(default=0.3, ge=0, description="Weight a of eq. 18, per pixel.")
     dynamic_weight: float = Field(default=0.0, ge=0, description="Weight b of eq. 18, s/rad.")
     model: Literal["auto"] | None = Field(
@@ -75,6 +81,18 @@ class CameraParameters(SensorParameters):
         "with confidence 0 and no pixels.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors, false alarms and rates that there are not."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            of_signal = "noise_equivalent_contrast", "blur_pixels"
+            said += self.idle(*of_signal, because=f"errors is '{self.errors}'")
+        if not self.false_alarms_per_frame:
+            said += self.idle("marked_false_alarms", because="false_alarms_per_frame is 0")
+        if not self.dynamic_weight:
+            said += self.idle("rate", because="dynamic_weight is 0")
+        return said
+
     @model_validator(mode="after")
     def _noise_is_known(self) -> Self:
         if self.errors == "signal" and self.noise_equivalent_contrast is None:
@@ -102,10 +120,12 @@ class Camera(Sensor):
         "signature": "(cells) -> what to add to each cell's signature",
         "darkness": "whether it is too dark to see anything",
     }
+    inputs = CUED_INPUTS
     effects: ClassVar[tuple[Effect, ...]] = (
         DynamicSignature(),
         Visibility(),
         FrameFalseAlarms(),
+        CUED_LOOKS,
     )
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -198,9 +218,25 @@ class Camera(Sensor):
         signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
             signature = signature + added(cells)
-        margin = signature - self.p.threshold
+        margin = signature - self._threshold_of(cells)
         signal = {"pixels": pixels, "contrast": contrast}
         return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
+
+    def _threshold_of(self, cells: Cells) -> Any:
+        """Return the threshold: one for all, or each cell's own where some are cued."""
+        if cells.cued is None or self.p.cued_threshold is None:
+            return self.p.threshold
+        return np.where(cells.cued, self.p.cued_threshold, self.p.threshold)
+
+    def lowest_threshold(self) -> float:
+        """Return the least signature that is ever detected."""
+        if self.p.cued_threshold is None or not self.built("cue"):
+            return float(self.p.threshold)
+        return float(min(self.p.threshold, self.p.cued_threshold))
+
+    def warnings(self) -> list[str]:
+        """Say which cues change nothing."""
+        return [*super().warnings(), *said_of_cues(self)]
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the angles to the target's centre in the picture."""

@@ -44,7 +44,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
         or not rosters
         or adding
         or camera.p.silhouette in ("aspect_table", "sampled_table", "mesh")
-        or camera.p.threshold <= 0
+        or camera.lowest_threshold() <= 0
     ):
         return math.inf
     roster = rosters[0]
@@ -60,4 +60,4 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     )
     gain = camera.p.static_weight * float(np.max(area * roster.column(contrast)))
     pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
-    return math.sqrt(gain / (pixel * camera.p.threshold)) * _MARGIN + _MARGIN_M
+    return math.sqrt(gain / (pixel * camera.lowest_threshold())) * _MARGIN + _MARGIN_M

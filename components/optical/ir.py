@@ -35,6 +35,7 @@ class Infrared(Camera):
     mark = IR
     Parameters = InfraredParameters
     lockstep = True
+    side_by_side = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), BandExtinction(), *Camera.effects)
     ladders = (INFRARED,)

@@ -4,6 +4,7 @@ import numpy as np
 from pydantic import Field
 
 from components.optical.ladder import VISIBLE
+from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, Look
 from components.sensor.marks import EO
 from components.sensor.parameters import SensorParameters
@@ -33,8 +34,14 @@ class OpticalRangeBoundary(Sensor):
 
     mark = EO
     Parameters = CameraBoundaryParameters
+    inputs = CUED_INPUTS
     lockstep = True
+    side_by_side = True
     ladders = (VISIBLE,)
+
+    def setup(self) -> None:
+        """Refuse cues: everything inside the range is seen anyway."""
+        refuse_cues(self)
 
     def look(self, cells: Cells) -> Look:
         """Detect every cell: the gate has kept those out of range away."""

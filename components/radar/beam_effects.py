@@ -10,7 +10,7 @@ from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.radar.beam_sweep import first_illumination, illumination_offset_s
 from components.radar.field_of_view import azimuth_width_rad
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.message import per_row
 
@@ -64,8 +64,13 @@ class Sweep:
         }
         self._ticks_per_s = block.context.ticks_per_s
 
-    def lit(self, targets: RelativeTargets, rows: IntArray) -> LitTargets:
+    def lit(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> LitTargets:
         """Return the targets as the beam meets them, one row per scan.
+
+        Those that lie in a cue cone it meets as the scan begins, if the radar's beam visits such
+        cones first.
 
         Raises
         ------
@@ -92,6 +97,8 @@ class Sweep:
 
         before, _ = block.axes(at_start.body_azimuth_rad, at_start.body_elevation_rad)
         offset_s, met = first_illumination(azimuth_at, before, **self._turn)
+        if cued is not None and block.p.cued_beam_first:
+            offset_s, met = np.where(cued, 0.0, offset_s), met | cued
         azimuth_at(offset_s)
         lit = replace(at_start, **found)
         reason = block.axes.reach(block.reach).decide(

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.clutter_parameters import ClutterParameters
+from components.radar.cued_parameters import CuedRadarParameters
 from components.radar.error_parameters import RadarErrorParameters, SignalErrorParameters
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth
 from components.radar.plausible import implausible
@@ -36,7 +37,9 @@ class Calibration(Parameters):
     )
 
 
-class LinkBudgetParameters(SignalErrorParameters, RadarParameters, TimeBudgetParameters):
+class LinkBudgetParameters(
+    SignalErrorParameters, RadarParameters, TimeBudgetParameters, CuedRadarParameters
+):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
 
     power_w: float = Field(gt=0, description="Transmitted power, W.")
@@ -99,7 +102,16 @@ class LinkBudgetParameters(SignalErrorParameters, RadarParameters, TimeBudgetPar
                 "was stated for? Give dwell_s or pulses_per_dwell"
             )
         check_signal_errors(self)
+        if self.cued_beam_first and not self.beam_sweep:
+            raise ValueError("cued_beam_first is true and beam_sweep is false: no beam sweeps")
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to false alarms that there are not."""
+        said = super().without_effect()
+        if not self.false_alarms:
+            said += self.idle("cell_false_alarm_probability", because="false_alarms is false")
+        return said
 
     @property
     def pulses_summed(self) -> int:

@@ -17,7 +17,7 @@ from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
 from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
@@ -126,8 +126,10 @@ class Radar(Sensor):
         """
         return FASTEST_M_S * (2.0 * uniform - 1.0)
 
-    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
+    def seen(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> tuple[RelativeTargets, IntArray]:
         """Return the targets at the instants at which the beam lights them."""
         if self._sweep is None:
             return targets, rows
-        return self._sweep.lit(targets, rows), np.arange(len(rows))
+        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))

@@ -19,6 +19,7 @@ from components.radar.range_effects import BlindRange
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_budget import unambiguous_range_m
+from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 
@@ -60,6 +61,14 @@ class RangeBoundaryParameters(RadarParameters):
         description="Pulse repetition frequency, Hz; as frequency_hz.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to Doppler processing that there is not."""
+        said = super().without_effect()
+        if self.moving_target_filter == "none" and not self.range_rate_folds:
+            because = "moving_target_filter is 'none' and range_rate_folds is false"
+            said += self.idle("frequency_hz", because=because)
+        return said
+
     @model_validator(mode="after")
     def _carrier(self) -> Self:
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
@@ -95,7 +104,9 @@ class RangeBoundary(Radar):
     """
 
     Parameters = RangeBoundaryParameters
+    inputs = CUED_INPUTS
     lockstep = True
+    side_by_side = True
     hooks = {
         "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
@@ -120,6 +131,7 @@ class RangeBoundary(Radar):
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""
         super().setup()
+        refuse_cues(self)
         (self._clutter_rcs_m2,) = self.built("clutter") or [None]
         (self._cfar,) = self.built("threshold from reference cells") or [None]
 

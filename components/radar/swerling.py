@@ -58,6 +58,19 @@ class SwerlingParameters(LinkBudgetParameters):
         description="How Pd is computed: exactly, by table (error < 1e-6), or by the thesis's "
         "series (error < 0.03; steady targets only).",
     )
+    cued_pulses: int | None = Field(
+        default=None,
+        ge=1,
+        le=1000,
+        description="Pulses integrated non-coherently within a cue cone; by default as usual.",
+    )
+    cued_false_alarm_probability: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="Probability of false alarm per look within a cue cone: a larger one lowers "
+        "the threshold. By default as usual.",
+    )
     reference_pd: float = Field(
         default=0.9, gt=0, lt=1, description="Pd whose SNR is the zero of the confidence."
     )
@@ -84,7 +97,33 @@ class SwerlingParameters(LinkBudgetParameters):
                 f"detection is 'gram_charlier' and swerling is {self.swerling}: the series covers "
                 "steady targets only; set swerling to 0, or fluctuation to 'sampled'"
             )
+        self._check_cued()
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a fluctuation that there is not."""
+        said = super().without_effect()
+        if self.swerling in (0, 5):
+            fading = "fluctuation_correlation_s", "scintillation_extent_m"
+            said += self.idle(*fading, because=f"swerling is {self.swerling}: nothing fluctuates")
+        return said
+
+    def _check_cued(self) -> None:
+        given = [
+            name
+            for name in ("cued_pulses", "cued_false_alarm_probability")
+            if getattr(self, name) is not None
+        ]
+        if given and self.cfar_reference_cells is not None:
+            raise ValueError(
+                f"{given[0]} and cfar_reference_cells are given: Pd with CFAR is that of one "
+                "detector; cue by cued_dwell_factor"
+            )
+        if self.cued_pulses is not None and self.samples_rcs:
+            raise ValueError(
+                "cued_pulses is given and the RCS is sampled for the usual pulses; cue by "
+                "cued_dwell_factor"
+            )
 
     @property
     def samples_rcs(self) -> bool:
@@ -110,6 +149,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     Parameters = SwerlingParameters
     lockstep = True
+    side_by_side = True
     hooks = {
         "RCS": "which Swerling model each cell has",
         "fading": "(cells, chosen, model) -> power of lasting echoes over their mean",
@@ -166,11 +206,10 @@ class SwerlingRadar(LinkBudgetRadar):
         snr, cnr = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
-        pd = np.empty(len(cells))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
-            pd[chosen] = self._pd(snr[chosen], model, None if cnr is None else cnr[chosen])
             confidence[chosen] = snr_db[chosen] - self._reference(model)
+        pd = self._pd_of_cells(cells, snr, cnr)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
         noise = draw >= self._of_target(cells, pd, cnr) if self.p.errors == "signal" else None
@@ -182,10 +221,8 @@ class SwerlingRadar(LinkBudgetRadar):
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
         pfa: Any = self.p.false_alarm_probability
-        if cnr is not None:
-            pfa = np.empty(len(cells))
-            for model, chosen in self.models_in_use(cells):
-                pfa[chosen] = self._pd(np.zeros(len(pfa[chosen])), model, cnr[chosen])
+        if cnr is not None or self._cued_detector(cells) is not None:
+            pfa = self._pd_of_cells(cells, np.zeros(len(cells)), cnr)
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
     def snr(self, cells: Cells) -> FloatArray:
@@ -212,7 +249,38 @@ class SwerlingRadar(LinkBudgetRadar):
         """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
-    def _pd(self, snr: FloatArray, model: int, cnr: FloatArray | None) -> FloatArray:
+    def _cued_detector(self, cells: Cells) -> tuple[int, float] | None:
+        """Return pulses and false alarm probability in cue cones; None where all is as usual."""
+        p = self.p
+        if cells.cued is None or not (p.cued_pulses or p.cued_false_alarm_probability):
+            return None
+        return (
+            p.cued_pulses or p.pulses_summed,
+            p.cued_false_alarm_probability or p.false_alarm_probability,
+        )
+
+    def _pd_of_cells(self, cells: Cells, snr: FloatArray, cnr: FloatArray | None) -> FloatArray:
+        """Return the probability of detection of every cell."""
+        pd = np.empty(len(cells))
+        cued = self._cued_detector(cells)
+        usual = self.p.pulses_summed, self.p.false_alarm_probability
+        for model, chosen in self.models_in_use(cells):
+            clutter = None if cnr is None else cnr[chosen]
+            found = self._pd(snr[chosen], model, clutter, *usual)
+            if cued is not None:
+                inside = cells.is_cued()[chosen]
+                found = np.where(inside, self._pd(snr[chosen], model, clutter, *cued), found)
+            pd[chosen] = found
+        return pd
+
+    def _pd(
+        self,
+        snr: FloatArray,
+        model: int,
+        cnr: FloatArray | None,
+        pulses: int,
+        false_alarm_probability: float,
+    ) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
         p, name = self.p, f"swerling{model}"
         kind = "" if cnr is None else self.context.sections["terrain"].clutter_mean
@@ -222,16 +290,14 @@ class SwerlingRadar(LinkBudgetRadar):
             snr, cnr = snr / (1.0 + cnr), None
         if self.cfar is not None:
             return self.cfar.probability(snr, name)
-        pd = probability_of_cells(
-            snr, p.pulses_summed, p.false_alarm_probability, name, self._method
-        )
+        pd = probability_of_cells(snr, pulses, false_alarm_probability, name, self._method)
         if cnr is None or not cnr.any():
             return pd
         cluttered = np.flatnonzero(cnr)
         pd[cluttered] = clutter_detection_probability(
             snr[cluttered],
             cnr[cluttered],
-            false_alarm_probability=p.false_alarm_probability,
+            false_alarm_probability=false_alarm_probability,
             model=name,
             clutter=kind,
             threshold=p.clutter_threshold,
@@ -244,6 +310,8 @@ class SwerlingRadar(LinkBudgetRadar):
         None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
         moving-target filter.
         """
+        if self.built("cue"):
+            return None
         proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
         if terrain_of(self) is not None or not proven:
             return None

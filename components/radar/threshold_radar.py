@@ -15,6 +15,7 @@ from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
 from components.radar.clutter_alarms import ClutterAlarms
 from components.radar.clutter_effects import GroundClutter, terrain_of
+from components.radar.cued_parameters import dwell_factor
 from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
@@ -36,6 +37,7 @@ from components.radar.resolution_effects import OneReportByCell
 from components.radar.signal_errors import heard, signal_variances
 from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out
+from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect
@@ -49,12 +51,17 @@ class ThresholdParameters(LinkBudgetParameters):
         default=None,
         description="SNR that is detected, dB; by default that of the calibration, or of Pd 0.9.",
     )
+    cued_threshold_db: float | None = Field(
+        default=None,
+        description="SNR that is detected within a cue cone, dB; by default the same.",
+    )
 
 
 class LinkBudgetRadar(Radar):
     """A radar whose decision rests on the SNR of its link budget."""
 
     Parameters = LinkBudgetParameters
+    inputs = CUED_INPUTS
     hooks = {
         "mean RCS": "(cells) -> each cell's mean RCS in m²",
         "energy of a look": "what the time of a scan leaves for each beam",
@@ -74,6 +81,7 @@ class LinkBudgetRadar(Radar):
         ClutterAlarms(),
         TimeBudget(),
         BeamSweep(),
+        CUED_LOOKS,
     )
 
     ladders = (DETECTION, RCS)
@@ -97,6 +105,8 @@ class LinkBudgetRadar(Radar):
         (self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
         (self._clutter_rcs_m2,) = self.built("clutter") or [None]
         (self.cfar,) = self.built("threshold from reference cells") or [None]
+        if self.built("cue") and self.p.cued_dwell_factor is not None:
+            self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
 
     def _without_blind_range(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
@@ -182,6 +192,7 @@ class LinkBudgetRadar(Radar):
             *super().warnings(),
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
+            *said_of_cues(self),
             *self._said_of_false_alarms(),
             *clutter_as_signal(self.p, terrain_of(self)),
         ]
@@ -211,6 +222,7 @@ class ThresholdRadar(LinkBudgetRadar):
 
     Parameters = ThresholdParameters
     lockstep = True
+    side_by_side = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
@@ -227,6 +239,11 @@ class ThresholdRadar(LinkBudgetRadar):
         super().setup()
         if self.cfar is not None:
             self.threshold_db += self.cfar.loss_db(*self._stated_for)
+        self.cued_threshold_db = self.threshold_db
+        if self.p.cued_threshold_db is not None:
+            self.cued_threshold_db = self.p.cued_threshold_db
+            if self.cfar is not None:
+                self.cued_threshold_db += self.cfar.loss_db(*self._stated_for)
 
     def false_alarm_zero_db(self) -> float:
         """Return the threshold."""
@@ -237,9 +254,15 @@ class ThresholdRadar(LinkBudgetRadar):
         snr, cnr = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
-        margin = snr_db - self.threshold_db
+        margin = snr_db - self._threshold_of(cells)
         if cnr is not None and self.p.clutter_threshold == "noise":
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
         return Look(echo & (margin >= 0.0), margin, {"snr_db": snr_db}, heard(snr, cnr))
+
+    def _threshold_of(self, cells: Cells) -> Any:
+        """Return the threshold in dB: one for all, or each cell's own where some are cued."""
+        if cells.cued is None:
+            return self.threshold_db
+        return np.where(cells.cued, self.cued_threshold_db, self.threshold_db)

@@ -87,9 +87,17 @@ class Cells:
         )
         self._flat = place if self._everything else rows[self.row] * width + self.target
         self.target = targets.columns[self.target]
+        #: Which lie in a cone that a cue told of; None where none does.
+        self.cued: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.target)
+
+    def is_cued(self) -> BoolArray:
+        """Return which cells lie in a cone that a cue told of."""
+        if self.cued is None:
+            return np.zeros(len(self), dtype=bool)
+        return self.cued
 
     def __getattr__(self, name: str) -> Any:
         if name[0] == "_":

@@ -28,7 +28,7 @@ from components.sensor.measuring import Measuring
 from components.sensor.mounting import Mounting
 from components.sensor.parameters import SensorParameters
 from components.sensor.skip_counts import counted
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.effect import Effect
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.ports import Input, Output
@@ -61,6 +61,7 @@ class Sensor(Measuring):
     windowed = True
     rewindable = True
     hooks: ClassVar[Mapping[str, str]] = {
+        "cue": "(targets, rows, wake) -> which targets lie in a cue cone at each scan",
         "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
         "strength": "(cells, found, look) -> look: as strong as its detections came out",
         "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
@@ -134,6 +135,10 @@ class Sensor(Measuring):
         return self.built("declaration")
 
     @cached_property
+    def _cueing(self) -> list[Any]:
+        return self.built("cue")
+
+    @cached_property
     def _strengths(self) -> list[Any]:
         return self.built("strength")
 
@@ -141,8 +146,18 @@ class Sensor(Measuring):
     def _reporting(self) -> list[Any]:
         return self.built("report")
 
-    def seen(self, targets: RelativeTargets, rows: IntArray) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets as this sensor sees them, and the row of each scan."""
+    def seen(
+        self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
+    ) -> tuple[RelativeTargets, IntArray]:
+        """Return the targets as this sensor sees them, and the row of each scan.
+
+        Parameters
+        ----------
+        targets : RelativeTargets
+        rows : (scans,)
+        cued : (scans, targets) of bool, optional
+            Which lie in a cue cone.
+        """
         return targets, rows
 
     def look(self, cells: Cells) -> Look:
@@ -160,8 +175,11 @@ class Sensor(Measuring):
         if held is None:
             return None
         self.span_ticks = wake.span_ticks
-        targets, rows = self.seen(*held)
+        cued = self._cueing[0](*held, wake) if self._cueing else None
+        targets, rows = self.seen(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
+        if cued is not None:
+            cells.cued = cued[reason == EVALUATE]
         rows = cells.message_rows
         look = self._idle
         if look is None or len(cells):
@@ -202,7 +220,7 @@ class Sensor(Measuring):
             true_elevation_rad=q,
             true_range_m=r,
             **measured,
-            extras={name: values[found] for name, values in look.extras.items()},
+            extras={name: values[found] for name, values in self._extras(cells, look).items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
             looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,
@@ -210,6 +228,12 @@ class Sensor(Measuring):
         for report in self._reporting:
             detections = report(detections, targets, rows)
         return detections
+
+    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+        """Return what is recorded of each cell beside its detection."""
+        if not self._cueing:
+            return look.extras
+        return {**look.extras, "cued": cells.is_cued()}
 
     def cells(
         self, targets: RelativeTargets, rows: IntArray, wake: Wake

@@ -11,3 +11,4 @@ class ExtendedKalman(Tracker):
     """
 
     lockstep = True
+    side_by_side = True

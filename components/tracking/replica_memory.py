@@ -60,6 +60,14 @@ class Heads:
             self.replica[which], self.next_number[which], self.tick[which], self.origin[:, which]
         )
 
+    def kept_with(self, newer: "Heads") -> "Heads":
+        """Return those of all replicas, as they are in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica))
+        names = ("replica", "next_number", "tick", "origin")
+        both = (np.concatenate([getattr(h, n) for h in (old, newer)], axis=-1) for n in names)
+        whole = Heads(*both)
+        return whole.take(np.argsort(whole.replica, kind="stable"))
+
     def followed_by(self, replica: IntArray, place: FloatArray) -> "Heads":
         """Return those of the replicas of some looks; a new one starts at its first look."""
         found, first = np.unique(replica, return_index=True)

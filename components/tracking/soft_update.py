@@ -83,8 +83,6 @@ def updated_by_all(
         contributors=part.contributors | mask,
         updated_by=np.where(hit, mask, part.updated_by),
         ranged=part.ranged | (ranged & hit),
-        nis=np.full(count, np.nan),
-        freedom=np.zeros(count, dtype=np.int64),
         **named(states, covariances),
     )
     return changed, hit, gain

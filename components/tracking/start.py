@@ -74,7 +74,7 @@ def started(
             "contributors": mask,
             "updated_by": mask,
             "ranged": ranged,
-            "nis": np.nan * ones,
+            "nis": 0.0 * ones,
             "freedom": 0 * whole,
             "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
             "weights": np.full((len(sizes), count), 1.0 / len(sizes)),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from components.estimation.batched import squared_length
 from components.estimation.frame import Place
 from components.estimation.measurement import Kind, expected
 from components.messages.reach import EVALUATE
@@ -82,7 +83,11 @@ def _predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackSt
     states, covariances, weights = rules.bank.predict(
         part.states(), part.covariances(), part.weights, dt_s
     )
-    return part.with_columns(tick=tick, weights=weights, **named(states, covariances))
+    again = dt_s == 0.0  # innovations of one instant add up
+    return part.with_columns(
+        tick=tick, weights=weights, nis=part.nis * again, freedom=part.freedom * again,
+        **named(states, covariances),
+    )  # fmt: skip
 
 
 def looked_at(
@@ -99,13 +104,13 @@ def looked_at(
     """Return tracks after association, and which detections lie in the gate of any."""
     place = places.take(looks[of])
     codes_here = codes[detection]
-    kinds = gated_pairs(
+    kinds, direction = gated_pairs(
         rules, part, of, place, scans, codes_here, detection, of_detection, len(looks)
     )
     gated = np.zeros(len(detection), dtype=bool)
     for one in kinds:
         gated[one.detection] = True
-    looked = _expected_looks(rules, part, of, scans, looks, place)
+    looked = _expected_looks(rules, part, of, scans, looks, place, direction)
     sensors = scans.contributors[detection]
     update = updated_by_all if rules.association == "jpda" else updated_by_one
     changed, hit, gain = update(rules, part, kinds, codes_here, sensors)
@@ -125,7 +130,6 @@ def looked_at(
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),
-        nis=np.where(hit, changed.nis, np.nan), freedom=np.where(hit, changed.freedom, 0),
     )  # fmt: skip
     spread = position_variance(changed)
     ended = changed.ranged & (spread > rules.delete_above_m**2)
@@ -161,6 +165,7 @@ def _expected_looks(
     scans: Scans,
     looks: IntArray,
     place: Place,
+    direction: FloatArray | None,
 ) -> BoolArray:
     """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
     sensors = np.where(scans.tells_misses[looks], scans.sensors[looks], 0)
@@ -168,8 +173,11 @@ def _expected_looks(
     found = np.zeros((len(rules.fields), len(part)), dtype=bool)
     if used == 0:
         return found
-    azimuth, elevation, distance = expected(Kind(True), part.state0, place)
-    distance = np.where(part.ranged, distance, 0.0)
+    azimuth, elevation = (
+        expected(Kind(False), part.state0, place) if direction is None else direction
+    )
+    away = np.sqrt(squared_length(part.state0[:3] - place.position_m))
+    distance = np.where(part.ranged, away, 0.0)
     there = np.ones(len(part), dtype=bool)
     mine = sensors[of]
     sees = seeing(part.vain)

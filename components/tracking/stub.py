@@ -46,6 +46,7 @@ class TrackerStub(Component):
     Parameters = StubParameters
     windowed = True
     lockstep = True
+    side_by_side = True
     rewindable = True
 
     def request(self, port: str) -> str:
@@ -60,7 +61,8 @@ class TrackerStub(Component):
         """Start with no tracks."""
         self._targets: IntArray = np.empty(0, dtype=np.int64)
         self._held: dict[str, Any] = {name: np.empty(0) for name in _HELD}
-        self._replica = 0
+        #: Whose each of them is; replicas ascending.
+        self._replicas: IntArray = np.empty(0, dtype=np.int64)
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
@@ -73,36 +75,87 @@ class TrackerStub(Component):
         if len(updated) == 0:
             return None
         replica = wake.replica[updated]
-        if replica[0] != self._replica:  # another run: nothing is held yet
-            self._targets = self._targets[:0]
-        self._replica = int(replica[-1])
+        passed = self._set_aside(replica, wake)
         targets = _present(self._targets, fused.target, len(fused.roster))
-        pool, start = self._pool(fused)
-        last = np.full((len(updated) + 1, len(targets)), -1, dtype=np.int64)
-        last[0, targets.searchsorted(self._targets)] = np.arange(start)
-        rows: Any = 1
+        pool, held, new = self._pool(fused, np.repeat(replica, counts[updated]))
+        begins = np.concatenate(([True], replica[1:] != replica[:-1]))
+        last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
+        if len(held):
+            first_row = begins.nonzero()[0][np.searchsorted(replica[begins], self._replicas)]
+            last[first_row, targets.searchsorted(self._targets)] = held
+        rows: Any = 0
         if len(updated) > 1:
-            rows = np.repeat(np.arange(1, len(updated) + 1), counts[updated])
-        last[rows, targets.searchsorted(fused.target)] = np.arange(start, start + len(fused.target))
+            rows = np.repeat(np.arange(len(updated)), counts[updated])
+        last[rows, targets.searchsorted(fused.target)] = new
         last = np.maximum.accumulate(last, axis=0)
+        first = new[np.cumsum(counts[updated]) - counts[updated]]
         if replica[0] != replica[-1]:
-            _forget_other_replicas(last, replica, start, counts[updated])
-        at_end = last[-1] >= 0
-        self._targets = targets[at_end]
-        held_at_end = last[-1][at_end]
-        self._held = {name: values[held_at_end] for name, values in pool.items()}
-        first = np.concatenate(([start], start + np.cumsum(counts[updated])[:-1]))
-        return self._tracks(fused, wake.ticks[updated], targets, last[1:], pool, first)
+            # What each row holds of replicas before its own is not its own's.
+            own_from = first.copy()
+            np.minimum.at(own_from, np.searchsorted(replica, self._replicas), held)
+            own_from = np.maximum.accumulate(np.where(begins, own_from, 0))
+            last[last < own_from[:, np.newaxis]] = -1
+        self._remember(last, replica, targets, pool, passed, wake)
+        return self._tracks(fused, wake.ticks[updated], targets, last, pool, first)
 
-    def _pool(self, fused: FusedDetections) -> tuple[dict[str, Any], int]:
-        """Return everything that may be held: what was, then the new entries."""
+    def _set_aside(self, replica: IntArray, wake: Wake) -> Any:
+        """Keep what is held by replicas that are updated now; return what others hold."""
+        here = np.isin(self._replicas, replica if wake.side_by_side else replica[:1])
+        if here.all():
+            return None
+        aside = self._targets[~here], self._replicas[~here], {
+            name: values[~here] for name, values in self._held.items()
+        }  # fmt: skip
+        self._targets, self._replicas = self._targets[here], self._replicas[here]
+        self._held = {name: values[here] for name, values in self._held.items()}
+        return aside if wake.side_by_side else None
+
+    def _remember(
+        self,
+        last: IntArray,
+        replica: IntArray,
+        targets: IntArray,
+        pool: dict[str, Any],
+        aside: Any,
+        wake: Wake,
+    ) -> None:
+        """Hold what each replica, or the last one if the others never come again, holds now."""
+        ends = np.append(replica[1:] != replica[:-1], True).nonzero()[0]
+        if not wake.side_by_side:
+            ends = ends[-1:]
+        row, column = (last[ends] >= 0).nonzero()
+        entry = last[ends][row, column]
+        self._targets, self._replicas = targets[column], replica[ends][row]
+        self._held = {name: values[entry] for name, values in pool.items()}
+        if aside is None:
+            return
+        order = np.argsort(np.concatenate([self._replicas, aside[1]]), kind="stable")
+        self._targets = np.concatenate([self._targets, aside[0]])[order]
+        self._replicas = np.concatenate([self._replicas, aside[1]])[order]
+        for name, values in self._held.items():
+            self._held[name] = np.concatenate([values, aside[2][name]])[order]
+
+    def _pool(
+        self, fused: FusedDetections, replica: IntArray
+    ) -> tuple[dict[str, Any], IntArray, IntArray]:
+        """Return everything that may be held, and the places in it of what was and what is new.
+
+        What was held comes before what is new of the same replica.
+        """
         start = len(self._targets)
         new: dict[str, Any] = {name: getattr(fused, name) for name in _HELD}
         if isinstance(fused, FusedWithPose):
             new |= fused.pose_columns()
+        count = len(replica)
         if start == 0:
-            return new, 0
-        return {name: np.concatenate([self._held[name], new[name]]) for name in new}, start
+            return new, self._targets, np.arange(count)
+        pool = {name: np.concatenate([self._held[name], new[name]]) for name in new}
+        if replica[0] == replica[-1]:
+            return pool, np.arange(start), np.arange(start, start + count)
+        order = np.argsort(np.concatenate([self._replicas, replica]), kind="stable")
+        place = np.empty(start + count, dtype=np.int64)
+        place[order] = np.arange(start + count)
+        return {name: v[order] for name, v in pool.items()}, place[:start], place[start:]
 
     def _tracks(
         self,
@@ -151,13 +204,3 @@ def _present(held: IntArray, new: IntArray, targets: int) -> IntArray:
     there[held] = True
     there[new] = True
     return there.nonzero()[0]
-
-
-def _forget_other_replicas(last: IntArray, replica: IntArray, start: int, counts: IntArray) -> None:
-    """Drop what each row holds from replicas before its own; entries are in order of rows."""
-    first_entry = start + np.cumsum(counts) - counts
-    begins = np.concatenate(([True], replica[1:] != replica[:-1]))
-    own_from = np.maximum.accumulate(np.where(begins, first_entry, 0))
-    own_from[replica == replica[0]] = 0  # what was held before belongs to the first
-    later = last[1:]
-    later[later < own_from[:, np.newaxis]] = -1

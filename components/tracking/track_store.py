@@ -36,8 +36,8 @@ class TrackStore:
         "contributors": np.int64,
         "updated_by": np.int64,
         "ranged": np.bool_,
-        # Normalised innovation squared of the last look, and of how many quantities; NaN and 0
-        # where it did not update the track with one detection.
+        # Normalised innovations squared of the looks at `tick`, and of how many quantities they
+        # are; both 0 where none updated the track with one detection.
         "nis": np.float64,
         "freedom": np.int64,
     }

@@ -92,6 +92,10 @@ class Tracker(Component):
         self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
         self._late, self._early = 0, 0
 
+    def goes_side_by_side(self) -> bool:
+        """Say no where looks are worked on again: one replica's are remembered."""
+        return super().goes_side_by_side() and self.p.late != "rerun"
+
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
         for producer in self.context.producers:
@@ -173,7 +177,9 @@ class Tracker(Component):
             return None
         replica = wake.replica[scans.row]
         heads = self._heads.followed_by(replica, scans.pose[:3])
-        store = self._store.take(np.isin(self._store.replica, heads.replica))
+        store = self._store
+        if not wake.side_by_side:
+            store = store.take(np.isin(store.replica, heads.replica))
         past = self._past
         begin = 0
         before: dict[int, Before] = {}
@@ -220,8 +226,11 @@ class Tracker(Component):
                         plan.row[works[tell]],
                     )
                 )
-        self._heads = heads.take(heads.replica == heads.replica[-1])
-        self._store = store.take(store.replica == heads.replica[-1])
+        if wake.side_by_side:
+            self._heads, self._store = self._heads.kept_with(heads), store
+        else:
+            self._heads = heads.take(heads.replica == heads.replica[-1])
+            self._store = store.take(store.replica == heads.replica[-1])
         self._past = Past.of(scans, memory.get(len(heads.replica) - 1), before, heads.replica[-1])
         if len(plan.look) == 0:
             return None

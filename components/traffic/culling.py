@@ -1,12 +1,13 @@
 """The targets that need moving: those that a sensor may look at during a window."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
-from components.traffic.near_intervals import NearIntervals, near_intervals
+from components.traffic.near_intervals import NearIntervals, near_intervals, range_between
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
@@ -43,8 +44,7 @@ class Culling:
         there = intervals_present_s(targets)
         first, last = own.interval_present()
         self.intervals: NearIntervals = near_intervals(
-            own.at,
-            fleet.each,
+            partial(range_between, own.at, fleet.each),
             closing_speed_mps=max_speeds_mps(targets) + own.max_speed_mps,
             present_s=(np.maximum(there[:, 0], first), np.minimum(there[:, 1], last)),
             reach_m=reach_m,

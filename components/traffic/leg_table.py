@@ -60,6 +60,24 @@ class LegTable:
         table._tables = {straight: flights.table} if count else {}
         return table
 
+    @classmethod
+    def joined(cls, one: LegTable, other: LegTable) -> LegTable:
+        """Return the table of the flights of both, those of `other` after those of `one`."""
+        table = cls.__new__(cls)
+        table._find = PieceSearch.joined(one._find, other._find)
+        for name in ("_start", "_end", "_until", "_pitch", "_roll", "_fixed", "_kind"):
+            both = [getattr(one, name), getattr(other, name)]
+            setattr(table, name, np.concatenate(both, axis=-1))
+        before = np.zeros(len(FORMULAS), dtype=np.int64)
+        for kind, members in one._tables.items():
+            before[kind] = members.shape[1]
+        table._slot = np.concatenate([one._slot, other._slot + before[other._kind]])
+        table._tables = dict(one._tables)
+        for kind, members in other._tables.items():
+            known = [one._tables[kind]] if kind in one._tables else []
+            table._tables[kind] = np.concatenate([*known, members], axis=-1)
+        return table
+
     def state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states of flights (n,), each at a time (n,) of its own, in s."""
         start, until = self._start[aircraft], self._until[aircraft]

@@ -93,22 +93,20 @@ class NearIntervals:
 
 
 def near_intervals(
-    own_at: Callable[[FloatArray], Any],
-    targets_at: Callable[[IntArray, FloatArray], Any],
+    range_at: Callable[[IntArray, FloatArray], FloatArray],
     *,
     closing_speed_mps: FloatArray,
     present_s: tuple[FloatArray, FloatArray],
     reach_m: float,
     end_s: float,
+    of_run: int | None = None,
 ) -> NearIntervals:
     """Find when targets may be within a range of the ownship, between time 0 and an end.
 
     Parameters
     ----------
-    own_at : callable
-        State of the ownship at times (n,).
-    targets_at : callable
-        States of targets (n,) of int, each at a time (n,) of its own.
+    range_at : callable
+        Range from the ownship in m of targets (n,) of int, each at a time (n,) of its own.
     closing_speed_mps : (targets,)
         Largest speed of the target plus that of the ownship.
     present_s : two (targets,)
@@ -116,6 +114,8 @@ def near_intervals(
     reach_m : float
     end_s : float
         Above 0.
+    of_run : int, optional
+        Where the targets are those of many runs: how many each of them has. All in one by default.
 
     Returns
     -------
@@ -132,11 +132,11 @@ def near_intervals(
     while len(target):
         start: FloatArray = piece * length
         half = 0.5 * length
-        range_m = _range_at(own_at, targets_at, target, start + half)
+        range_m = range_at(target, start + half)
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= reach_m + drift)
-        fine = length <= FINEST_S or 2 * len(target) > _MOST_PIECES_PER_TARGET * len(closing)
+        fine = length <= FINEST_S or _too_many(target, of_run or len(closing))
         settled = maybe & ((range_m <= reach_m - drift) | fine)
         found.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
@@ -149,12 +149,29 @@ def near_intervals(
     return _merged(near[some], start[some], end[some])
 
 
-def _range_at(
+def _too_many(target: IntArray, of_run: int) -> BoolArray:
+    """Return for each piece whether its run has become too many of them."""
+    run = target // of_run
+    too_many: BoolArray = 2 * np.bincount(run) > _MOST_PIECES_PER_TARGET * of_run
+    return too_many[run]
+
+
+def range_between(
     own_at: Callable[[FloatArray], Any],
     targets_at: Callable[[IntArray, FloatArray], Any],
     target: IntArray,
     time_s: FloatArray,
 ) -> FloatArray:
+    """Return the range from an ownship to targets (n,), each at a time (n,) of its own, m.
+
+    Parameters
+    ----------
+    own_at : callable
+        State of the ownship at times (m,).
+    targets_at : callable
+        States of targets (n,) of int at times (n,).
+    target, time_s : (n,)
+    """
     times, which = np.unique(time_s, return_inverse=True)
     own, other = own_at(times), targets_at(target, time_s)
     _, _, range_m = line_of_sight(

@@ -24,6 +24,16 @@ class PieceSearch:
         self._steps = int(lengths.max(initial=1) - 1).bit_length()
 
     @classmethod
+    def joined(cls, one: "PieceSearch", other: "PieceSearch") -> "PieceSearch":
+        """Return the search for the paths of both, those of `other` after those of `one`."""
+        search = cls([])
+        search.starts_s = np.concatenate([one.starts_s, other.starts_s])
+        search.first = np.concatenate([one.first, other.first + len(one.starts_s)])
+        search.last = np.concatenate([one.last, other.last + len(one.starts_s)])
+        search._steps = max(one._steps, other._steps)
+        return search
+
+    @classmethod
     def of_one_each(cls, aircraft: int) -> "PieceSearch":
         """Return the search for paths of one piece, which starts at 0."""
         search = cls([])

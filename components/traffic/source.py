@@ -24,6 +24,8 @@ from components.traffic.culling import Culling
 from components.traffic.envelope import TrafficEnvelope, traffic_envelope
 from components.traffic.flight_limits import max_speeds_mps
 from components.traffic.flight_protocols import Trajectory
+from components.traffic.flown_together import FlownTogether
+from components.traffic.replica_flights import flown_by
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_ownship import SteeredOwnship
@@ -34,6 +36,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Output
+from dsa_des.block.replica_runs import ReplicaRuns
 from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
@@ -137,6 +140,28 @@ class TrafficSource(SteeredOwnship):
             self._steered_culling = SteeredCulling(
                 speed_mps, self.targets, self.fleet, look.range_m
             )
+
+    @classmethod
+    def prepare(cls, parameters: Sequence[Any]) -> None:
+        """Do what can be done at once for blocks with these parameters, which will be made."""
+
+    @property
+    def says_truth(self) -> bool:
+        """Whether the truth is recorded."""
+        return self._says_truth
+
+    def together(self, replicas: ReplicaRuns) -> FlownTogether | None:
+        """Return what flies the flights of all replicas, where no other instants are asked for."""
+        terrain = self.context.sections.get("terrain")
+        checked = terrain is not None and (
+            terrain.height_m is not None or terrain.raster is not None
+        )
+        # Where the line of sight was chosen by where the traffic is, each replica chooses.
+        asked = self._offered is not None and self._offered.asked
+        if checked or asked or self._crabbing or self._flights_asked_for:
+            return None
+        flown = flown_by(self, replicas)
+        return None if flown is None else FlownTogether(self, flown, len(replicas))
 
     @property
     def width(self) -> int:

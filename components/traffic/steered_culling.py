@@ -26,6 +26,30 @@ _CELLS_AT_ONCE = 8192
 _RANGE_MARGIN_M = 1.0
 
 
+def closing_speeds_mps(targets_mps: FloatArray, own_mps: Any) -> FloatArray:
+    """Return how fast each target and a steered ownship can come nearer to each other."""
+    closing: FloatArray = (targets_mps + own_mps * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
+    return closing
+
+
+def epochs_of(closing_mps: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return how long an epoch lasts around each ownship, and how near counts at its start.
+
+    Parameters
+    ----------
+    closing_mps : (ownships, targets)
+    reach_m : float
+
+    Returns
+    -------
+    epoch_s : (ownships,)
+    within_m : (ownships, targets)
+    """
+    fastest = np.maximum(closing_mps.max(axis=1, initial=0.0), 1e-3)
+    epoch_s = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
+    return epoch_s, reach_m + closing_mps * epoch_s[:, np.newaxis] + _RANGE_MARGIN_M
+
+
 class SteeredCulling:
     """The targets near an ownship that is steered, by epochs of time.
 
@@ -44,11 +68,9 @@ class SteeredCulling:
         self, own_speed_mps: float, targets: Sequence[Any], fleet: Any, reach_m: float
     ) -> None:
         self.reach_m, self._fleet = reach_m, fleet
-        speeds = max_speeds_mps(targets)
-        closing = (speeds + own_speed_mps * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
-        fastest = max(float(closing.max(initial=0.0)), 1e-3)
-        self.epoch_s = max(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
-        self._within_m = reach_m + closing * self.epoch_s + _RANGE_MARGIN_M
+        closing = closing_speeds_mps(max_speeds_mps(targets), own_speed_mps)
+        epoch_s, within_m = epochs_of(closing[np.newaxis], reach_m)
+        self.epoch_s, self._within_m = float(epoch_s[0]), within_m[0]
         #: By number of the epoch, for one path of the ownship.
         self._near: dict[int, BoolArray] = {}
         self._own: Any = None

@@ -1,4 +1,4 @@
-"""A flight that is told to turn, climb or descend while it is flown."""
+"""A flight that is told to turn, climb or descend, or fly faster or slower, while it is flown."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
 from components.traffic.legs import AnyLeg, Climb, ScriptedTrajectory, Straight, Turn
 
+# Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
+# place is right to 0.0625 m on the way, and exact at the end.
+_SPEED_STEP_S = 0.5
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
+AROUND_S = np.array([-_BASE_S, 0.0, _BASE_S])
 
 
 class SteerableFlight(Protocol):
@@ -60,27 +64,11 @@ class SteeredFlight:
         time_s : float
             Not before an earlier manoeuvre.
         told : Manoeuvre
-            A turn or a change of altitude, which begins and ends at once: without a change of
-            speed along the path's projection, and without acceleration upward.
+            A turn or a change of altitude begins and ends at once: without a change of speed along
+            the path's projection, and without acceleration upward. Speeds change steadily, each
+            without the other.
         """
-        state = self.at(np.array([time_s - _BASE_S, time_s, time_s + _BASE_S]))
-        here = float(state.lat_deg[1]), float(state.lon_deg[1]), float(state.alt_m[1])
-        # Ends of the chord seen from its middle, so that the track is the one there.
-        north, east, _ = line_of_sight_ned(
-            *here, state.lat_deg[[0, 2]], state.lon_deg[[0, 2]], state.alt_m[[0, 2]]
-        )
-        along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
-        legs: list[AnyLeg] = [_leg(told, here[2]), Straight()]
-        part = ScriptedTrajectory(
-            self.name,
-            lat_deg=here[0],
-            lon_deg=here[1],
-            alt_m=here[2],
-            heading_deg=math.degrees(math.atan2(along_east, along_north)),
-            speed_mps=math.hypot(along_north, along_east) / (2.0 * _BASE_S),
-            legs=legs,
-            start_time_s=time_s,
-        )
+        part = flown_from(self.name, self.at(time_s + AROUND_S), time_s, told)
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -103,11 +91,64 @@ class SteeredFlight:
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
 
 
-def _leg(told: Manoeuvre, alt_m: float) -> AnyLeg:
+def flown_from(
+    name: str, around: TrajectoryState, time_s: float, told: Manoeuvre
+) -> ScriptedTrajectory:
+    """Return what is flown from a manoeuvre on.
+
+    Parameters
+    ----------
+    name : str
+    around : TrajectoryState
+        Arrays (3,): where the aircraft would be without it, `AROUND_S` of the time.
+    time_s : float
+    told : Manoeuvre
+    """
+    here = float(around.lat_deg[1]), float(around.lon_deg[1]), float(around.alt_m[1])
+    # Ends of the chord seen from its middle, so that the track is the one there.
+    north, east, _ = line_of_sight_ned(
+        *here, around.lat_deg[[0, 2]], around.lon_deg[[0, 2]], around.alt_m[[0, 2]]
+    )
+    along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
+    speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
+    climb = 0.5 * float(around.alt_m[2] - around.alt_m[0]) / _BASE_S
+    return ScriptedTrajectory(
+        name,
+        lat_deg=here[0],
+        lon_deg=here[1],
+        alt_m=here[2],
+        heading_deg=math.degrees(math.atan2(along_east, along_north)),
+        speed_mps=speed,
+        legs=_legs(told, here[2], speed, climb),
+        start_time_s=time_s,
+    )
+
+
+def _legs(told: Manoeuvre, alt_m: float, speed_mps: float, climb_mps: float) -> list[AnyLeg]:
+    """Return the legs of a manoeuvre from an altitude and speeds, the last one for ever."""
+    if told.speed_mps != 0.0:
+        change = max(told.speed_mps, -speed_mps)
+        means, last_s = _ramp(change, told.acceleration_mps2)
+        legs: list[AnyLeg] = [
+            Straight(duration_s=last_s, speed_mps=speed_mps + v, climb_mps=climb_mps) for v in means
+        ]
+        return [*legs, Straight(speed_mps=speed_mps + change, climb_mps=climb_mps)]
+    if told.vertical_speed_mps != 0.0:
+        means, last_s = _ramp(told.vertical_speed_mps, told.vertical_acceleration_mps2)
+        legs = [Climb(duration_s=last_s, climb_mps=climb_mps + v) for v in means]
+        return [*legs, Climb(climb_mps=climb_mps + told.vertical_speed_mps)]
     if told.climb_m != 0.0:
         rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
-        return Climb(climb_mps=rate_mps, to_alt_m=alt_m + told.climb_m)
-    return Turn(
+        return [Climb(climb_mps=rate_mps, to_alt_m=alt_m + told.climb_m), Straight()]
+    turn = Turn(
         rate_deg_s=math.copysign(math.degrees(told.rate_rad_s), told.turn_rad),
         angle_deg=math.degrees(abs(told.turn_rad)),
     )
+    return [turn, Straight()]
+
+
+def _ramp(change_mps: float, acceleration_mps2: float) -> tuple[list[float], float]:
+    """Return the mean changes over the equal steps of a steady change, and how long each is."""
+    time_s = abs(change_mps) / acceleration_mps2
+    count = max(math.ceil(time_s / _SPEED_STEP_S), 1)
+    return [change_mps * (k + 0.5) / count for k in range(count)], max(time_s / count, 1e-9)

@@ -33,6 +33,7 @@ from dsa_des.time.clock import ClockSpec, parse_rational
 from dsa_des.time.randomness import Stream, Streams
 
 if TYPE_CHECKING:
+    from dsa_des.block.replica_runs import ReplicaRuns, Runner
     from dsa_des.block.wake import Wake
 
 
@@ -41,6 +42,15 @@ def as_written(value: Fraction) -> int | float | str:
     if value.denominator == 1:
         return int(value)
     return float(value) if Fraction(repr(float(value))) == value else str(value)
+
+
+def _in_words(value: Any) -> str:
+    """Return a parameter's value as a sentence holds it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(as_written(value)) if isinstance(value, Fraction) else repr(value)
 
 
 #: An exact rate or time: a number or text such as "30000/1001".
@@ -87,6 +97,27 @@ class Parameters(BaseModel):
         """Refuse numbers that no physics can compute with (`dsa_des.block.limits`)."""
         refuse_extremes(info.field_name or "", value)
         return value
+
+    def without_effect(self) -> list[str]:
+        """Say which keys were given a value that changes nothing, and because of what."""
+        return []
+
+    def idle(self, *keys: str, because: str) -> list[str]:
+        """Return one sentence for each of some keys that is not at its default.
+
+        Parameters
+        ----------
+        *keys : str
+            That have no effect.
+        because : str
+            Which value of another key makes them so.
+        """
+        fields = type(self).model_fields
+        return [
+            f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"
+            for key in keys
+            if getattr(self, key) != fields[key].default
+        ]
 
 
 class ClockedParameters(Parameters):
@@ -209,9 +240,9 @@ class Component:
     #: draws by scan number only, or keeps replicas apart by `Wake.replica`. A class says so of its
     #: own code only: a subclass that does not say it again gets an instance for each replica.
     lockstep: ClassVar[bool] = False
-    #: Whether it keeps what it remembers of each replica apart, so that replicas may go side by
-    #: side: a wake is then a stretch of time of all of them, and the next one comes back to each
-    #: (`Wake.side_by_side`). True also of what remembers nothing. A class says it of its own code.
+    #: Whether replicas may share it in lock step even where they go side by side: a wake is then a
+    #: stretch of time of all of them, and the next one comes back to each (`Wake.side_by_side`), so
+    #: it must remember all of them, or nothing. A class says so of its own code only.
     side_by_side: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -348,13 +379,18 @@ class Component:
             effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
         )
 
-    def keeps_replicas_apart(self) -> bool:
-        """Return whether this block, with the effects built, may serve replicas side by side."""
-        return type(self).side_by_side and all(
-            effect.side_by_side
-            for effect in type(self).effects
-            if effect.name in self.context.effects
-        )
+    def goes_side_by_side(self) -> bool:
+        """Return whether this block, which may serve replicas, may serve them side by side."""
+        return type(self).side_by_side
+
+    def together(self, replicas: "ReplicaRuns") -> "Runner | None":
+        """Return what runs this block for all replicas in lock step, or None: one instance each.
+
+        Asked of a block that cannot be shared as it is, once it is set up. What it returns gets the
+        rows of all replicas, which may go side by side, and gives what each instance would. It must
+        be sure that each of them would ask and offer its neighbours the same as this one does.
+        """
+        return None
 
     def stream(self, purpose: str) -> Stream:
         """Return this block's keyed random numbers for one purpose."""

@@ -45,14 +45,9 @@ class Effect:
     #: of different replicas may come in one call. A subclass says it again for itself.
     lockstep: ClassVar[bool] = False
 
-    #: Whether what it builds remembers nothing from call to call, or keeps it for every replica by
-    #: itself, so that replicas may go side by side. A subclass says it again for itself.
-    side_by_side: ClassVar[bool] = False
-
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         cls.lockstep = vars(cls).get("lockstep", False)
-        cls.side_by_side = vars(cls).get("side_by_side", False)
 
     def verdict(self, block: Any) -> Verdict:
         """Say whether the scene calls for this effect in this block (a `Component`)."""

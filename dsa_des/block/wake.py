@@ -84,13 +84,20 @@ class Wake:
     @property
     def time_s(self) -> FloatArray:
         """Time of each row since the start of the run, s."""
-        ticks = self.ticks % self.span_ticks if self.span_ticks else self.ticks
-        return ticks / self.ticks_per_s
+        return self.own_ticks(self.ticks) / self.ticks_per_s
 
     @property
     def replica(self) -> IntArray:
         """Replica of each row, in order; 0 when only one runs."""
-        return self.ticks // self.span_ticks if self.span_ticks else np.zeros_like(self.ticks)
+        return self.replica_of(self.ticks)
+
+    def replica_of(self, ticks: IntArray) -> IntArray:
+        """Return the replicas that instants belong to."""
+        return ticks // self.span_ticks if self.span_ticks else np.zeros_like(ticks)
+
+    def own_ticks(self, ticks: IntArray) -> IntArray:
+        """Return instants as counted from the start of their own replica."""
+        return ticks % self.span_ticks if self.span_ticks else ticks
 
     def held(self, port: str) -> tuple[Any, IntArray] | None:
         """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""

@@ -18,10 +18,14 @@ def load(
     """Load and check a scene; parameters that were dropped are listed on standard error."""
     path = chosen_file(scene, "scene")
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    if quiet:
-        return loaded
+    if not quiet:
+        say_what_was_done(loaded)
+    return loaded
+
+
+def say_what_was_done(loaded: Scene) -> None:
+    """List on standard error what was done to a scene that its files do not show."""
     for key in loaded.dropped:
         say(f"note: the swap dropped {key}", err=True)
     for note in loaded.notes:
         say(f"note: {note}", err=True)
-    return loaded

@@ -47,6 +47,9 @@ class Recorder:
         self, sinks: Iterable[Sink], *, wanted: Mapping[str, Collection[str]] | None = None
     ) -> None:
         self.sinks = list(sinks)
+        #: Told of every message when it is sent, by block: also of what a window that is undone
+        #: had sent, and before the rows are in their order.
+        self.listeners: list[Callable[[str, Message], None]] = []
         self._wanted = wanted
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
@@ -93,6 +96,8 @@ class Recorder:
         ValueError
             If the message holds a table or a column that no message of the run declares.
         """
+        for listener in self.listeners:
+            listener(block, message)
         if self._wanted is not None and self._pending.keys().isdisjoint(message.recorded):
             return
         for table, columns in message.tables().items():
@@ -111,6 +116,8 @@ class Recorder:
 
     def advance(self, tick: int) -> None:
         """Hand on every row before `tick`; no more of them will come."""
+        if tick <= 0:
+            return
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []

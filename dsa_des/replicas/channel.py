@@ -19,6 +19,9 @@ from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
 from dsa_des.time.timeline import ReplicaTime, first_scan
 
+# So many messages are kept before the last row of each replica is sought in them.
+_MOST_PASSED = 8
+
 
 @dataclass(frozen=True)
 class ReplicaWireFaults(WireFaults):
@@ -53,6 +56,8 @@ class ReplicaChannel(Channel):
     ) -> None:
         super().__init__(source, delay_ticks, faults)
         self._time, self._span = time, time.span_ticks
+        #: What was sampled since `_last` was made.
+        self._passed: list[tuple[IntArray, Message]] = []
 
     def hold(self, message: Message, tick: int) -> None:
         """Make `message` the last arrived one in every replica, as if it had come at `tick`."""
@@ -126,19 +131,39 @@ class ReplicaChannel(Channel):
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds in each replica at each of `ticks`; see `Channel.sample`."""
         new = self.collect(end)
-        held = _in_order([part for part in (self._last, new) if part is not None])
+        if new is not None:
+            self._passed.append(new)
+            rows = last_at_or_before(new[0], ticks)
+            if bool((new[0][rows] == ticks).all()):
+                # What has come at the very instant is held: what was before need not be looked up.
+                if len(self._passed) > _MOST_PASSED:
+                    self._remember(ticks)
+                return new[1], rows
+        if self._last is not None:
+            self._passed.insert(0, self._last)
+        held = _in_order(self._passed)
+        self._passed, self._last = [], held
         if held is None:
             return None
         arrivals, message = held
-        replica = arrivals // self._span
-        if new is not None:
-            ends = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
-            if not self._time.side_by_side:  # those that have passed never come again
-                ends = ends[replica[ends] >= ticks[-1] // self._span]
-            self._last = (arrivals[ends], message.take(ends)) if len(ends) else None
         rows = last_at_or_before(arrivals, ticks)
-        rows[replica[rows] != ticks // self._span] = -1
+        rows[arrivals[rows] // self._span != ticks // self._span] = -1
+        self._remember(ticks)
         return message, rows
+
+    def _remember(self, ticks: IntArray) -> None:
+        """Keep of what has passed the last row of each replica that may ask for it."""
+        held = _in_order(([] if self._last is None else [self._last]) + self._passed)
+        self._passed, self._last = [], None
+        if held is None:
+            return
+        arrivals, message = held
+        replica = arrivals // self._span
+        ends = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
+        if not self._time.side_by_side:  # those that have passed never come again
+            ends = ends[replica[ends] >= ticks[-1] // self._span]
+        if len(ends):
+            self._last = arrivals[ends], message.take(ends)
 
 
 def _in_order(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:

@@ -1,13 +1,11 @@
 """The scan clocks of replicas that run in lock step, as one clock on their common timeline."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from fractions import Fraction
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.time.clock import ScanClock
+from dsa_des.time.clock import ClockSpec, ScanClock
 from dsa_des.time.timeline import ReplicaTime, first_scan
 
 Scans = tuple[IntArray, IntArray]
@@ -20,21 +18,32 @@ class ReplicaClock(ScanClock):
 
     Parameters
     ----------
-    clocks : sequence of ScanClock
+    specs : sequence of ClockSpec
         One for each replica.
+    ticks_per_s : int
     time : ReplicaTime
+    jitter : callable
+        Given a replica's number, returns the draws of its clock's jitter.
     """
 
-    def __init__(self, clocks: Sequence[ScanClock], time: ReplicaTime) -> None:
-        first = clocks[0]
-        self.spec, self.ticks_per_s = first.spec, first.ticks_per_s
-        self.period = min(clock.period for clock in clocks)
-        self._clocks = clocks
+    def __init__(
+        self,
+        specs: Sequence[ClockSpec],
+        ticks_per_s: int,
+        time: ReplicaTime,
+        jitter: Callable[[int], Callable[[IntArray], np.ndarray]],
+    ) -> None:
+        self.spec, self.ticks_per_s = specs[0], ticks_per_s
         self._time = time
-        rates = {replace(clock.spec, offset_s=Fraction(0)) for clock in clocks}
+        rates = {(spec.rate_hz, spec.rate_error_ppm, spec.jitter_s) for spec in specs}
         # Clocks that differ in their offsets only are one array expression.
-        self._alike = len(rates) == 1 and first.spec.jitter_s == 0
-        self._offsets = np.array([clock.offset for clock in clocks], dtype=np.int64)
+        self._alike = len(rates) == 1 and self.spec.jitter_s == 0
+        self._clocks = [
+            ScanClock(spec, ticks_per_s, jitter(number))
+            for number, spec in enumerate(specs[:1] if self._alike else specs)
+        ]
+        self.period = min(clock.period for clock in self._clocks)
+        self._offsets = np.array([spec.offset_s * ticks_per_s for spec in specs], dtype=np.int64)
         self._last = (0, -1, None)
         none = np.empty(0, dtype=np.int64)
         #: Scans read ahead: from, until, and in order of time within the replicas these times,
@@ -48,7 +57,7 @@ class ReplicaClock(ScanClock):
         span, length = self._time.span_ticks, self._time.run_ticks
         first = max(0, start // span)
         last = min(-(-end // span), self._time.replicas)
-        if self._alike and last - first > 1:
+        if self._alike and last > first:
             return self._alike_between(start, end, first, last)
         found: list[Scans] = []
         for replica in range(first, last):
@@ -86,16 +95,19 @@ class ReplicaClock(ScanClock):
         self._read = start, until, own[order], numbers[order], ticks[order]
 
     def _alike_between(self, start: int, end: int, first: int, last: int) -> Scans:
-        clock = self._clocks[first]
+        clock = self._clocks[0]
         earliest = int(self._offsets[first:last].min())
         begin, until = 0, self._time.run_ticks
         if self._time.side_by_side:
-            begin, until = start + clock.offset - int(self._offsets[first:last].max()), end
-        scans, ticks = clock.between(begin, until + clock.offset - earliest)
+            begin, until = start, end
+        elif last - first == 1:
+            first_tick = first * self._time.span_ticks
+            begin, until = max(start - first_tick, 0), min(end - first_tick, until)
+        latest = int(self._offsets[first:last].max())
+        scans, ticks = clock.between(begin + clock.offset - latest, until + clock.offset - earliest)
         replicas = np.arange(first, last, dtype=np.int64)
-        on_line = (replicas * self._time.span_ticks)[:, np.newaxis]
         within = ticks + (self._offsets[first:last] - clock.offset)[:, np.newaxis]
-        on_line = within + on_line
+        on_line = within + (replicas * self._time.span_ticks)[:, np.newaxis]
         numbers = scans + first_scan(1) * replicas[:, np.newaxis]
         if self._time.side_by_side:
             wanted = (within >= start) & (within < end)

@@ -8,10 +8,13 @@ replica as an additional column.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
+from dsa_des.block.replica_runs import ReplicaRuns, Runner
+from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
@@ -90,6 +93,8 @@ class Replicas(Timeline):
         self._report = report
         #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
+        #: What runs blocks for all replicas that differ in more than their clocks.
+        self.together: dict[str, Runner] = {}
         #: By block, which of its parameters are not the same in all replicas.
         self._differing: dict[str, set[str]] = {}
         self._watched: dict[str, WatchedParameters] = {}
@@ -120,11 +125,15 @@ class Replicas(Timeline):
                 f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
                 f"of 64-bit ticks at {self.scene.ticks_per_s} per second"
             )
+        self._faces = components
         for name, component in components.items():
             if not self._shared(name, component):
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
                 make = self._maker(name, component)
+                if (runner := self._together(name, component)) is not None:
+                    self.together[name] = runner
+                    continue
                 self.split[name] = SplitBlock(
                     tuple(component.outputs), make, self._finished,
                     side_by_side=self.time.side_by_side,
@@ -137,7 +146,7 @@ class Replicas(Timeline):
         """Whether one instance serves all replicas."""
         if not component.serves_replicas():
             return False
-        if self.time.side_by_side and not component.keeps_replicas_apart():
+        if self.time.side_by_side and not component.goes_side_by_side():
             return False
         if name in self._watched:
             return not self._watched[name].read
@@ -153,17 +162,34 @@ class Replicas(Timeline):
                 found.update(n for n in fields if getattr(other, n) != getattr(first, n))
         return found
 
-    def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
-        block = self.scene.blocks[name]
+    def _together(self, name: str, face: Component) -> Runner | None:
+        """Return what runs a block for all replicas though they differ, if it offers that."""
+        if self.scene.duration_s is None and face.natural_duration_s() is not None:
+            return None
+        try:
+            return face.together(ReplicaRuns(self._parameters_of(name), partial(self._made, name)))
+        except BaseException as error:
+            if is_ours_to_obey(error):
+                raise
+            return None  # what is wrong with one of them shows when that one is made
 
+    def _parameters_of(self, name: str) -> list[Any]:
+        return [scene.blocks[name].parameters for scene in self._scenes]
+
+    def _made(self, name: str, number: int) -> Component:
+        """Return a block as a replica has it, not set up."""
+        scene, face = self._scenes[number], self._faces[name].context
+        context = Context(
+            Streams(scene.seed), self.scene.ticks_per_s, duration_s=face.duration_s,
+            consumers=face.consumers, producers=face.producers, sections=scene.sections,
+        )  # fmt: skip
+        block = scene.blocks[name]
+        return block.cls(name, block.parameters, context)
+
+    def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
         def make(number: int) -> Component:
-            scene = self._scenes[number]
-            context = Context(
-                Streams(scene.seed), self.scene.ticks_per_s, duration_s=face.context.duration_s,
-                consumers=face.context.consumers, producers=face.context.producers,
-                sections=scene.sections,
-            )  # fmt: skip
-            component = block.cls(name, scene.blocks[name].parameters, context)
+            scene, component = self._scenes[number], self._made(name, number)
+            context = component.context
             self._check_same_length(face, component)
             planned = plan(component, scene.tolerance)
             context.tolerance = unspent(planned, scene.tolerance)
@@ -211,7 +237,12 @@ class Replicas(Timeline):
 
     def clock(self, name: str, component: Component) -> ScanClock | None:
         """Return the clocks of all replicas as one."""
-        found = [component.clock_of(scene.blocks[name].parameters) for scene in self._scenes]
+        found: list[Any] = []
+        known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
+        for parameters in self._parameters_of(name):
+            if id(parameters) not in known:
+                known[id(parameters)] = component.clock_of(parameters)
+            found.append(known[id(parameters)])
         specs = [spec for spec in found if spec is not None]
         if not specs:
             return None
@@ -221,17 +252,18 @@ class Replicas(Timeline):
             for wire in self.scene.wires:
                 if wire.delay_scans and name in (wire.source, wire.target):
                     raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
-        clocks = []
-        for scene, spec in zip(self._scenes, specs, strict=True):
-            draw = Streams(scene.seed).scan_normals(name, "clock jitter")
-            clocks.append(ScanClock(spec, scene.ticks_per_s, draw))
-        clock = ReplicaClock(clocks, self.time)
+
+        def jitter(number: int) -> Callable[[IntArray], FloatArray]:
+            return Streams(self._scenes[number].seed).scan_normals(name, "clock jitter")
+
+        clock = ReplicaClock(specs, self.scene.ticks_per_s, self.time, jitter)
         self._clocks.append(clock)
         return clock
 
     def runner(self, component: Component) -> Any:
         """Return the block, or its instances."""
-        return self.split.get(component.name, component)
+        found = self.together.get(component.name)
+        return self.split.get(component.name, component) if found is None else found
 
     def windows(
         self, longest_ticks: int, cuts: Iterable[int], rewinder: Rewinder | None
@@ -276,6 +308,11 @@ class Replicas(Timeline):
         """Let instances report; a shared block has seen the rows of all and speaks for none."""
         for block in self.split.values():
             block.close(len(self._scenes))
+        if self._report is not None:
+            for name in self.together:
+                make = self._maker(name, components[name])
+                for number in range(len(self._scenes)):
+                    self._finished(number, make(number))
         return {}
 
 

@@ -20,8 +20,8 @@ LONGEST_SLEEP_S = 3600.0
 _SLOWEST, _FASTEST = 1e-6, 1e12
 
 
-def parse_factor(text: str) -> float:
-    """Return the factor of ``--realtime``.
+def parse_factor(text: str, option: str = "--realtime") -> float:
+    """Return the factor of ``--realtime``, or of another option.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def parse_factor(text: str) -> float:
         factor = math.nan
     if not _SLOWEST <= factor <= _FASTEST:
         raise UsageError(
-            f"--realtime {shortened(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
+            f"{option} {shortened(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
             f"{_FASTEST:g}: simulated seconds per second, 1 for the speed of the clock"
         )
     return factor
@@ -58,6 +58,9 @@ class Pacer:
     windows: int = 0
     max_lag_s: float = 0.0
     total_lag_s: float = 0.0
+    #: Whether the run is to end at the instant up to which it has come, and that instant, s.
+    stopped: bool = False
+    time_s: float = 0.0
 
     def __post_init__(self) -> None:
         self._started = self.now()
@@ -73,6 +76,7 @@ class Pacer:
 
     def __call__(self, time_s: float) -> None:
         """Wait for the instant up to which the simulation has come."""
+        self.time_s = time_s
         due = self._started + time_s / self.factor
         while (ahead_s := due - self.now()) > 0.0:
             self.sleep(min(ahead_s, LONGEST_SLEEP_S))
@@ -123,6 +127,8 @@ class PacedWindows:
 
     def next(self) -> Window | None:
         """Return the next window; simulated time 0 is when the first is asked for."""
+        if self._pacer.stopped:
+            return None
         if not self._under_way:
             self._pacer.start()
         self._under_way = True

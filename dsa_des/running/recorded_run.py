@@ -44,6 +44,8 @@ def record_run(
     told: bool = True,
     progress: Callable[[float], None] | None = None,
     draw: bool = True,
+    prepare: Callable[[Simulation], None] | None = None,
+    recorded_as: Scene | None = None,
 ) -> dict[str, Any]:
     """Run a checked scene into the folder `target` and return its summary.
 
@@ -65,6 +67,12 @@ def record_run(
         Called with the simulated time in s after each window, instead of a bar.
     draw : bool
         Whether reports draw their figures.
+    prepare : callable, optional
+        Called with the simulation before it runs: to listen to it, or to hand its blocks what no
+        scene holds.
+    recorded_as : Scene, optional
+        The scene that the folder says it is a run of, where that is another one: which gives the
+        same tables without what `prepare` handed over.
 
     Raises
     ------
@@ -83,6 +91,8 @@ def record_run(
         simulate_everything=simulate_everything,
         check_rewinding=check_rewinding,
     )
+    if prepare is not None:
+        prepare(simulation)
     if told:
         say_if_long(simulation)
     warnings = warnings_of(simulation)
@@ -99,7 +109,7 @@ def record_run(
         # Arrow takes longer to import than most scenes to check: not before all is well.
         from dsa_des.record.arrow import ParquetSink
 
-        scene_text = to_toml(loaded.resolved())
+        scene_text = to_toml((recorded_as or loaded).resolved())
         messages = simulation.recorded_messages()
         said = notes_of(messages, scene_text, loaded.seed, simulation.ticks_per_s)
         tables = ParquetSink(folder, said)
@@ -116,6 +126,8 @@ def record_run(
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
         info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
+        if pacer is not None and pacer.stopped:
+            info["duration_s"], info["stopped"] = pacer.time_s, True
         if warnings:
             info["warnings"] = warnings
         if notes:

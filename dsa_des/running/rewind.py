@@ -4,7 +4,8 @@ In a loop every way back has a delay. A window is run with its feedback wires cu
 had come back before the window began. If then a message turns out to arrive inside the window,
 everything from that instant on was wrong; the run goes back to the window's start and runs it
 again up to that instant, where it was right. Windows start small after such a message and double
-while nothing comes back.
+while nothing comes back; they are never shorter than the delay of what comes back, as within it
+nothing can.
 """
 
 from collections import deque
@@ -71,6 +72,11 @@ class Rewinder:
         if self._trace is not None:
             del self._trace[self._traced :]
 
+    @property
+    def sure_ticks(self) -> int:
+        """How long a window may be in which nothing that is sent in it can come back."""
+        return min((channel.delay_ticks for channel in self._feedback), default=0)
+
     def came_back(self) -> int | None:
         """Return when the first message arrives that came back since `mark` or `restore`."""
         ticks = [channel.earliest_pushed() for channel in self._feedback]
@@ -93,6 +99,7 @@ class RewindingWindows(EqualWindows):
         super().__init__(end_tick, longest_ticks, cuts)
         self._rewinder = rewinder
         self._length = 0
+        self._least = rewinder.sure_ticks
         self._came = 0  # when something came back last
         self._right: Window | None = None  # what is right of a window that was undone
 
@@ -101,7 +108,8 @@ class RewindingWindows(EqualWindows):
         if self._right is not None or self.start >= self.end_tick:
             return self._right
         self._rewinder.mark()
-        return Window(self.start, self.end_after(self._length or self._small()), True)
+        length = max(self._length or self._small(), self._least)
+        return Window(self.start, self.end_after(min(length, self.longest_ticks)), True)
 
     def heard(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
@@ -112,13 +120,13 @@ class RewindingWindows(EqualWindows):
                 # What failed may never have happened: look less far.
                 self._rewinder.restore()
                 middle = int(failure.ticks[len(failure.ticks) // 2])
-                self._length = max(1, min(early, middle) - self.start)
+                self._length, self._least = max(1, min(early, middle) - self.start), 0
                 return None
         elif self._right is None and early < window.end:
             self._rewinder.restore()
             self._right = Window(self.start, early, True)
             return None
-        self._right = None
+        self._right, self._least = None, self._rewinder.sure_ticks
         if back is None:
             self._length = min(2 * (self._length or self._small()), self.longest_ticks)
         else:  # what comes back often comes regularly; at first, or after a hurry, start small
@@ -128,7 +136,8 @@ class RewindingWindows(EqualWindows):
         return super().heard(window, failure)
 
     def _small(self) -> int:
-        return max(1, self.longest_ticks // _RESTART)
+        small = self.longest_ticks // _RESTART
+        return max(1, min(small, self._rewinder.sure_ticks or small))
 
 
 def _copied(state: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,8 +16,10 @@ FIGURES = {
     "polar": ("metric", "axis"),
     "histogram": ("metric", "axis"),
     "cdf": ("metric", "axis"),
+    "series": ("metric", "freedom"),
     "run": ("cell", "replica"),
 }
+_MOST_FREEDOM = 1e6
 _AXES = ("axis", "lines", "x", "y")
 
 
@@ -70,6 +72,12 @@ def read_figures(
                     message = f"must be the number of a {name} of this study: 0 to {most[name] - 1}"
                     add((*key, name), message, value)
                 figure[name] = value
+            elif name == "freedom":
+                degrees = number_of(value)
+                if degrees is None or not 0.0 < degrees <= _MOST_FREEDOM:
+                    message = "must be degrees of freedom: above 0, at most "
+                    add((*key, name), f"{message}{_MOST_FREEDOM:g}", value)
+                figure[name] = degrees
             elif name == "limit":
                 figure["limits"] = _limits(value)
                 if not figure["limits"]:

@@ -22,6 +22,7 @@ from dsa_des.studies.metric import NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.seal import parquet
+from dsa_des.studies.series_figure import draw_series, of_series
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
 from dsa_des.text.safe_text import shortened
@@ -248,6 +249,8 @@ class Tables:
     def _draw_one(self, target: BinaryIO, figure: FigureRecord) -> bool:
         if figure.kind in ("histogram", "cdf"):
             return self._draw_spread(target, figure)
+        if figure.kind == "series":
+            return self._draw_series(target, figure)
         categories = {axis.column for axis in self.record.axes if axis.category}
         places = Places(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
@@ -294,6 +297,26 @@ class Tables:
         draw = draw_histogram if figure.kind == "histogram" else draw_cdf
         title = _shortened(self.record.title if figure.title is None else figure.title)
         draw(target, series, metric, title, mark)
+        return True
+
+    def _draw_series(self, target: BinaryIO, figure: FigureRecord) -> bool:
+        """Draw results whose names differ in a number, one line per place of the axes."""
+        metric = str(figure.metric)
+        known = of_series(metric, [line.result.name for line in self.lines])
+        by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
+        for line in self.lines:
+            if line.result.name in known:
+                by_place.setdefault(line.at, {})[line.result.name] = line
+        series = [
+            (
+                ", ".join(value_label(a, v) for a, v in zip(self.rows.axes, at, strict=True)),
+                list(known.values()),
+                [lines[name] for name in known],
+            )
+            for at, lines in by_place.items()
+        ]
+        title = _shortened(self.record.title if figure.title is None else figure.title)
+        draw_series(target, series, metric, title, self.record.confidence, figure.freedom)
         return True
 
     def telling(self, only: Sequence[str] = ()) -> list[str]:

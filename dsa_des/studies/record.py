@@ -85,7 +85,7 @@ class StopRecord(_Strict):
 class FigureRecord(_Strict):
     """A figure; see `read_figures`."""
 
-    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "run"]
+    kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series", "run"]
     metric: str | None = None
     title: str | None = None
     axis: str | None = None
@@ -93,6 +93,7 @@ class FigureRecord(_Strict):
     x: str | None = None
     y: str | None = None
     limits: list[float] = []
+    freedom: float | None = None
     cell: _Whole = 0
     replica: _Whole = 0
 
@@ -309,7 +310,7 @@ def record_text(study: Study, digest: str) -> str:
         "confidence": study.confidence,
         "interval": study.interval,
         "figures": [
-            {k: v if isinstance(v, int | list) else str(v) for k, v in figure.items()}
+            {k: v if isinstance(v, int | float | list) else str(v) for k, v in figure.items()}
             for figure in study.figures
         ],
         "requirements": [vars(requirement) for requirement in study.requirements],

@@ -286,3 +286,12 @@ def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate
     degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
     half = t_quantile(degrees, confidence) * math.sqrt(one + other)
     return Estimate(value, value - half, value + half, count, count < FEW)
+
+
+def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float]:
+    """Return the interval that holds a chi-square variable with a probability, tails alike."""
+    from scipy.special import gammaincinv
+
+    tail = 0.5 * (1.0 - share)
+    low, high = (2.0 * float(gammaincinv(0.5 * freedom, p)) for p in (tail, 1.0 - tail))
+    return low, high

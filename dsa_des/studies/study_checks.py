@@ -12,6 +12,7 @@ from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import CLASS, NUMBER, SHARE, TRIALS, Metric, Result
+from dsa_des.studies.series_figure import of_series
 from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -120,7 +121,11 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
             message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"
             add(("requirements", number, "metric"), message, wanted.metric)
     for number, figure in enumerate(study.figures):
-        if figure["kind"] != "run" and figure["metric"] not in names:
+        if figure["kind"] == "series":
+            if not of_series(str(figure["metric"]), results):
+                message = "there are no such results with a number behind them (NAME.5, NAME.10)"
+                add(("figures", number, "metric"), message, str(figure["metric"]))
+        elif figure["kind"] != "run" and figure["metric"] not in names:
             message = "no metric of the study gives it"
             message += did_you_mean(str(figure["metric"]), names)
             add(("figures", number, "metric"), message, str(figure["metric"]))

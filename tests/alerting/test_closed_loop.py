@@ -32,3 +32,23 @@ def test_seen_too_late_well_clear_is_lost():
 
 def test_without_a_turn_they_would_have_met():
     assert closest_m("crossing.toml", "blocks.avoidance.level=9") < 40.0
+
+
+def test_a_filter_s_estimates_lead_out_of_the_way():
+    """Its margins make the alert come before that of the truth, which is certain."""
+    found = dsa_des.run(dsa_des.load_scene(CONFIGS / "crossing_tracked.toml"))
+    closest = found.info["summary"]["targets"]["crossing"]["closest_approach"]["range_m"]
+    assert closest > 2 * EN_ROUTE_M
+    first = {
+        block: min(
+            row["time_s"]
+            for row in found.tables["alerts"].to_pylist()
+            if row["block"] == block and row["level"] >= 2
+        )
+        for block in ("alerting", "true_alerting")
+    }
+    assert first["true_alerting"] - 10.0 < first["alerting"] < first["true_alerting"]
+
+
+def test_estimates_that_come_too_late():
+    assert closest_m("crossing_tracked_late.toml") < 0.2 * EN_ROUTE_M

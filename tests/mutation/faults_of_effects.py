@@ -146,7 +146,7 @@ FAULTS = [
          "float(np.min(area * roster.column(contrast)))"),
         ("farthest-without-the-back", 'ends.append(roster.column("ir.back_m2"))', "pass"),
         ("farthest-without-contrast", "np.max(area * roster.column(contrast))", "np.max(area)"),
-        ("farthest-at-threshold-one", "gain / (pixel * camera.p.threshold)", "gain / pixel"),
+        ("farthest-at-threshold-one", "gain / (pixel * camera.lowest_threshold())", "gain / pixel"),
         ("farthest-despite-plumes", "        or adding\n", ""),
         ("farthest-despite-tables",
          'or camera.p.silhouette in ("aspect_table", "sampled_table", "mesh")',

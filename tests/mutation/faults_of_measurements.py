@@ -95,8 +95,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py", _IN_CELL,
-        ("ground-taken-for-the-target", "if cnr is not None:\n            pfa = np.empty",
-         "if False:\n            pfa = np.empty"),
+        ("ground-taken-for-the-target",
+         "if cnr is not None or self._cued_detector(cells) is not None:", "if False:"),
     ),
     *in_file(
         _GROUP, "components/radar/fading.py",
@@ -190,11 +190,10 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/operator/stochastic.py", "wiring/test_operator.py",
-        ("coordinates-every-time", "if self._has_acted:\n", "if False:\n"),
-        ("never-waits", "tick >= self._free_from", "tick >= 0"),
+        ("coordinates-every-time", "if mind.has_acted:\n", "if False:\n"),
+        ("never-waits", "tick >= mind.free_from", "tick >= 0"),
         ("has-acted-for-good",
-         "self._since, self._acts_at, self._has_acted = None, None, False",
-         "self._since, self._acts_at = None, None"),
+         "since=None, acts_at=None, has_acted=False", "since=None, acts_at=None"),
     ),
     *in_file(
         _GROUP, "components/fusion/carried.py", _CARRIED,
@@ -230,5 +229,51 @@ FAULTS = [
          'terrain.height_m or 0.0, "none"'),
         ("dip-of-the-sea", 'cells.of_row("own_alt_m") - surface_m, refraction',
          'cells.of_row("own_alt_m"), refraction'),
+    ),
+    *in_file(
+        _GROUP, "components/radar/swerling.py", "wiring/test_picked_models_are_used.py",
+        ("proof-forgets-filter", ' and self.p.moving_target_filter == "none"', ""),
+    ),
+    *in_file(
+        _GROUP, "components/radar/fading.py", "wiring/test_fluctuation_that_lasts.py::"
+        "test_an_echo_scintillates_as_the_target_is_seen_from_farther_below",
+        ("aspect-bearing-only", " cells.elevation_rad,", " 0.0 * cells.elevation_rad,"),
+    ),
+    *in_file(
+        _GROUP, "components/fusion/pass_through.py", "wiring/test_time_of_measurement.py",
+        ("swept-scan-a-look", "if message.ticks_after is not None:", "if False:"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/wind_effect.py",
+        "wiring/test_wind.py::test_a_replayed_ownship_turns_into_the_wind_where_it_is_steered",
+        ("part-of-steered", "for start_s, part in flight.parts:", "for start_s, part in ():"),
+    ),
+    *in_file(
+        _GROUP, "components/line_of_sight/transform.py",
+        "wiring/test_what_the_earth_hides.py::test_the_limb_and_a_ridge_hide_side_by_side",
+        ("one-kind-only", "[hides(own, other, present) for hides in self._hiding]",
+         "[self._hiding[-1](own, other, present)]"),
+        ("other-kind-only", "[hides(own, other, present) for hides in self._hiding]",
+         "[self._hiding[0](own, other, present)]"),
+        ("heading-by-straight-ray", "other.yaw_rad - seen.azimuth_rad",
+         "other.yaw_rad - self._line_of_sight.from_ownship(own, other).azimuth_rad",
+         "the air bends rays upward, not sideways"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/stochastic.py", "wiring/test_operator.py::"
+        "test_what_is_drawn_is_by_the_decision_not_by_how_often_an_alert_was_seen",
+        ("draws-of-no-decision", "mind = mind._replace(since=since)",
+         "mind = mind._replace(since=since, decisions=mind.decisions + 1)"),
+    ),
+    *in_file(
+        _GROUP, "components/terrain/rays.py",
+        "wiring/test_what_the_earth_hides.py::test_a_steep_ray_is_bent_less_over_a_ridge",
+        ("arch-of-flat", " * np.clip(level, 0.0, 1.0) / (8.0", " / (8.0"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py::"
+        "test_each_cell_of_a_radar_mounted_askew_reports_its_own_ground",
+        ("ground-alarm-beam-axis", "(number + self._draws.uniform(key, scan, draw)) * size",
+         "(number + 0.5) * size"),
     ),
 ]  # fmt: skip

@@ -12,6 +12,8 @@ _AIRCRAFT = "wiring/test_aircraft_keys.py"
 _HOST = "wiring/test_host_plane_keys.py"
 
 _BANDS = "wiring/test_infrared_bands_and_night.py"
+_CUES = "wiring/test_cue_keys.py"
+_FUSED = "wiring/test_fused_track_keys.py"
 _EARTH = "wiring/test_what_the_earth_hides.py"
 
 FAULTS = [
@@ -88,7 +90,7 @@ FAULTS = [
          "signature = self.p.dynamic_weight * pixels * contrast"),
         ("picture-of-one-row", "float(self.p.azimuth_pixels * self.p.elevation_pixels)",
          "float(self.p.azimuth_pixels * self.p.azimuth_pixels)"),
-        ("threshold-ignored", "margin = signature - self.p.threshold", "margin = signature - 1.0"),
+        ("threshold-ignored", "            return self.p.threshold\n", "            return 1.0\n"),
         ("whole-circle-of-pixels", "width = sector_width_rad(*self.reach.azimuth_rad)",
          "width = 2.0 * 3.141592653589793"),
     ),
@@ -230,10 +232,10 @@ FAULTS = [
         ("alarms-measured-from-another-model",
          "return self._reference((self.p.swerling or 0) % 5)", "return self._reference(0)"),
         ("detected-above-pd", "Look(echo & (draw < pd)", "Look(echo & (draw > pd)"),
-        ("pulses-ignored", "snr, p.pulses_summed, p.false_alarm_probability, name, self._method",
-         "snr, 1, p.false_alarm_probability, name, self._method"),
-        ("model-ignored", "snr, p.pulses_summed, p.false_alarm_probability, name, self._method",
-         'snr, p.pulses_summed, p.false_alarm_probability, "swerling1", self._method'),
+        ("pulses-ignored", "snr, pulses, false_alarm_probability, name, self._method",
+         "snr, 1, false_alarm_probability, name, self._method"),
+        ("model-ignored", "snr, pulses, false_alarm_probability, name, self._method",
+         'snr, pulses, false_alarm_probability, "swerling1", self._method'),
         ("sampled-for-one-pulse", 'pulses=self.p.pulses_summed, model=f"swerling{model}"',
          'pulses=1, model=f"swerling{model}"'),
         ("clutter-mean-ignored", 'else self.context.sections["terrain"].clutter_mean',
@@ -515,5 +517,67 @@ FAULTS = [
          "_grid(self._elevation_step, limit_low=low, limit_high=high)",
          "_grid(self._azimuth_step, limit_low=low, limit_high=high)"),
         ("range-not-on-its-grid", "self._range_grid.round(range_m)", "range_m"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/cued_looks.py", (_CUES, "tracking/test_cued_declaration.py"),
+        ("cones-stand-still", "time_s - cones.state_s[entry],", "0.0 * time_s,"),
+        ("cones-never-end", "live = time_s <= cones.until_s[entry]",
+         "live = time_s <= np.inf + 0.0 * cones.until_s[entry]"),
+        ("cones-of-half-the-angle", "np.cos(cones.half_angle_rad[entry])",
+         "np.cos(60.0 * cones.half_angle_rad[entry])"),
+        ("cones-see-below-as-above", "along -= axis[2][:, np.newaxis]",
+         "along += axis[2][:, np.newaxis]"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/cues.py", _CUES,
+        ("cones-of-the-state-s-instant", "lasts_s**2 * covariance[3:, 3:]",
+         "0.0 * covariance[3:, 3:]"),
+        ("cues-as-often-as-tracks", "tick - self._last_tick < self._every_ticks",
+         "tick - self._last_tick < 0"),
+        ("all-tracks-cue", "if not self.p.tentative:", "if False:"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/swerling.py", _CUES,
+        ("cued-by-the-usual-pulses", "p.cued_pulses or p.pulses_summed,", "p.pulses_summed,"),
+        ("cued-whoever-it-is", "np.where(inside, self._pd(", "np.where(True, self._pd("),
+    ),
+    *in_file(
+        _GROUP, "components/radar/beam_effects.py", _CUES,
+        ("beam-never-first", "block.p.cued_beam_first:", "False:"),
+    ),
+    *in_file(
+        _GROUP, "components/track_fusion/covariance_intersection.py",
+        (_FUSED, "track_fusion/test_same_bytes_of_fused_tracks.py"),
+        ("frame-of-the-last-tracker", "if row[entry] < first[place]:",
+         "if row[entry] <= first[place]:"),
+        ("silent-tracks-stay", "when - local.updated_s > self.p.drop_after_s",
+         "when - local.updated_s > 1e9"),
+        ("not-carried-on", "found = fused_states(mine, when, ",
+         "found = fused_states(mine, mine.time_s, "),
+    ),
+    *in_file(
+        _GROUP, "components/estimation/frame_change.py",
+        ("track_fusion/test_intersection.py", _FUSED),
+        ("frames-only-shifted", "return times(self.turn, vector)", "return vector + 0.0"),
+        ("covariance-not-turned", "product_transposed(block, self.turn)",
+         "covariance[i : i + 3, j : j + 3]"),
+    ),
+    *in_file(
+        _GROUP, "components/estimation/covariance_intersection.py",
+        ("track_fusion/test_intersection.py", _FUSED),
+        ("always-half-and-half", "return np.where(ends_high, 1.0, np.where(ends_low, 0.0, weight))",
+         "return np.full(count, 0.5)"),
+        ("trace-of-the-whole", "cost = turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2",
+         "cost = (turned**2).sum(axis=0)"),
+    ),
+    *in_file(
+        _GROUP, "components/track_fusion/matching.py", _FUSED,
+        ("bearings-at-another-instant", "then[:3] += back_s * state[3:]",
+         "then[:3] += 0.0 * state[3:]"),
+        ("once-together-always", "share > rules.stay_factor**2", "share > np.inf"),
+    ),
+    *in_file(
+        "clocks", "dsa_des/running/rewind.py", "tracking/test_cued_declaration.py",
+        ("loops-start-anywhere", "self._rewinder.sure_ticks or small", "small"),
     ),
 ]  # fmt: skip

@@ -53,6 +53,7 @@ def common(dice: Dice, table: dict[str, Any]) -> None:
         table["misalignment_deg"] = dice.pick([0.5, -0.2, 0], [0, 0, 3], [10, 10, 10])
     if dice.chance(0.25, "declaration m of n"):
         table["declare_m"], table["declare_n"] = dice.pick((1, 1), (1, 3), (2, 3), (3, 5))
+        dice.maybe(table, "declare_by", 0.5, "place", "target")
     if dice.chance(0.03, "sensor switched off"):
         table["enabled"] = False
     if dice.chance(0.25, "stated errors"):

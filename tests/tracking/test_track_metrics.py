@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.metrics.set_distances import chi_square_bounds, set_distance
+from components.metrics.set_distances import set_distance
 from components.metrics.track_tally import changes
+from dsa_des.studies.statistics import chi_square_bounds
 
 
 def enumerated(distance, cutoff, order):

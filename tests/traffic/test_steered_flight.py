@@ -69,3 +69,36 @@ def test_it_climbs_by_the_change_at_the_rate_and_levels_off(climb_m):
     assert state.alt_m - start == pytest.approx(wanted, abs=0.02)
     straight = STRAIGHT.at(np.array([20.0, 30.0, done_s, done_s + 50.0]))
     assert state.yaw_rad == pytest.approx(straight.yaw_rad, abs=1e-6)
+
+
+@pytest.mark.parametrize("change", [-37.0, 12.3])
+def test_a_speed_changes_steadily(change):
+    """North of the start by v t + a t² / 2 until the speed is there, then with that speed."""
+    climbing = ScriptedTrajectory(
+        "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=0.0, speed_mps=60.0,
+        climb_mps=5.0,
+    )  # fmt: skip
+    ends_s = abs(change) / 1.5
+    for told, flown in (
+        (Manoeuvre(speed_mps=change, acceleration_mps2=1.5), "north"),
+        (Manoeuvre(vertical_speed_mps=change, vertical_acceleration_mps2=1.5), "up"),
+    ):
+        times = np.linspace(0.0, ends_s + 20.0, 173)
+        state = SteeredFlight(climbing).steered(10.0, told).at(10.0 + times)
+        north, east, _ = line_of_sight_ned(
+            52.0, 4.0, 1000.0, state.lat_deg, state.lon_deg, np.full(len(times), 1000.0)
+        )
+        gone = math.copysign(1.5, change) * (
+            0.5 * np.minimum(times, ends_s) ** 2 + ends_s * np.maximum(times - ends_s, 0.0)
+        )
+        along = 600.0 + 60.0 * times + (gone if flown == "north" else 0.0)
+        up = 1050.0 + 5.0 * times + (gone if flown == "up" else 0.0)
+        assert np.abs(state.alt_m - up).max() < 0.07
+        assert np.abs(east).max() < 0.01
+        assert np.abs(north - along).max() < 0.35 + 0.07  # geodesic at altitude against chord
+
+
+def test_a_speed_does_not_become_negative():
+    told = Manoeuvre(speed_mps=-80.0, acceleration_mps2=4.0)
+    state = SteeredFlight(STRAIGHT).steered(0.0, told).at(np.array([16.0, 50.0]))
+    assert state.lon_deg[0] == state.lon_deg[1]

@@ -143,3 +143,62 @@ def test_it_climbs_out_of_the_band_of_altitudes(tmp_path):
     )
     assert beyond["time_s"] == to_edge["time_s"]
     assert beyond["climb_m"] == pytest.approx(to_edge["climb_m"] - 37.0)
+
+
+def across(tmp_path: Path, **keys: Any) -> Any:
+    """From the right, 400 m below and climbing to us: at our place after 100 s."""
+    found = scene(tmp_path, level=1, **keys)
+    heading = math.radians(217 - 90)
+    found["blocks"]["traffic"]["intruders"] = [{
+        "name": "across", "up_m": 30.0, "heading_deg": 127.0, "speed_mps": 60.0, "climb_mps": 0.5,
+        **{k: v - 6000.0 * f(heading) for (k, v), f in zip(
+            ahead(5000.0, 0.0).items(), (math.sin, math.cos), strict=True)},
+    }]  # fmt: skip
+    return found
+
+
+@covers("manoeuvre", "beyond_mps", of=KIND)
+@pytest.mark.parametrize("kind", ["speed", "vertical_speed"])
+def test_it_changes_a_speed_out_of_the_band(tmp_path, kind):
+    """The change is at least what a straight flight needs that flies so from then on."""
+    to_edge, beyond = (
+        rows(run(across(tmp_path, manoeuvre=kind, beyond_mps=v)), "manoeuvres")[0]
+        for v in (0.0, 3.5)
+    )
+    name = f"{kind}_mps"
+    assert to_edge["turn_rad"] == to_edge["climb_m"] == 0.0
+    others = {"speed_mps", "vertical_speed_mps"} - {name}
+    assert all(to_edge[other] == 0.0 for other in others)
+    change = to_edge[name]
+    assert beyond["time_s"] == to_edge["time_s"]
+    assert beyond[name] == pytest.approx(change + math.copysign(3.5, change))
+    left_s = 100.0 - to_edge["time_s"]
+    if kind == "speed":
+        # They pass at right angles: what comes late or early by t passes at 60 t sin(angle).
+        late_m = abs(change) * left_s * 60.0 / math.hypot(60.0, 50.0 + change)
+        assert to_edge["acceleration_mps2"] == 2.0
+        assert 500.0 < late_m < 900.0
+    else:
+        # 30 m above us: 80 m of height apart, while within 500 m.
+        assert to_edge["vertical_acceleration_mps2"] == pytest.approx(0.25 * 9.80665)
+        assert change < 0.0 and 50.0 < -change * (left_s - 7.0) < 120.0
+
+
+@pytest.mark.parametrize("kind", ["speed", "vertical_speed"])
+def test_speeds_that_are_told_are_flown(tmp_path, kind):
+    """By the recorded truth: along the track or upward, faster than before by what was told."""
+    loop = across(tmp_path, manoeuvre=kind)
+    loop["duration_s"] = 60
+    found = run(loop)
+    told = rows(found, "manoeuvres")
+    assert len(told) == 1
+    flown = [row for row in rows(found, "truth") if row["target"] is None]
+    first, last = flown[0], flown[-1]
+
+    def speeds(row: dict[str, float]) -> tuple[float, float]:
+        level = math.hypot(row["velocity_north_m_s"], row["velocity_east_m_s"])
+        return level, -row["velocity_down_m_s"]
+
+    level, climb = 50.0 + told[0]["speed_mps"], 0.5 + told[0]["vertical_speed_mps"]
+    assert speeds(first) == pytest.approx((50.0, 0.5), abs=0.01)
+    assert speeds(last) == pytest.approx((level, climb), abs=0.02)

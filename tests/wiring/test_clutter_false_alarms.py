@@ -9,7 +9,7 @@ import crooked
 import numpy as np
 import pytest
 from covering import LINK_BUDGETS
-from scipy.stats import binom, chi2, ncx2, norm
+from scipy.stats import binom, chi2, kstest, ncx2, norm
 from wired import alone, chain, rows, run, sensor
 
 import dsa_des
@@ -128,17 +128,21 @@ def test_each_cell_of_a_radar_mounted_askew_reports_its_own_ground(mean):
         terrain={**TERRAIN, "clutter_mean": mean}, duration_s=scans / 100,
     )))  # fmt: skip
     believed = crooked.rotation(29.0, -25.0, -13.0)
-    seen, beyond = np.zeros(COUNTS), []
+    seen, beyond, within = np.zeros(COUNTS), [], []
     for row in found:
         line = believed @ crooked.direction(row["azimuth_rad"], row["elevation_rad"])
         azimuth, elevation = np.degrees(crooked.angles(line))
-        cell = (azimuth + 10.0) // 3.0, (elevation + 24.0) // 6.0, row["range_m"] // 300.0 - 4.0
+        cell = (azimuth + 10.0) / 3.0, (elevation + 24.0) / 6.0, row["range_m"] / 300.0 - 4.0
         seen[tuple(int(number) for number in cell)] += 1
+        within.append([number % 1.0 for number in cell])
         beyond.append(10.0 ** (0.1 * row["snr_db"]) + 1.0 + math.log(pfa))
     assert expected.max() > 20.0 * expected.min()
     off = np.sum((seen - expected) ** 2 / variance)
     assert chi2.ppf(0.005, seen.size) < off < chi2.ppf(0.995, seen.size)
     assert min(beyond) > -1e-9
+    # Anywhere in their cells, not on the beam's axis.
+    for places in np.transpose(within):
+        assert kstest(places, "uniform").pvalue > 0.001
     if mean == "fluctuating":
         # What is beyond the threshold of an exponential power has the mean of that power.
         wanted = scans * np.sum(pfa + ground * (1.0 + cnr))

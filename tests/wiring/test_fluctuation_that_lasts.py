@@ -184,6 +184,24 @@ def test_an_echo_scintillates_as_the_target_turns(turned, extent_m):
     assert np.corrcoef(np.nan_to_num(seen))[0, 1] == pytest.approx(expected, abs=0.13)
 
 
+def test_an_echo_scintillates_as_the_target_is_seen_from_farther_below():
+    """Targets 2.2 m higher: nothing turns, the line of sight rises by 0.05 deg."""
+    extent_m, count, seen, sides = 4.0, 400, [], []
+    for more_m in (0.0, 2.2):
+        targets = [{**target, "up_m": target["up_m"] + more_m} for target in formation(count)]
+        radar = {**RADAR, **LOUD, "scintillation_extent_m": extent_m, "scan_rate_hz": 1}
+        found = rows(dsa_des.run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
+        by_name = {row["target"]: 10.0 ** (0.1 * row["snr_db"]) for row in found}
+        seen.append([by_name.get(target["name"], 0.0) for target in targets])
+        sides.append([crooked.ned(target) for target in targets])
+    one, other = (np.array(side) / np.linalg.norm(side, axis=1)[:, np.newaxis] for side in sides)
+    apart = np.linalg.norm(one - other, axis=1)
+    wavelength_m = 299_792_458.0 / 35e9
+    expected = float(np.mean(ball(2.0 * math.pi * extent_m / wavelength_m * apart) ** 2))
+    assert 0.1 < expected < 0.5
+    assert np.corrcoef(seen)[0, 1] == pytest.approx(expected, abs=0.2)
+
+
 def test_who_is_seen_from_one_side_does_not_scintillate():
     still = power(scintillation_extent_m=0.5, count=40, duration_s=2)
     assert np.nanvar(still[0]) > 0.3

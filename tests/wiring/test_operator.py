@@ -11,6 +11,8 @@ from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
 
 from components.operator.pilot_model import CLIMB, TURN, Draws, response_s, steering
+from dsa_des import load_scene
+from dsa_des.errors import SceneError
 
 KIND = ("operator.stochastic",)
 FIXED = {"deterministic": True, "turn_share": 1.0, "level": 1}
@@ -85,6 +87,13 @@ def test_drawn_pilots_differ_and_each_is_the_same_again(tmp_path):
     assert all(told["time_s"] - began >= 4.0 for began, told in drawn)
 
 
+def test_what_is_drawn_is_by_the_decision_not_by_how_often_an_alert_was_seen(tmp_path):
+    """The first decision of a pilot who waits longer to see it is drawn alike, so much later."""
+    keys = {"deterministic": False, "coordination_s": 0.0}
+    told = [first(tmp_path, held_s=held_s, **keys)[1]["time_s"] for held_s in (0.0, 1.0, 3.0)]
+    assert [time_s - told[0] for time_s in told] == [0.0, 1.0, 3.0]
+
+
 def test_an_alert_that_ends_is_not_acted_on(tmp_path):
     found = scene(tmp_path, initial_delay_s=200.0)
     assert rows(run(found), "manoeuvres") == []
@@ -157,3 +166,10 @@ def test_the_side_is_the_smaller_one_four_times_of_five():
     assert steering((-math.inf, 0.2), True, Draws(0.9, 0.0, 0.5)) > 0.0
     assert steering((-math.inf, math.inf), True, None) == 0.0
     assert steering((-10.0, 20.0), False, None) == pytest.approx(-10.0 - CLIMB.fixed)
+
+
+def test_a_turn_that_no_flight_can_have_is_refused_before_the_run(tmp_path):
+    with pytest.raises(SceneError, match=r"turn_rate_deg_s.*greater than or equal to 0.1"):
+        load_scene(scene(tmp_path, turn_rate_deg_s=0.001))
+    with pytest.raises(SceneError, match=r"turn_rate of its configuration is 0.001 deg/s"):
+        run(by_bands(tmp_path, rate_deg_s=0.001))

@@ -33,3 +33,16 @@ def test_what_is_picked_is_what_it_would_be_by_name():
         {"model": picked["earth"], "attitude": "exact"},
     ):
         assert looked(**other)[0] != named
+
+
+def test_nothing_is_proven_of_ranges_behind_a_moving_target_filter():
+    """Its gain follows range rates, which no bound of Pd over range knows."""
+    models = {}
+    for kind in ("none", "double_canceller"):
+        radar = sensor("radar.swerling", range_km=5.0, elevation_deg=[-20, 20],
+                       azimuth_deg=[-170, 170], moving_target_filter=kind, prf_hz=20e3)  # fmt: skip
+        scene = chain({"radar": radar}, ownship=NEARLY_LEVEL, targets=FAR)
+        scene["accuracy"] = {"angle_deg": 3.0, "range_m": 200.0, "detection_probability": 0.3}
+        scene["blocks"]["transform"] |= {"model": "auto"}
+        models[kind] = run(scene).summary["models"]["transform"]["earth"]
+    assert models["none"] != "ellipsoid" == models["double_canceller"]

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from wired import HEARS_ALL, SEES_ALL, chain, measured, rows, run, sensor
 
+from components.fusion.pass_through import PassThrough
+
 STUB = {"type": "tracking.stub"}
 LATE = {**HEARS_ALL, "scan_rate_hz": 2, "latency_s": 0.3}
 EYE = {**SEES_ALL, "scan_rate_hz": 5, "latency_s": 0.04}
@@ -126,3 +128,18 @@ def test_windows_and_single_scans_agree_on_late_rows():
         Simulation(loaded, window=window, recorder=Recorder([sink])).run()
         tables.append(sink.tables())
     assert tables[0] == tables[1] == tables[2]
+
+
+def test_a_sweeping_radar_s_scan_is_told_as_no_look(monkeypatch):
+    """It has no one instant; that of a radar that stares is told, scan by scan."""
+    told, as_it_is = [], PassThrough.run
+
+    def noted(self, wake):
+        fused = as_it_is(self, wake)
+        told.extend(fused.sensors[index] for index in fused.looks.sensor)
+        return fused
+
+    monkeypatch.setattr(PassThrough, "run", noted)
+    sensors = {"sweeps": {**HEARS_ALL, "beam_sweep": True}, "stares": HEARS_ALL}
+    run(chain(sensors, duration_s=3, fusion={"type": "fusion.pass_through"}))
+    assert told == ["stares"] * 3

@@ -7,6 +7,7 @@ import crooked
 import numpy as np
 import pymap3d
 import pytest
+from covering import covers
 from wired import chain, measured, rows, run
 
 from components.metrics.coverage import Coverage
@@ -73,7 +74,7 @@ def test_a_look_that_updates_nothing_has_no_innovation():
     short = {**RADAR, "range_km": 2.3}
     both = run(scene({"radar": short, "camera": camera}, 2, crooked.TARGETS))
     told = rows(both, "state_tracks")
-    assert {row["nis_freedom"] for row in told} == {0, 2, 3}
+    assert {row["nis_freedom"] for row in told} == {0, 2, 3, 5}  # 5: both at once
     assert all((row["nis"] is None) == (row["nis_freedom"] == 0) for row in told)
     joint = rows(run(scene({"radar": RADAR}, association="jpda")), "state_tracks")
     assert {row["nis"] for row in joint} == {None}
@@ -135,3 +136,20 @@ def test_coverage_is_entered_where_range_and_field_say():
         assert result["track_confirmed_share"] == 1.0
     never = load_scene(scene({"radar": {**RADAR, "range_km": 0.5}}, 3, (crooked.DIVING,)))
     assert Coverage(never).entered_s(0.5) == {}
+
+
+@covers("series_s", of=("[metric tracking]",))
+def test_a_series_has_the_last_comparison_of_each_stretch():
+    """Against a run of as many comparisons as stretches, whose mean is of that one."""
+    keys = {"metric": "tracking", "step_s": 0.5}
+    found = measured(scene({"radar": RADAR}, 4), {**keys, "series_s": 2.0})
+    ends = [name for name in found if name.startswith("track_nees.time_s.")]
+    assert ends == ["track_nees.time_s.2", "track_nees.time_s.4"]
+    last = measured(scene({"radar": RADAR}, 4), {**keys, "from_s": 4.0})
+    assert found["track_nees.time_s.4"] == pytest.approx(last["track_nees_mean"])
+    named = measured(scene({"radar": RADAR}, 4), {**keys, "series_s": 4.0, "block": "tracker"})
+    assert named["track_nees.time_s.tracker.4"] == found["track_nees.time_s.4"]
+    with pytest.raises(Exception, match="is shorter than step_s"):
+        measured(scene({"radar": RADAR}), {**keys, "series_s": 0.1})
+    with pytest.raises(Exception, match="makes 0 stretches of the run"):
+        measured(scene({"radar": RADAR}), {**keys, "series_s": 9.0})

@@ -164,6 +164,43 @@ def test_bent_rays_pass_a_ridge_that_straight_ones_do_not(horizon, tmp_path):
         assert {row["target"] for row in found} == expected
 
 
+def test_a_steep_ray_is_bent_less_over_a_ridge(tmp_path):
+    """The arch is that of the ray's level part: 0.6 of what a level ray of its length has."""
+    alt_m, share = 15_000.0, (179.9997 - 179.9) / (179.9997 - 179.8)
+    there = pymap3d.geodetic2ned(OWN["lat_deg"], -179.8, alt_m, OWN["lat_deg"], OWN["lon_deg"],
+                                 1000.0)  # fmt: skip
+    length_m, level_m = float(np.linalg.norm(there)), float(np.hypot(*there[:2]))
+    flat_m = 0.25 * length_m**2 * share * (1.0 - share) / (2.0 * R)
+    bent_m = flat_m * (level_m / length_m) ** 2
+    assert flat_m - bent_m > 0.8
+    over = line_over_the_crest_m(alt_m)
+    crest = round(over)
+    own = {**OWN, "alt_m": 1000.0}
+    for stands_m, seen in ((0.5 * (flat_m + bent_m), False), (0.75 * bent_m, True)):
+        terrain = {"raster": wall(tmp_path, crest), "raster_offset_m": over + stands_m - crest,
+                   "refraction": "four_thirds"}  # fmt: skip
+        found = rows(run(chain({"radar": RADAR}, ownship=own, terrain=terrain,
+                               targets=[behind_the_wall(alt_m, "high")])))  # fmt: skip
+        assert bool(found) is seen
+
+
+def test_the_limb_and_a_ridge_hide_side_by_side(tmp_path):
+    own = {**OWN, "alt_m": 1000.0}
+    targets = [behind_the_wall(100.0, "behind the ridge"),
+               far("behind the limb", 250e3, 300.0, bearing_deg=300.0),
+               far("free", 9e3, 1500.0, bearing_deg=300.0)]  # fmt: skip
+    seen = {}
+    for ridge, limb in ((True, True), (True, False), (False, True)):
+        terrain = {"horizon": limb}
+        if ridge:
+            terrain["raster"] = wall(tmp_path, 900)
+        found = rows(run(chain({"radar": RADAR}, ownship=own, targets=targets, terrain=terrain)))
+        seen[ridge, limb] = {row["target"] for row in found}
+    assert seen[True, True] == {"free"}
+    assert seen[True, False] == {"free", "behind the limb"}
+    assert seen[False, True] == {"free", "behind the ridge"}
+
+
 @covers("horizon", of=("[terrain]",))
 def test_from_above_there_is_sky_down_to_the_dip_of_the_horizon():
     """From 2400 m the horizon dips by 1.57°: a target 1° below the horizontal is before the sky."""
@@ -216,7 +253,7 @@ def test_rasters_that_do_not_fit_the_flight_are_named(name, crest, own, says, tm
 @pytest.mark.parametrize(
     ("terrain", "says"),
     [
-        ({"raster": "S42W180.hgt"}, "raster.*1 holes"),
+        ({"raster": "S42W180.hgt"}, "raster.*1 hole "),
         ({"raster": "nowhere.hgt"}, "raster.*nowhere.hgt"),
         ({"refraction": "air"}, "refraction.*four_thirds"),
         ({"raster_offset_m": 900}, "raster_offset_m.*200"),

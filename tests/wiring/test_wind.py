@@ -205,6 +205,36 @@ def test_replayed_flights_turn_into_the_wind_too(tmp_path):
         assert pose(row)[0] == pytest.approx(80.0, abs=1e-9)
 
 
+def test_a_replayed_ownship_turns_into_the_wind_where_it_is_steered(tmp_path):
+    """What it flies by itself was turned when it was read; what it is told is turned as it goes."""
+    lines = ["time,id,lat,lon,alt"]
+    for t in range(0, 41, 2):
+        for name, north, east in (("own", 60.0 * t, 0.0), ("it", 2600.0 - 50.0 * t, 90.0)):
+            lat, lon, _ = pymap3d.enu2geodetic(east, north, 0.0, -41.0, 172.0, 900.0)
+            lines.append(f"{t},{name},{float(lat)!r},{float(lon)!r},900")
+    path = tmp_path / "f.csv"
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    loop = chain({"radar": RADAR}, duration_s=36, weather=WIND, fusion={"type": "fusion.pick_best"},
+                 tracker={"type": "tracking.stub"})  # fmt: skip
+    loop["blocks"]["traffic"] = {"type": "traffic.csv", "file": str(path), "ownship": "own"}
+    loop["blocks"]["avoidance"] = {
+        "type": "avoidance.turn_away", "range_km": 1.5, "turn_deg": 60, "rate_deg_s": 6
+    }  # fmt: skip
+    loop["wires"] += [
+        "tracker -> avoidance",
+        {"from": "avoidance", "to": "traffic", "holds": "nothing", "delay_s": 0.5},
+    ]
+    found = run(loop)
+    own = [row for row in rows(found, "truth") if row["target"] is None]
+    turns = 0
+    for row in own:
+        velocity = row["velocity_east_m_s"], row["velocity_north_m_s"]
+        turned = row["heading_rad"] - math.atan2(*(np.array(velocity) - AIR))
+        assert math.remainder(turned, 2 * math.pi) == pytest.approx(0.0, abs=2e-2)
+        turns += abs(math.atan2(*velocity)) > math.radians(50.0)
+    assert turns > 5
+
+
 def test_many_flights_together_by_differences_of_their_positions():
     wind = Wind(9.0, -14.0)
     rng = np.random.default_rng(4)

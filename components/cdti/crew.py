@@ -1,0 +1,199 @@
+"""What goes on between the pages of a session and its simulation: decisions, and who waits."""
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+from components.cdti.admission import OPERATOR, Admission
+from components.cdti.live_pace import LivePacer
+from components.cdti.page_messages import Chosen, Climbed, Judged, PageMessage, Ready, Turned
+from components.cdti.scope import Scope
+from components.messages.decisions import CLIMB, KINDS, TURN, Decision
+from components.operator.desk import Desk, Laid
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import printable
+
+if TYPE_CHECKING:
+    from components.cdti.server import DisplayServer, Page
+
+#: Pictures are sent no closer together than this, wall seconds.
+FRAME_S = 0.015
+#: A page that is gone for so long is not being reloaded, s.
+GONE_S = 3.0
+_LOG = 200
+
+
+class SessionCrew:
+    """Answers the pages of one session.
+
+    Parameters
+    ----------
+    scene : Scene
+    desk : Desk
+    console : str or None
+        The block at which the operator sits; None where all only watch.
+    factor : float
+    waits : bool
+        Whether the run begins when an operator is ready.
+    """
+
+    def __init__(
+        self, scene: Scene, desk: Desk, console: str | None, factor: float, *, waits: bool
+    ) -> None:
+        self._scene, self._desk, self._console, self._factor = scene, desk, console, factor
+        self._pauses = False
+        if console is not None:
+            parameters: Any = scene.blocks[console].parameters
+            self._pauses = parameters.unattended == "pauses"
+        self._waits = waits
+        self._operators = 0
+        self._began = False
+        self._gone_at: float | None = None
+        self.scope: Scope | None = None
+        self._now = (0.0, 0.0)
+        self._shown_at = -math.inf
+        self._named = 0
+        #: What became of each decision, by the page's number for it.
+        self._answers: dict[str, dict[str, Any]] = {}
+        self._log: list[dict[str, Any]] = []
+
+    def attach(self, server: "DisplayServer", pacer: LivePacer, admission: Admission) -> None:
+        """Learn with whom to work."""
+        self._server, self._pacer, self._admission = server, pacer, admission
+
+    # -- the thread of the simulation --------------------------------------------------------------
+
+    def holds(self) -> bool:
+        """Return whether the run waits: for its operator to be ready, or to come back."""
+        if self._gone_at is not None and time.monotonic() - self._gone_at > GONE_S:
+            self._gone_at = None
+            address = self._server.address(self._admission.renew())
+            say(f"the operator's page is gone; to decide again: {address}")
+        if self._waits and not self._began:
+            return True
+        return self._pauses and self._operators == 0
+
+    def came_to(self, time_s: float, lag_s: float) -> None:
+        """Take note of how far the run has come, and show it."""
+        self._now = time_s, lag_s
+        if self._gone_at is not None:
+            self.holds()
+        if self.scope is not None and len(self.scope.names) != self._named:
+            self._named = len(self.scope.names)
+            self._server.tell({"type": "names", "names": self.scope.names})
+        wall_s = time.perf_counter()
+        if wall_s - self._shown_at >= FRAME_S:
+            self._shown_at = wall_s
+            self._server.show()
+
+    def sentence(self) -> str:
+        """Return what was decided, for the terminal."""
+        taken = sum(answer["type"] == "taken" for answer in self._answers.values())
+        return f"{taken} decisions taken in, up to {self._now[0]:.1f} s"
+
+    # -- the thread of the server ------------------------------------------------------------------
+
+    def operators(self, count: int) -> None:
+        """Take note of how many pages are there that may decide."""
+        if self._operators and not count:
+            self._gone_at = time.monotonic()
+        elif count:
+            self._gone_at = None
+        self._operators = count
+        self._pacer.wake()
+
+    def welcome(self, role: str) -> dict[str, Any]:
+        """Return what a new page is told of the scene."""
+        scope = self.scope
+        duration = self._scene.duration_s
+        return {
+            "title": printable(self._scene.title),
+            "duration": None if duration is None else float(duration),
+            "factor": self._factor,
+            "sensors": [] if scope is None else scope.sensors,
+            "names": [] if scope is None else scope.names,
+            "console": self._console is not None,
+            "began": self._began or not self._waits,
+            "log": self._log[-_LOG:],
+        }
+
+    def frame(self, chosen: int) -> dict[str, Any] | None:
+        """Return the newest picture."""
+        if self.scope is None:
+            return None
+        time_s, lag_s = self._now
+        return {
+            "type": "frame",
+            "t": round(time_s, 4),
+            "lag": round(lag_s, 4),
+            "operators": self._operators,
+            **self.scope.picture(time_s, chosen),
+        }
+
+    async def said(self, page: "Page", message: PageMessage) -> None:
+        """Take in what a page said."""
+        if isinstance(message, Chosen):
+            page.chosen = message.target
+            self._server.show()
+            return
+        if page.role != OPERATOR:
+            number = getattr(message, "id", None)
+            await page.send({"type": "refused", "id": number, "why": "this page only watches"})
+            return
+        if isinstance(message, Ready):
+            if not self._began:
+                self._began = True
+                self._pacer.wake()
+                self._server.tell({"type": "began"})
+        elif isinstance(message, Judged | Turned | Climbed):
+            await self._decide(page, message)
+
+    async def _decide(self, page: "Page", message: Judged | Turned | Climbed) -> None:
+        known = self._answers.get(message.id)
+        if known is not None:  # sent again after the connection was lost
+            if known["type"] != "waits":
+                await page.send(known)
+            return
+        name = None if self.scope is None else self.scope.name_of(message.target)
+        why = ""
+        if self._console is None:
+            why = "nobody decides in this scene"
+        elif name is None or self.scope is None:
+            why = "there is no such target"
+        elif isinstance(message, Climbed) and self.scope.alt_m + message.value < 0.0:
+            why = "that leads below the ground"
+        elif not self._lay(message, name):
+            why = "the run is over, or too much was decided at once"
+        if why:
+            await page.send({"type": "refused", "id": message.id, "why": why})
+
+    def _lay(self, message: Judged | Turned | Climbed, name: str) -> bool:
+        """Lay a decision on the desk; the page is told when the simulation has it."""
+        kind = KINDS.index(message.decision)
+        value = getattr(message, "value", 0.0)
+        decision = Decision(
+            kind,
+            name,
+            turn_rad=math.radians(value) if kind == TURN else 0.0,
+            climb_m=value if kind == CLIMB else 0.0,
+            wall_time_s=round(time.time(), 6),
+        )
+        said = {
+            "id": message.id,
+            "decision": message.decision,
+            "target": message.target,
+            "value": value,
+        }
+        self._answers[message.id] = {"type": "waits"}
+
+        def taken(time_s: float) -> None:
+            answer = {"type": "taken", **said, "time": round(time_s, 6)}
+            self._answers[message.id] = answer
+            self._log.append(answer)
+            self._server.tell(answer)
+
+        if self._desk.lay(Laid(decision, taken)):
+            return True
+        del self._answers[message.id]
+        return False

@@ -1,0 +1,101 @@
+"use strict";
+// Traffic symbols: TSO-C195b / AC 20-172B and TCAS. Caution: amber circle; warning: red square; the
+// direction of flight is an arrowhead inside; without an alert an open arrowhead, or a diamond.
+const Symbols = (() => {
+  const names = ["ground", "ink", "faint", "line", "own", "traffic", "eo", "ir", "radar", "sight",
+    "symbol-caution", "symbol-warning", "on-symbol", "caution", "warning"];
+  const WORDS = ["", "PREVENTIVE", "CORRECTIVE", "WARNING"];
+  const CLIMBS_MPS = 2.54;  // 500 ft/min
+  let colours = {};
+
+  function readTheme() {
+    const style = getComputedStyle(document.documentElement);
+    colours = Object.fromEntries(
+      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  }
+  function shape(level, directed) {
+    if (level >= 3) return "square";
+    if (level === 2) return "circle";
+    if (level === 1) return "open circle";
+    return directed ? "arrowhead" : "diamond";
+  }
+  function arrowhead(c, r) {
+    c.moveTo(0, -r);
+    c.lineTo(0.8 * r, 0.8 * r);
+    c.lineTo(0, 0.35 * r);
+    c.lineTo(-0.8 * r, 0.8 * r);
+    c.closePath();
+  }
+  // `course` is the direction of flight on screen, clockwise from up, or null.
+  function traffic(c, x, y, level, course, r) {
+    const alert = level >= 3 ? colours["symbol-warning"] : colours["symbol-caution"];
+    c.save();
+    c.translate(x, y);
+    c.lineWidth = 2;
+    c.strokeStyle = level > 0 ? alert : colours.traffic;
+    c.fillStyle = alert;
+    c.beginPath();
+    if (level >= 3) c.rect(-r, -r, 2 * r, 2 * r);
+    else if (level > 0) c.arc(0, 0, r, 0, 2 * Math.PI);
+    else if (course === null) {
+      c.moveTo(0, -r); c.lineTo(r, 0); c.lineTo(0, r); c.lineTo(-r, 0); c.closePath();
+    } else {
+      c.rotate(course);
+      arrowhead(c, r);
+    }
+    if (level >= 2) c.fill();
+    c.stroke();
+    if (level > 0 && course !== null) {
+      c.rotate(course);
+      c.beginPath();
+      arrowhead(c, 0.62 * r);
+      c.strokeStyle = level >= 2 ? colours["on-symbol"] : alert;
+      c.lineWidth = 1.5;
+      c.stroke();
+    }
+    c.restore();
+  }
+  function altitude(up) {
+    if (up === null) return "";
+    const hundreds = Math.round(up / 30.48);
+    const sign = hundreds < 0 ? "−" : "+";
+    return `${sign}${String(Math.abs(hundreds)).padStart(2, "0")}`;
+  }
+  function climb(rate) {
+    if (rate === null || Math.abs(rate) < CLIMBS_MPS) return "";
+    return rate > 0 ? "↑" : "↓";
+  }
+  function own(c, x, y, r) {
+    c.save();
+    c.translate(x, y);
+    c.strokeStyle = colours.own;
+    c.lineWidth = 2.5;
+    c.beginPath();
+    c.moveTo(0, -r); c.lineTo(0, 0.8 * r);
+    c.moveTo(-0.85 * r, 0); c.lineTo(0.85 * r, 0);
+    c.moveTo(-0.35 * r, 0.7 * r); c.lineTo(0.35 * r, 0.7 * r);
+    c.stroke();
+    c.restore();
+  }
+  function text(c, words, x, y, colour, align = "left", size = 12) {
+    c.font = `${size}px system-ui, sans-serif`;
+    c.textAlign = align;
+    c.fillStyle = colour;
+    c.fillText(words, x, y);
+  }
+  function ready(canvas) {
+    const ratio = window.devicePixelRatio || 1;
+    const width = Math.round(canvas.clientWidth * ratio);
+    const height = Math.round(canvas.clientHeight * ratio);
+    if (canvas.width !== width || canvas.height !== height) {
+      canvas.width = width;
+      canvas.height = height;
+    }
+    const c = canvas.getContext("2d");
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    return c;
+  }
+  return { get colours() { return colours; }, WORDS, readTheme, shape, traffic, altitude, climb, own,
+    text, ready };
+})();

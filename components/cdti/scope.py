@@ -1,0 +1,257 @@
+"""What the display shows: listens to a run's messages, and tells how things are at an instant.
+
+The thread of the simulation calls `listen`; any other may call `picture`. What they share is
+replaced as a whole, never changed.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from components.alert_configuration.configuration import Alerter, Configuration
+from components.cdti.camera_sights import CameraSights
+from components.cdti.contacts import Contacts, contacts_of_lines, contacts_of_states
+from components.cdti.lost_area import lost_area
+from components.cdti.own_flight import OwnFlight
+from components.messages.alerts import AlertLevels, contact_name
+from components.messages.detections import Detections, SensorOffer
+from components.messages.fused import FusedDetections
+from components.messages.state_tracks import StateTracks
+from components.messages.targets import TrafficStates
+from components.messages.tracks import Tracks
+from components.sensor.marks import IR
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Component
+from dsa_des.block.message import Message
+from dsa_des.running.simulation import Simulation
+from dsa_des.text.safe_text import printable
+
+#: A contact that was not seen for so long is no longer shown, s.
+FORGOTTEN_S = 10.0
+_RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
+_LOOKAHEAD_S = 120.0
+
+
+@dataclass(frozen=True)
+class _Alerts:
+    """The latest alerts: targets with what is known of their flights, at an instant."""
+
+    time_s: float
+    target: Any
+    level: Any
+    relative: FloatArray
+    own_alt_m: float
+    own_mps: FloatArray
+    to_loss_s: Any
+    closest_m: Any
+
+
+class Scope:
+    """The state of the display.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._per_s = simulation.ticks_per_s
+        self._own = OwnFlight()
+        self._sights = CameraSights(simulation.components)
+        self._contacts: Contacts | None = None
+        self._alerts: _Alerts | None = None
+        self._since: dict[int, float] = {}
+        self._names: tuple[str, ...] = ()
+        #: Names of all targets, fit to be shown.
+        self.names: list[str] = []
+        self._rules = _rules_of(simulation)
+        senders = {
+            type_of
+            for block in simulation.components.values()
+            for type_of in (o.message for o in block.outputs.values())
+        }
+        kinds = (StateTracks, Tracks, FusedDetections)
+        #: What contacts are taken from: the best that the scene has.
+        self._believed = next((k for k in kinds if any(issubclass(t, k) for t in senders)), None)
+        self.sensors = [
+            _sensor(name, component)
+            for name, component in sorted(simulation.components.items())
+            if any(issubclass(o.message, Detections) for o in component.outputs.values())
+        ]
+
+    # -- the thread of the simulation ------------------------------------------------------------
+
+    def listen(self, block: str, message: Message) -> None:
+        """Take in what a block has sent."""
+        if len(message) == 0:
+            return
+        if isinstance(message, TrafficStates):
+            self._own.take(message, self._per_s)
+            self._sights.states = message
+            self._name(message.roster.names)
+        elif isinstance(message, Detections):
+            self._sights.take(block, message, self._per_s)
+        elif isinstance(message, AlertLevels):
+            self._take_alerts(message)
+        elif self._believed is not None and isinstance(message, self._believed):
+            last = message.take(slice(len(message) - 1, len(message)))
+            if isinstance(last, StateTracks):
+                self._contacts = contacts_of_states(last, self._own, self._per_s)
+            else:
+                self._contacts = contacts_of_lines(last, self._own, self._per_s, self._contacts)
+
+    def _name(self, names: tuple[str, ...]) -> None:
+        if names is not self._names:
+            self._names, self.names = names, [printable(name) for name in names]
+
+    def _take_alerts(self, message: AlertLevels) -> None:
+        last = message.take(slice(len(message) - 1, len(message)))
+        time_s = int(last.tick[0]) / self._per_s
+        contacts = last.contacts()
+        on = {int(t) for t, level in zip(contacts, last.level, strict=True) if level > 0}
+        self._since = {t: self._since.get(t, time_s) for t in sorted(on)}
+        times = [last.times[name] for name in sorted(last.times)]
+        with np.errstate(invalid="ignore"):
+            to_loss = np.fmin.reduce(times) if times else np.full(len(contacts), np.nan)
+        self._name(last.roster.names)
+        self._alerts = _Alerts(
+            time_s,
+            contacts,
+            last.level,
+            np.array([last.relative[name] for name in _RELATIVE]),
+            float(last.own_motion["alt_m"][0]),
+            np.array([last.own_motion[name][0] for name in _RELATIVE[3:]]),
+            to_loss,
+            last.closest_horizontal_m,
+        )
+
+    # -- any thread ------------------------------------------------------------------------------
+
+    @property
+    def alt_m(self) -> float:
+        """The ownship's altitude; infinite before it is known."""
+        return math.inf if self._own.now is None else self._own.now.alt_m
+
+    def name_of(self, contact: int) -> str | None:
+        """Return a contact's name as the run has it; empty for none, None if there is none."""
+        return contact_name(self._names, contact)
+
+    def picture(self, time_s: float, chosen: int) -> dict[str, Any]:
+        """Return what is shown at an instant, for JSON: m, deg, s, north and east of the ownship.
+
+        Parameters
+        ----------
+        time_s : float
+        chosen : int
+            The target whose camera picture is wanted; -1 leaves it to the display.
+        """
+        own = self._own.now
+        if own is None:
+            return {"own": None, "contacts": [], "alerts": [], "area": [], "camera": None}
+        alerts, contacts = self._alerts, self._contacts
+        shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
+        flights: dict[int, list[float]] = {}
+        said: list[dict[str, Any]] = []
+        area: list[list[float]] = []
+        if alerts is not None:
+            flights = _flights(alerts)
+            said = self._said(alerts)
+            area = self._area(alerts)
+        level = {one["target"]: one["level"] for one in said}
+        for one in shown:
+            one += flights.get(one[0], [None, None, None])
+            one.append(level.get(one[0], 0))
+        if chosen < 0:
+            chosen = said[0]["target"] if said else (shown[0][0] if shown else -1)
+        return {
+            "own": {
+                "heading": round(math.degrees(own.heading_rad) % 360.0, 3),
+                "alt": round(own.alt_m, 1),
+                "speed": round(own.speed_mps, 1),
+                "climb": round(own.climb_mps, 2),
+            },
+            "contacts": shown,
+            "alerts": said,
+            "area": area,
+            "camera": self._sights.picture(chosen, self._toward(chosen), time_s, own),
+        }
+
+    def _toward(self, contact: int) -> tuple[float, float] | None:
+        """Return the bearing and elevation of a contact as it was seen last, rad."""
+        contacts = self._contacts
+        if contacts is None:
+            return None
+        place = np.flatnonzero(contacts.number == contact)
+        if len(place) == 0:
+            return None
+        bearing, elevation = contacts.toward[place[0]].tolist()
+        return bearing, elevation
+
+    def _said(self, alerts: _Alerts) -> list[dict[str, Any]]:
+        """Return the alerts that are on, the most urgent first."""
+        found = []
+        since = self._since
+        for place in np.flatnonzero(alerts.level > 0).tolist():
+            target = int(alerts.target[place])
+            to_loss = float(alerts.to_loss_s[place])
+            found.append({
+                "target": target,
+                "level": int(alerts.level[place]),
+                "since": since.get(target, alerts.time_s),
+                "at": alerts.time_s,
+                "to_loss": round(to_loss, 2) if math.isfinite(to_loss) else None,
+                "closest": round(float(alerts.closest_m[place]), 1),
+            })  # fmt: skip
+        return sorted(found, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
+
+    def _area(self, alerts: _Alerts) -> list[list[float]]:
+        on = np.flatnonzero(alerts.level > 0)
+        if self._rules is None or len(on) == 0 or not np.all(np.isfinite(alerts.own_mps)):
+            return []
+        level = self._rules[0].corrective_level(self._rules[1])
+        if level is None:
+            return []
+        relative = alerts.relative[:, on]
+        found = lost_area(level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S)
+        degrees = np.degrees(found.direction_rad)
+        return [
+            [round(a, 1), round(b, 1), round(c, 1)]
+            for a, b, c in zip(
+                degrees.tolist(), found.near_m.tolist(), found.far_m.tolist(), strict=True
+            )
+        ]
+
+
+def _flights(alerts: _Alerts) -> dict[int, list[float]]:
+    """Return east, north and upward velocity of the targets that the alerting knows, m/s."""
+    moving = alerts.own_mps[:, np.newaxis] - alerts.relative[3:]
+    if not np.all(np.isfinite(moving)):
+        return {}
+    rounded = np.round(moving.T, 2).tolist()
+    return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
+
+
+def _rules_of(simulation: Simulation) -> tuple[Configuration, Alerter] | None:
+    """Return the configuration and the alerter of the alerting block, if there is one."""
+    from components.alert_configuration.conf_file import read_conf
+
+    for component in simulation.components.values():
+        if any(issubclass(o.message, AlertLevels) for o in component.outputs.values()):
+            configuration = read_conf(component.p.conf)
+            return configuration, configuration.alerters[component.p.alerter - 1]
+    return None
+
+
+def _sensor(name: str, component: Component) -> dict[str, Any]:
+    """Return where a sensor looks, deg and m; what is not known is None."""
+    offer: SensorOffer = component.offer("detections")
+    kind = "radar" if offer.measures_range else "ir" if component.mark is IR else "eo"
+    reach = offer.reach
+    found: dict[str, Any] = {"name": printable(name), "kind": kind}
+    if reach is None or not reach.enabled:
+        return {**found, "range": None, "azimuth": None}
+    low, high = (round(math.degrees(edge), 3) for edge in reach.azimuth_rad)
+    far = getattr(component, "reach", reach).range_max_m
+    return {**found, "range": round(far, 1) if math.isfinite(far) else None, "azimuth": [low, high]}

@@ -1,0 +1,301 @@
+"""The server of the display: its page, and a socket for each browser; it lives in its own thread.
+
+The simulation hands over pictures and never waits for a browser: each gets the newest picture when
+it has drawn the one before.
+"""
+
+import asyncio
+import json
+import logging
+import threading
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Any, Protocol
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from components.cdti.admission import OPERATOR, Admission
+from components.cdti.page_messages import LARGEST_BYTES, Drawn, PageMessage, read_message
+from components.cdti.page_text import headers, page
+from dsa_des.errors import UsageError
+
+SOCKET = "/socket"
+#: Browsers at a time.
+MOST_PAGES = 8
+#: Pictures that a page may have without having drawn them.
+_AHEAD = 2
+_START_S, _END_S = 10.0, 3.0
+
+
+class Page:
+    """One browser's connection.
+
+    Parameters
+    ----------
+    connection : ServerConnection
+    role : str
+    """
+
+    def __init__(self, connection: ServerConnection, role: str) -> None:
+        self.connection, self.role = connection, role
+        self.chosen = -1
+        self._sent, self._drawn = 0, 0
+        self._free = asyncio.Event()
+        self._free.set()
+
+    def drawn(self, frame: int) -> None:
+        """Take note that a picture is on screen."""
+        self._drawn = max(self._drawn, min(frame, self._sent))
+        if self._sent - self._drawn < _AHEAD:
+            self._free.set()
+
+    async def ready(self) -> None:
+        """Wait until the page can take another picture."""
+        await self._free.wait()
+
+    async def send_frame(self, content: dict[str, Any]) -> None:
+        """Send a picture."""
+        self._sent += 1
+        if self._sent - self._drawn >= _AHEAD:
+            self._free.clear()
+        await self.connection.send(_json({**content, "frame": self._sent}))
+
+    async def send(self, content: dict[str, Any]) -> None:
+        """Send anything else; a connection that is gone is no matter."""
+        with suppress(ConnectionClosed):
+            await self.connection.send(_json(content))
+
+
+class Crew(Protocol):
+    """What a server asks of whoever runs the session; called in the server's thread."""
+
+    def welcome(self, role: str) -> dict[str, Any]:
+        """Return what a new page is told."""
+
+    def frame(self, chosen: int) -> dict[str, Any] | None:
+        """Return the newest picture, or None before the first."""
+
+    async def said(self, page: Page, message: PageMessage) -> None:
+        """Take in what a page said."""
+
+    def operators(self, count: int) -> None:
+        """Take note of how many pages are there that may decide."""
+
+
+class DisplayServer:
+    """Serves the page at one address.
+
+    Parameters
+    ----------
+    host : str
+    port : int
+        0 takes a free one.
+    admission : Admission
+    crew : Crew
+
+    Raises
+    ------
+    UsageError
+        From `start`, if the address cannot be served.
+    """
+
+    def __init__(self, host: str, port: int, admission: Admission, crew: Crew) -> None:
+        self._host, self._port = host, port
+        self._admission, self._crew = admission, crew
+        self.pages: list[Page] = []
+        self.loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._live, name="display", daemon=True)
+        self._up, self._failed = threading.Event(), ""
+        self._new: asyncio.Condition
+        self._number = 0
+        self._stop: asyncio.Event
+
+    # -- other threads -----------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Serve from now on."""
+        self._thread.start()
+        if not self._up.wait(_START_S) or self._failed:
+            raise UsageError(f"cannot serve at {self.authority}: {self._failed or 'no answer'}")
+
+    @property
+    def authority(self) -> str:
+        """Host and port, as they stand in the address."""
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return f"{host}:{self._port}"
+
+    def address(self, token: str) -> str:
+        """Return the address of the page."""
+        return f"http://{self.authority}/?token={token}"
+
+    def show(self) -> None:
+        """Let every page have a new picture when it can take one."""
+        self._from_outside(self._announce)
+
+    def tell(self, content: dict[str, Any]) -> None:
+        """Tell every page."""
+        self._from_outside(lambda: self._tell_all(content))
+
+    def close(self, last: dict[str, Any]) -> None:
+        """Say a last word to every page and end."""
+        if not self._thread.is_alive():
+            return
+
+        async def leave() -> None:
+            await self._tell_all(last)
+            self._stop.set()
+
+        self._from_outside(leave)
+        self._thread.join(_END_S)
+
+    def _from_outside(self, call: Callable[[], Awaitable[None]]) -> None:
+        async def run() -> None:
+            await call()
+
+        if not self.loop.is_closed():
+            asyncio.run_coroutine_threadsafe(run(), self.loop)
+
+    # -- its own thread ----------------------------------------------------------------------------
+
+    def _live(self) -> None:
+        asyncio.set_event_loop(self.loop)
+        try:
+            self.loop.run_until_complete(self._serve())
+        finally:
+            self.loop.close()
+            self._up.set()
+
+    async def _serve(self) -> None:
+        self._new, self._stop = asyncio.Condition(), asyncio.Event()
+        quiet = logging.getLogger(f"{__name__}.connections")
+        quiet.setLevel(logging.CRITICAL)  # what a stranger sends is no matter of the terminal's
+        try:
+            server = await serve(
+                self._meet,
+                self._host,
+                self._port,
+                process_request=self._answer,
+                max_size=LARGEST_BYTES,
+                compression=None,
+                server_header=None,
+                logger=quiet,
+                ping_interval=10,
+                ping_timeout=20,
+                close_timeout=1,
+            )
+        except OSError as error:
+            self._failed = (error.strerror or str(error)).lower()
+            return
+        self._port = server.sockets[0].getsockname()[1]
+        self._up.set()
+        await self._stop.wait()
+        await _closed(server)
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a socket, or with what is wrong."""
+        parts = urlsplit(request.path)
+        hosts = request.headers.get_all("Host")
+        if hosts != [self.authority]:  # another name for this address: a page of somewhere else
+            return connection.respond(403, "not this host\n")
+        if not self._admission.knows(_token(request)):
+            return connection.respond(
+                403, "the address lacks its token, or it is not of this run\n"
+            )
+        if parts.path == "/":
+            text, _ = page()
+            body = text.encode("utf-8")
+            sent = Headers({**headers(f"ws://{self.authority}"), "Content-Length": str(len(body))})
+            sent["Connection"] = "close"
+            return Response(200, "OK", sent, body)
+        if parts.path != SOCKET:
+            return connection.respond(404, "there is nothing here\n")
+        # Only our own page may open the socket, wherever it is opened from.
+        if request.headers.get_all("Origin") != [f"http://{self.authority}"]:
+            return connection.respond(403, "not this origin\n")
+        if len(self.pages) >= MOST_PAGES:
+            return connection.respond(503, "too many browsers\n")
+        return None
+
+    async def _meet(self, connection: ServerConnection) -> None:
+        """Live with one page until it goes."""
+        assert connection.request is not None
+        query = parse_qs(urlsplit(connection.request.path).query)
+        role, key = self._admission.role(_token(connection.request), query.get("key", [""])[0])
+        if role == OPERATOR:
+            for other in [p for p in self.pages if p.role == OPERATOR]:
+                other.role = "replaced"
+                await other.connection.close(4001, "opened elsewhere")
+        page = Page(connection, role)
+        self.pages.append(page)
+        self._count()
+        feeding = None
+        try:
+            await page.send(
+                {"type": "welcome", "role": role, "key": key, **self._crew.welcome(role)}
+            )
+            feeding = asyncio.create_task(self._feed(page))
+            async for text in connection:
+                await self._hear(page, text)
+        except ConnectionClosed:
+            pass
+        finally:
+            if feeding is not None:
+                feeding.cancel()
+            self.pages.remove(page)
+            self._count()
+
+    def _count(self) -> None:
+        self._crew.operators(sum(page.role == OPERATOR for page in self.pages))
+
+    async def _hear(self, page: Page, text: str | bytes) -> None:
+        try:
+            message = read_message(text)
+        except ValueError as error:
+            await page.send({"type": "refused", "id": None, "why": f"this {error}"})
+            return
+        if isinstance(message, Drawn):
+            page.drawn(message.frame)
+        else:
+            await self._crew.said(page, message)
+
+    async def _feed(self, page: Page) -> None:
+        """Send a page the newest picture whenever it can take one."""
+        seen = 0
+        with suppress(ConnectionClosed):
+            while True:
+                await page.ready()
+                async with self._new:
+                    while self._number == seen:
+                        await self._new.wait()
+                seen = self._number
+                content = self._crew.frame(page.chosen)
+                if content is not None:
+                    await page.send_frame(content)
+
+    async def _announce(self) -> None:
+        async with self._new:
+            self._number += 1
+            self._new.notify_all()
+
+    async def _tell_all(self, content: dict[str, Any]) -> None:
+        waits = [asyncio.create_task(page.send(content)) for page in self.pages]
+        if waits:
+            await asyncio.wait(waits, timeout=1.0)
+
+
+def _token(request: Request) -> str:
+    return parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, allow_nan=False, separators=(",", ":"))
+
+
+async def _closed(server: Server) -> None:
+    server.close(code=1001, reason="the run has ended")
+    with suppress(TimeoutError):
+        await asyncio.wait_for(server.wait_closed(), 2.0)

@@ -1,0 +1,175 @@
+"""``dsa-des cdti``: one session, from the scene to its run folder."""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+from components.cdti.admission import Admission
+from components.cdti.crew import SessionCrew
+from components.cdti.live_pace import LivePacer
+from components.cdti.scope import Scope
+from components.operator.desk import Desk
+from components.operator.human import Human
+from components.operator.recorded import Recorded
+from dsa_des.commands.loading import say_what_was_done
+from dsa_des.errors import UsageError
+from dsa_des.files.output_folder import OutputFolder
+from dsa_des.library.scenes import load_scene
+from dsa_des.running.pacing import parse_factor
+from dsa_des.running.recorded_run import record_run
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.scene import Scene
+from dsa_des.terminal.interruption import Terminated
+from dsa_des.terminal.terminal import say
+from dsa_des.text.safe_text import printable
+
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+_EVERYWHERE = ("0.0.0.0", "::", "")
+
+
+def run_session(
+    scene: str,
+    sets: tuple[str, ...],
+    swaps: tuple[str, ...],
+    seed: int | None,
+    duration: str | None,
+    factor: str,
+    out: str | None,
+    host: str,
+    port: int,
+    no_wait: bool,
+    figures: bool,
+) -> None:
+    """Run a scene with its display, and keep the run also when it is interrupted.
+
+    Raises
+    ------
+    UsageError
+        The scene has several consoles, the address cannot be served, or the package websockets is
+        missing.
+    KeyboardInterrupt
+        When it was interrupted, once the run folder is complete.
+    """
+    try:
+        from components.cdti.server import DisplayServer
+    except ImportError as error:
+        if not (error.name or "").startswith("websockets"):
+            raise
+        raise UsageError(
+            "dsa-des cdti needs the package websockets: pip install 'dsa-des[view]'"
+        ) from None
+    speed = parse_factor(factor, "--factor")
+    _check_host(host)
+    # By its whole path, so that the run folder's scene finds its files from wherever it is run.
+    path = Path(os.path.abspath(chosen_file(scene, "scene")))
+    loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    say_what_was_done(loaded)
+    console = _console(loaded)
+    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
+    target.check()
+    replay = _replay(loaded, console, target.path)
+    desk = Desk()
+    crew = SessionCrew(loaded, desk, console, speed, waits=not no_wait and console is not None)
+    admission = Admission()
+    server = DisplayServer(host, port, admission, crew)
+    pacer = LivePacer(speed, crew.holds, crew.came_to)
+    crew.attach(server, pacer, admission)
+    server.start()
+    say(f"display: {server.address(admission.token)}")
+    say("It lets one browser decide; whoever opens it after that watches. Ctrl-C ends the run.")
+    if host not in _LOOPBACK:
+        open_to = f"note: others in the network of {host} can reach it"
+        say(f"{open_to}, and what is sent is not encrypted", err=True)
+
+    def prepare(simulation: Simulation) -> None:
+        scope = Scope(simulation)
+        if simulation.recorder is not None:
+            simulation.recorder.listeners.append(scope.listen)
+        if console is not None:
+            block = simulation.components[console]
+            assert isinstance(block, Human)
+            block.desk = desk
+        crew.scope = scope
+
+    ended = "the run was broken off"
+    received: list[int] = []
+    try:
+        with _stopping(pacer, received):
+            summary = record_run(
+                loaded,
+                target,
+                silent=True,
+                warn=True,
+                pacer=pacer,
+                draw=figures,
+                prepare=prepare,
+                recorded_as=replay,
+            )
+        ended = "interrupted" if received else "the scene has come to its end"
+    finally:
+        desk.close()
+        server.close({"type": "end", "why": ended})
+    say(f"run: {printable(str(summary['out']))}: {crew.sentence()}; {pacer.sentence()}")
+    if received:
+        raise KeyboardInterrupt if received[0] == signal.SIGINT else Terminated(received[0])
+
+
+def _console(scene: Scene) -> str | None:
+    """Return the name of the block at which a person sits, or None: a scene to be watched."""
+    found = [name for name, cls in scene.classes.items() if issubclass(cls, Human)]
+    if len(found) > 1:
+        raise UsageError(
+            f"{scene.path}: {', '.join(found)} are all of type operator.human: one person sits at "
+            "one console"
+        )
+    return found[0] if found else None
+
+
+def _replay(scene: Scene, console: str | None, target: Path) -> Scene | None:
+    """Return the scene that gives the same tables with what was decided instead of a person."""
+    if console is None:
+        return None
+    table = (target / "decisions.parquet").absolute()
+    block = scene.blocks[console]
+    kept = {
+        key: value
+        for key, value in block.parameters.model_dump(mode="json").items()
+        if key in Recorded.Parameters.model_fields
+    }
+    options = block.options.model_dump(mode="json", exclude_unset=True)
+    recorded = {"type": "operator.recorded", **kept, **options, "decisions": str(table)}
+    return scene.set({f"blocks.{console}": recorded})
+
+
+def _check_host(host: str) -> None:
+    if host in _EVERYWHERE:
+        raise UsageError(
+            f"--host {host!r}: name the address under which others reach this machine: pages that "
+            "came from any other name are refused"
+        )
+
+
+@contextmanager
+def _stopping(pacer: LivePacer, received: list[int]) -> Iterator[None]:
+    """Let ctrl-C and SIGTERM end the run at its next instant; a second one breaks it off."""
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if received:
+            raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
+        received.append(number)
+        pacer.stop()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {n: signal.signal(n, handle) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, there in before.items():
+            signal.signal(number, there)

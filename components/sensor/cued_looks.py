@@ -1,0 +1,136 @@
+"""Cues as an effect: which targets lie in a cone that was told, where a sensor looks harder."""
+
+from typing import Any
+
+import numpy as np
+
+from components.estimation.cue_cone import axis_in_body
+from components.estimation.frame import place_in_frame
+from components.messages.cues import CueCones
+from components.messages.targets import RelativeTargets
+from components.sensor.believed_pose import believed_pose
+from components.sensor.sensor import Sensor
+from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.ports import Input
+from dsa_des.block.wake import Wake
+
+#: The input over which they come.
+PORT = "cues"
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+class CuedLooks(Effect):
+    """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
+
+    lockstep = True
+    side_by_side = True
+    name = "cues"
+    acts_on = "cue"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for a wire that brings cues."""
+        told = [one.block for one in block.context.producers if one.port == PORT]
+        if not told:
+            return Verdict(False, "no wire brings cues")
+        return Verdict(True, f"{' and '.join(told)} cues it")
+
+    def build(self, block: Any) -> "ConesAhead":
+        """Return what finds targets in cones."""
+        return ConesAhead()
+
+
+class ConesAhead:
+    """Finds targets in the cones that a sensor holds at its scans."""
+
+    def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
+        """Return which targets lie in a cone at each scan, (scans, targets); None for none at all.
+
+        Parameters
+        ----------
+        targets : RelativeTargets
+        rows : (scans,)
+            Row of `targets` at each scan.
+        wake : Wake
+
+        Raises
+        ------
+        ValueError
+            If the targets came without the ownship's pose.
+        """
+        held = wake.held(PORT)
+        if held is None:
+            return None
+        message, at = held
+        cones: CueCones = message
+        counts = np.where(at >= 0, np.diff(cones.offsets)[at], 0)
+        if not counts.any():
+            return None
+        scan = np.repeat(np.arange(len(rows)), counts)
+        first = np.cumsum(counts) - counts
+        entry = np.arange(len(scan)) + (cones.offsets[at] - first)[scan]
+        time_s = wake.time_s[scan]
+        live = time_s <= cones.until_s[entry]
+        scan, entry, time_s = scan[live], entry[live], time_s[live]
+        if len(scan) == 0:
+            return None
+        pose = believed_pose(targets, rows[scan])
+        if not pose:
+            raise ValueError("cues need the ownship's pose, which these targets come without")
+        own = list(pose.values())
+        place = place_in_frame(
+            tuple(getattr(cones, name)[entry] for name in _ORIGIN), tuple(own[:3]), tuple(own[3:])
+        )
+        axis = axis_in_body(
+            time_s - cones.state_s[entry],
+            np.stack([getattr(cones, name)[entry] for name in _STATE]),
+            np.stack([cones.azimuth_rad[entry], cones.elevation_rad[entry]]),
+            cones.has_range[entry],
+            place,
+        )
+        azimuth = targets.body_azimuth_rad[rows[scan]]
+        elevation = targets.body_elevation_rad[rows[scan]]
+        level = np.cos(elevation)
+        along = axis[0][:, np.newaxis] * level * np.cos(azimuth)
+        along += axis[1][:, np.newaxis] * level * np.sin(azimuth)
+        along -= axis[2][:, np.newaxis] * np.sin(elevation)
+        inside = along >= np.cos(cones.half_angle_rad[entry])[:, np.newaxis]
+        found = np.zeros((len(rows), azimuth.shape[1]), dtype=bool)
+        np.logical_or.at(found, scan, inside)
+        return found
+
+
+CUED_LOOKS = CuedLooks()
+#: Inputs of a sensor that can be cued.
+CUED_INPUTS = {
+    **Sensor.inputs,
+    PORT: Input(CueCones, "sampled", "Where to look more closely.", required=False),
+}
+
+
+def refuse_cues(block: Any) -> None:
+    """Raise ValueError if a sensor that cannot look harder is cued."""
+    told = [one.block for one in block.context.producers if one.port == PORT]
+    if told:
+        raise ValueError(
+            f"{told[0]} cues it, and it takes no cues: all inside its range is detected, there is "
+            "no threshold to lower; cue a sensor that has one, or leave the wire out"
+        )
+
+
+def said_of_cues(block: Any) -> list[str]:
+    """Warn of a wire of cues that changes nothing, and of parameters that no cue ever uses."""
+    given = [
+        name
+        for name in type(block.p).model_fields
+        if name.startswith("cued_") and getattr(block.p, name) not in (None, False)
+    ]
+    told = any(one.port == PORT for one in block.context.producers)
+    if told and not given:
+        return [
+            "is cued, and nothing says what it then does otherwise: give one of its cued_* keys"
+        ]
+    if given and not told:
+        return [f"{given[0]} is given, and no wire brings cues"]
+    return []

@@ -1,0 +1,153 @@
+"""What tracks tell sensors: cones in which to look more closely (``tracking.cues``)."""
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.estimation.cue_cone import half_angle_rad
+from components.estimation.frame import Place
+from components.messages.columns import COVARIANCE
+from components.messages.cues import CueCones
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks
+from components.sensor.marks import TRACKER
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.component import Component, NonNegativeRational, Parameters
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+_STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_OWN = ("own_north_m", "own_east_m", "own_down_m")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+class CueParameters(Parameters):
+    """Parameters of cues."""
+
+    tentative: bool = Field(
+        default=True, description="Whether tentative tracks cue too; else only confirmed ones."
+    )
+    sigmas: float = Field(
+        default=3.0, gt=0, le=10,
+        description="Half angle of a cone in standard deviations of the track across the line of "
+        "sight, at the end of the time for which it counts.",
+    )  # fmt: skip
+    least_half_angle_deg: float = Field(
+        default=1.0, gt=0, le=90, description="No cone is narrower, deg."
+    )
+    most_half_angle_deg: float = Field(
+        default=15.0,
+        gt=0,
+        le=180,
+        description="A track that would take a wider cone cues none, deg.",
+    )
+    lasts_s: float = Field(
+        default=2.0, gt=0,
+        description="How long after the instant of its track a cone counts, s.",
+    )  # fmt: skip
+    acceleration_intensity_m2_s3: float = Field(
+        default=4.0, gt=0,
+        description="Intensity of the white acceleration by which a cone widens over that time, "
+        "m²/s³.",
+    )  # fmt: skip
+    every_s: NonNegativeRational = Field(
+        default=Fraction(1, 2), description="Least time from one message of cues to the next, s."
+    )
+
+    @model_validator(mode="after")
+    def _some_fit(self) -> Any:
+        if self.least_half_angle_deg > self.most_half_angle_deg:
+            raise ValueError(
+                f"least_half_angle_deg is {self.least_half_angle_deg:g}: it must be at most "
+                f"most_half_angle_deg, {self.most_half_angle_deg:g}"
+            )
+        return self
+
+
+class Cues(Component):
+    """Tells sensors in which cones tracks are thought to be.
+
+    Each cone is told with the state of its track, so that a sensor carries it on to its own scan.
+    While there is nothing to tell, and nothing was told, no message is sent.
+    """
+
+    mark = TRACKER
+    inputs = {"tracks": Input(StateTracks, "trigger", "What a tracker holds.")}
+    outputs = {"cues": Output(CueCones, "Where to look more closely.")}
+    Parameters = CueParameters
+    windowed = True
+    rewindable = True
+
+    def setup(self) -> None:
+        """Start with nothing told."""
+        self._every_ticks = math.ceil(self.p.every_s * self.context.ticks_per_s)
+        self._last_tick = -self._every_ticks
+        self._silent = True
+
+    def run(self, wake: Wake) -> CueCones | None:
+        """Tell the cones of the tracks at every instant at which they are due."""
+        tracks = wake["tracks"]
+        if tracks is None:
+            return None
+        row, entry, half_rad = self._wanted(tracks)
+        many = np.bincount(row, minlength=len(tracks)).tolist()
+        due = []
+        for place, tick in enumerate(tracks.tick.tolist()):
+            if tick - self._last_tick < self._every_ticks or (self._silent and not many[place]):
+                continue
+            due.append(place)
+            self._last_tick, self._silent = tick, not many[place]
+        if not due:
+            return None
+        rows = np.array(due, dtype=np.int64)
+        told = np.isin(row, rows)
+        return self._message(tracks, rows, row[told], entry[told], half_rad[told])
+
+    def _wanted(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return the row and entry of each track that cues, and its cone's half angle."""
+        wanted = tracks.track_status != DELETED
+        if not self.p.tentative:
+            wanted &= tracks.track_status != TENTATIVE
+        entry = np.flatnonzero(wanted)
+        lasts_s = self.p.lasts_s
+        state = np.stack([getattr(tracks, name)[entry] for name in _STATE])
+        covariance = np.empty((6, 6, len(entry)))
+        for (i, j), name in COVARIANCE.items():
+            covariance[i, j] = covariance[j, i] = tracks.covariance[name][entry]
+        across = lasts_s * (covariance[:3, 3:] + covariance[3:, :3])
+        spread = covariance[:3, :3] + across + lasts_s**2 * covariance[3:, 3:]
+        for i in range(3):
+            spread[i, i] += self.p.acceleration_intensity_m2_s3 * lasts_s**3 / 3.0
+        own = np.stack([getattr(tracks, name)[entry] for name in _OWN])
+        axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(entry), axis=2)
+        half = half_angle_rad(state[:3], spread, Place(own, axes), self.p.sigmas)
+        level = np.cos(tracks.elevation_rad[entry])
+        told = np.maximum(
+            tracks.azimuth_variance_rad2[entry] * level * level,
+            tracks.elevation_variance_rad2[entry],
+        )
+        half = np.where(tracks.has_range[entry], half, self.p.sigmas * np.sqrt(told))
+        half = np.maximum(half, math.radians(self.p.least_half_angle_deg))
+        kept = half <= math.radians(self.p.most_half_angle_deg)
+        row = np.repeat(np.arange(len(tracks)), np.diff(tracks.offsets))[entry]
+        return row[kept], entry[kept], half[kept]
+
+    def _message(
+        self,
+        tracks: StateTracks,
+        rows: IntArray,
+        row: IntArray,
+        entry: IntArray,
+        half_rad: FloatArray,
+    ) -> CueCones:
+        names = ("track", "azimuth_rad", "elevation_rad", "has_range", "state_s", *_STATE, *_ORIGIN)
+        return CueCones(
+            tick=tracks.tick[rows],
+            offsets=offsets_of(np.searchsorted(rows, row), len(rows)),
+            half_angle_rad=half_rad,
+            until_s=tracks.state_s[entry] + self.p.lasts_s,
+            **{name: getattr(tracks, name)[entry] for name in names},
+        )

@@ -1,0 +1,284 @@
+"""Traffic of many replicas whose flights differ, flown together: every row asks for its own.
+
+What each row holds is what a run of its own replica would give, to the bit. Targets are numbered
+through: those of the first replica, then those of the second, and so on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from components.geometry.ellipsoid import line_of_sight
+from components.geometry.state import TrajectoryState
+from components.messages.reach import farthest_look
+from components.messages.steering import Manoeuvre
+from components.messages.targets import TrafficStates
+from components.traffic.near_intervals import NearIntervals, near_intervals
+from components.traffic.own_flights import OwnFlights
+from components.traffic.steered_culling import closing_speeds_mps, epochs_of
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.wake import Wake
+
+_TOLD = Manoeuvre._fields
+
+
+class Flown:
+    """The flights of all replicas, as arrays.
+
+    Parameters
+    ----------
+    own, targets : Fleet
+        The ownship of each replica, and all targets of the first one, of the second, and so on.
+    own_speed_mps, target_speed_mps : (replicas,) and (replicas * targets,)
+        Largest speeds.
+    own_present_s, target_present_s : (replicas, 2) and (replicas * targets, 2)
+        First and last time at which each may be there.
+    """
+
+    def __init__(
+        self,
+        own: Any,
+        targets: Any,
+        own_speed_mps: FloatArray,
+        target_speed_mps: FloatArray,
+        own_present_s: FloatArray,
+        target_present_s: FloatArray,
+    ) -> None:
+        self.own, self.targets = own, targets
+        self.own_speed_mps, self.target_speed_mps = own_speed_mps, target_speed_mps
+        self.own_present_s, self.target_present_s = own_present_s, target_present_s
+
+
+class FlownTogether:
+    """Handles the wakes of a traffic source for all replicas.
+
+    Parameters
+    ----------
+    face : TrafficSource
+        The source as the first replica has it, set up.
+    flown : Flown
+    replicas : int
+    """
+
+    def __init__(self, face: Any, flown: Flown, replicas: int) -> None:
+        self._flown, self._roster = flown, face.roster
+        self._width = len(face.roster)
+        self._columns = np.arange(self._width)
+        self._own = OwnFlights(flown.own, replicas)
+        self._ticks_per_s = face.context.ticks_per_s
+        self._says_truth = face.says_truth
+        self._intervals: NearIntervals | None = None
+        self._epochs: _Epochs | None = None
+        #: Manoeuvres that have come and are not flown by any row yet, with their ticks.
+        self._told: list[tuple[int, Manoeuvre]] = []
+        look = farthest_look(consumer.request for consumer in face.context.consumers)
+        culls = not face.context.simulate_everything and face.clock_of(face.p) is None
+        if culls and math.isfinite(look.range_m):
+            if face.context.producers:
+                self._epochs = _Epochs(self, flown, self._width, look.range_m)
+            else:
+                self._intervals = self._near_intervals(look.range_m, float(face.context.duration_s))
+
+    def _near_intervals(self, reach_m: float, end_s: float) -> NearIntervals:
+        flown, width = self._flown, max(1, self._width)
+        own = np.repeat(np.arange(len(flown.own_speed_mps)), self._width)
+        first = np.maximum(flown.target_present_s[:, 0], flown.own_present_s[own, 0])
+        last = np.minimum(flown.target_present_s[:, 1], flown.own_present_s[own, 1])
+        return near_intervals(
+            lambda target, time_s: self.range_m(target // width, target, time_s),
+            closing_speed_mps=flown.target_speed_mps + flown.own_speed_mps[own],
+            present_s=(first, last),
+            reach_m=reach_m,
+            end_s=end_s,
+            of_run=width,
+        )
+
+    def range_m(self, ownship: IntArray, target: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return the range from ownships to targets (n,), each at a time (n,) of its own."""
+        own, other = self._own.each(ownship, time_s), self._flown.targets.each(target, time_s)
+        return line_of_sight(
+            own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
+            validate=False,
+        )[2]  # fmt: skip
+
+    def run(self, wake: Wake) -> TrafficStates:
+        """Return the state of all aircraft of each row's replica."""
+        replica, time_s = wake.replica, wake.time_s
+        truth = self._steer(wake, replica, time_s)
+        shape = len(wake), self._width
+        target = replica[:, np.newaxis] * self._width + self._columns
+        own = self._own.each(replica, time_s)
+        each, times = target.reshape(-1), np.repeat(time_s, self._width)
+        states = self._flown.targets.each(each, times).reshaped(shape)
+        present = states.present & own.present[:, np.newaxis]
+        near: BoolArray | None = None
+        if self._intervals is not None:
+            near = self._intervals.holds(each, times).reshape(shape)
+        elif self._epochs is not None:
+            near = self._epochs.near(replica, time_s)
+        culled = None
+        if near is not None:
+            present &= near
+            culled = self._width - near.sum(axis=1)
+        return TrafficStates(
+            tick=wake.ticks,
+            own_lat_deg=own.lat_deg,
+            own_lon_deg=own.lon_deg,
+            own_alt_m=own.alt_m,
+            own_yaw_rad=own.yaw_rad,
+            own_pitch_rad=own.pitch_rad,
+            own_roll_rad=own.roll_rad,
+            lat_deg=states.lat_deg,
+            lon_deg=states.lon_deg,
+            alt_m=states.alt_m,
+            yaw_rad=states.yaw_rad,
+            pitch_rad=states.pitch_rad,
+            roll_rad=states.roll_rad,
+            present=present,
+            roster=self._roster,
+            columns=self._columns,
+            culled=culled,
+            true_flights=cast(Any, truth),
+            run_time_s=None if truth is None else time_s,
+        )
+
+    def _steer(self, wake: Wake, replica: IntArray, time_s: FloatArray) -> RowFlights | None:
+        """Let ownships fly what has come for them, and return the true flights of each row."""
+        for new in wake.arrivals("manoeuvres"):
+            manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
+            self._told += zip(new.tick.tolist(), manoeuvres, strict=True)
+        known = self._own.count[replica] if self._says_truth else None
+        if self._told:
+            now, self._told = self._due(wake)
+            while now:  # the first of every ownship, then the second ones
+                first: dict[int, tuple[int, Manoeuvre]] = {}
+                later = []
+                for one in now:
+                    if first.setdefault(one[0] // wake.span_ticks, one) is not one:
+                        later.append(one)
+                ownship = np.array(list(first), dtype=np.int64)
+                ticks = np.array([tick for tick, _ in first.values()], dtype=np.int64)
+                at_s = (ticks % wake.span_ticks) / self._ticks_per_s
+                self._own.steer(ownship, at_s, [told for _, told in first.values()])
+                if self._epochs is not None:
+                    self._epochs.forget(ownship)
+                if known is not None:
+                    known = known + _later(replica, wake.ticks, ownship, ticks)
+                now = later
+        if known is None:
+            return None
+        return RowFlights(self._own, self._flown.targets, self._width, replica, known)
+
+    def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
+        """Part what has come into what rows of this wake fly, and what is for later ones."""
+        ticks = np.array([tick for tick, _ in self._told], dtype=np.int64)
+        end = (ticks // wake.span_ticks + 1) * wake.span_ticks
+        last = wake.ticks[np.maximum(np.searchsorted(wake.ticks, end) - 1, 0)]
+        # The last row of the same ownship; that of another one is earlier than anything of it.
+        due = (last >= ticks) & (last < end)
+        now = [one for one, is_due in zip(self._told, due.tolist(), strict=True) if is_due]
+        later = [one for one, is_due in zip(self._told, due.tolist(), strict=True) if not is_due]
+        return sorted(now, key=lambda one: one[0]), later
+
+
+def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
+    """Return 1 for the rows of some ownships at or after what came for each of them."""
+    order = np.argsort(ownship)
+    place = np.minimum(np.searchsorted(ownship[order], replica), len(ownship) - 1)
+    mine = order[place]
+    return ((ownship[mine] == replica) & (ticks >= came[mine])).astype(np.int64)
+
+
+class RowFlights:
+    """The flights of all aircraft as each row of a message knows them, for the truth.
+
+    As `components.messages.known_flights.KnownFlights` of `TrueFlights`.
+
+    Parameters
+    ----------
+    own : OwnFlights
+    targets : Fleet
+    width : int
+        Targets of each replica.
+    replica, known : (rows,) of int
+        Each row's replica, and how many manoeuvres of its ownship it knows.
+    """
+
+    def __init__(
+        self, own: OwnFlights, targets: Any, width: int, replica: IntArray, known: IntArray
+    ) -> None:
+        self._own, self._targets, self._width = own, targets, width
+        self._replica, self._known = replica, known
+
+    def __len__(self) -> int:
+        return len(self._replica)
+
+    def __call__(
+        self, columns: IntArray, time_s: FloatArray
+    ) -> tuple[TrajectoryState, TrajectoryState]:
+        """Return the ownships' states (rows, 1) and the targets' (rows, n) at times (rows, 1)."""
+        shape = len(time_s), len(columns)
+        target = self._replica[:, np.newaxis] * self._width + columns
+        times = np.repeat(time_s, len(columns), axis=1).reshape(-1)
+        others = self._targets.each(target.reshape(-1), times).reshaped(shape)
+        own = self._own.each(self._replica, time_s.reshape(-1), self._known)
+        return own.reshaped(time_s.shape), others
+
+    def take_rows(self, rows: slice | IntArray) -> RowFlights:
+        """Return the flights of some rows."""
+        known = self._known[rows]
+        return RowFlights(self._own, self._targets, self._width, self._replica[rows], known)
+
+    @classmethod
+    def join_rows(cls, parts: Sequence[RowFlights]) -> RowFlights:
+        """Return the flights of the rows of all parts, in the order given."""
+        first = parts[0]
+        columns = [np.concatenate([getattr(p, n) for p in parts]) for n in ("_replica", "_known")]
+        return cls(first._own, first._targets, first._width, *columns)
+
+
+class _Epochs:
+    """Who may come in reach of an ownship that is steered; see `SteeredCulling`.
+
+    Parameters
+    ----------
+    flights : FlownTogether
+    flown : Flown
+    width : int
+    reach_m : float
+    """
+
+    def __init__(self, flights: FlownTogether, flown: Flown, width: int, reach_m: float) -> None:
+        self._flights, self._width = flights, width
+        replicas = len(flown.own_speed_mps)
+        speeds = flown.target_speed_mps.reshape(replicas, width)
+        closing = closing_speeds_mps(speeds, flown.own_speed_mps[:, np.newaxis])
+        self._epoch_s, self._within_m = epochs_of(closing, reach_m)
+        self._last: IntArray = np.full(replicas, -1, dtype=np.int64)
+        self._near: BoolArray = np.zeros((replicas, width), dtype=bool)
+
+    def forget(self, ownship: IntArray) -> None:
+        """Take note that ownships fly on otherwise than was known."""
+        self._last[ownship] = -1
+
+    def near(self, replica: IntArray, time_s: FloatArray) -> BoolArray:
+        """Return which targets may be in reach at each row, (rows, width)."""
+        epoch = np.floor(time_s / self._epoch_s[replica]).astype(np.int64)
+        begins = np.ones(len(replica), dtype=bool)
+        begins[1:] = (replica[1:] != replica[:-1]) | (epoch[1:] != epoch[:-1])
+        first = np.flatnonzero(begins)
+        of, number = replica[first], epoch[first]
+        found = self._near[of]
+        new = np.flatnonzero(self._last[of] != number)
+        if len(new):
+            ownship = np.repeat(of[new], self._width)
+            target = (of[new][:, np.newaxis] * self._width + np.arange(self._width)).reshape(-1)
+            start_s = np.repeat(number[new] * self._epoch_s[of[new]], self._width)
+            range_m = self._flights.range_m(ownship, target, start_s).reshape(-1, self._width)
+            found[new] = range_m <= self._within_m[of[new]]
+        self._last[of], self._near[of] = number, found
+        return found[np.cumsum(begins) - 1]

@@ -1,0 +1,104 @@
+"""The flights of many ownships, each of which may be steered while it is flown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from components.geometry.state import TrajectoryState
+from components.messages.steering import Manoeuvre
+from components.traffic.flight_protocols import Fleet
+from components.traffic.leg_table import LegTable
+from components.traffic.steered_flight import AROUND_S, flown_from
+from dsa_des.arrays.types import FloatArray, IntArray
+
+
+class OwnFlights:
+    """What every ownship flies: its own flight, and after manoeuvres what each of them led to.
+
+    As many `components.traffic.steered_flight.SteeredFlight`, to the bit.
+
+    Parameters
+    ----------
+    flights : Fleet
+        What each of them flies until its first manoeuvre.
+    count : int
+    """
+
+    def __init__(self, flights: Fleet, count: int) -> None:
+        self._flights = flights
+        #: Of each ownship: when its parts begin, in order, and which they are.
+        self._start_s = np.full((count, 1), np.inf)
+        self._part = np.zeros((count, 1), dtype=np.int64)
+        #: How many parts each of them has.
+        self.count = np.zeros(count, dtype=np.int64)
+        self._parts: LegTable | None = None
+        self._made = 0
+
+    def each(
+        self, ownship: IntArray, time_s: FloatArray, known: IntArray | None = None
+    ) -> TrajectoryState:
+        """Return the states of ownships (n,), each at a time (n,) of its own, in s.
+
+        Parameters
+        ----------
+        ownship : (n,) of int
+        time_s : (n,)
+        known : (n,) of int, optional
+            How many of the ownship's manoeuvres are known; all by default.
+        """
+        if self._parts is None:
+            return self._flights.each(ownship, time_s)
+        part = (self._start_s[ownship] <= time_s[:, np.newaxis]).sum(axis=1)
+        if known is not None:
+            part = np.minimum(part, known)
+        steered = part > 0
+        if not steered.any():
+            return self._flights.each(ownship, time_s)
+        which = self._part[ownship[steered], part[steered] - 1]
+        told = self._parts.state(which, time_s[steered])
+        if steered.all():
+            return told
+        own = self._flights.each(ownship[~steered], time_s[~steered])
+        columns = []
+        for alone, after in zip(own.arrays(), told.arrays(), strict=True):
+            column = np.empty(len(ownship), dtype=alone.dtype)
+            column[~steered], column[steered] = alone, after
+            columns.append(column)
+        return TrajectoryState(*columns)
+
+    def steer(self, ownship: IntArray, time_s: FloatArray, told: Sequence[Manoeuvre]) -> None:
+        """Let ownships fly manoeuvres from times on.
+
+        Parameters
+        ----------
+        ownship : (n,) of int
+            Each once.
+        time_s : (n,)
+            Not before earlier manoeuvres of the same one.
+        told : sequence of n Manoeuvre
+        """
+        around = self.each(
+            np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
+        ).reshaped((len(ownship), len(AROUND_S)))
+        new = [
+            flown_from("ownship", _row(around, row), at_s, manoeuvre)
+            for row, (at_s, manoeuvre) in enumerate(zip(time_s.tolist(), told, strict=True))
+        ]
+        table = LegTable(new)
+        self._parts = table if self._parts is None else LegTable.joined(self._parts, table)
+        if int(self.count[ownship].max()) + 1 >= self._start_s.shape[1]:
+            room = self._start_s.shape
+            self._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
+            self._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
+        place = self.count[ownship]
+        self._start_s[ownship, place] = time_s
+        self._part[ownship, place] = self._made + np.arange(len(new))
+        self.count[ownship] += 1
+        self._made += len(new)
+
+
+def _row(state: TrajectoryState, row: int) -> Any:
+    return TrajectoryState(*(values[row] for values in state.arrays()))

@@ -1,0 +1,257 @@
+"""Sessions in a real browser: what the operator sees, does, and what becomes of it.
+
+Left out by name where Playwright's Python package, websockets or a Chromium is missing.
+"""
+
+import itertools
+import math
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pymap3d
+import pytest
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+pytest.importorskip("websockets", reason="needs the package websockets")
+from live import TRACKS, Session  # noqa: E402
+
+import dsa_des  # noqa: E402
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+if CHROMIUM is None:
+    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
+
+#: The intruder is in sight of the camera at once, of the radar after 6 s; a warning follows at 7 s.
+SETS = (
+    "blocks.traffic.intruders[0].east_m=3000", "blocks.traffic.intruders[0].north_m=2500",
+    "blocks.radar.range_km=3.5", "blocks.eo.scan_rate_hz=5", "record.truth=true",
+    "blocks.radar.false_alarm_probability=1e-6",
+)  # fmt: skip
+HOSTILE = "<script>alert(1)</script>"
+#: What tells of a loss of separation here, m: half of the volume's radius of 4000 ft.
+KEPT_M = 0.5 * 4000 * 0.3048
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield launched
+        launched.close()
+
+
+class Screen:
+    """A page of the display in the browser; it must have nothing to complain of."""
+
+    def __init__(self, browser, address, **context):
+        self.context = browser.new_context(
+            **{"viewport": {"width": 1280, "height": 800}, **context}
+        )
+        self.page = self.context.new_page()
+        self.said, self.asked = [], []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+        self.when("App.state().role !== ''")
+
+    def state(self):
+        return self.page.evaluate("App.state()")
+
+    def when(self, what, timeout=20_000):
+        self.page.wait_for_function(f"() => ({what})", timeout=timeout)
+        return self.state()
+
+    def taken(self, decision):
+        self.when(f"App.said.some(one => one.type === 'taken' && one.decision === '{decision}')")
+        said = self.page.evaluate("App.said")
+        return next(one for one in said if one.get("decision") == decision)
+
+    def close(self, authority):
+        assert self.said == []
+        assert [url for url in self.asked if authority not in url] == []
+        self.context.close()
+
+
+def closest_m(run):
+    """Horizontal distance of the aircraft at its least, from the recorded truth, by pymap3d."""
+    rows = pq.read_table(run / "truth.parquet").to_pylist()
+    own = {row["time_s"]: row for row in rows if row["target"] is None}
+    return min(
+        math.hypot(*pymap3d.geodetic2enu(
+            row["lat_deg"], row["lon_deg"], row["alt_m"],
+            *(own[row["time_s"]][name] for name in ("lat_deg", "lon_deg", "alt_m")),
+        )[:2])
+        for row in rows if row["target"] is not None
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "judged", "arrow", "by_deg", "kept"),
+    [("v", "verified", "ArrowRight", 60, True), ("x", "rejected", "ArrowLeft", -10, False)],
+)
+def test_a_session_is_decided_by_its_operator_and_replays(
+    browser, tmp_path, monkeypatch, key, judged, arrow, by_deg, kept
+):
+    sets = (*SETS, "blocks.operator.turn_rate_deg_s=6")
+    session = Session(monkeypatch, tmp_path / "run", factor="8", duration="50", sets=sets)
+    screen = Screen(browser, session.address)
+    page = screen.page
+    assert page.evaluate("document.activeElement.id") == "ready"
+    page.keyboard.press("Enter")
+    seen = screen.when("App.state().lines.length && !App.state().symbols.length")
+    assert seen["lines"][0]["bearing"] == pytest.approx(50.2, abs=3) and not seen["alerts"]
+    seen = screen.when("App.state().alerts.length && App.state().symbols.length")
+    alert = seen["alerts"][0]
+    track, name = alert["target"], f"track {alert['target'] - TRACKS}"
+    (symbol,) = [one for one in seen["symbols"] if one["number"] == track]
+    shape, word = {2: ("circle", "CORRECTIVE"), 3: ("square", "WARNING")}[alert["level"]]
+    assert (symbol["shape"], symbol["tag"]) == (shape, "+01") and seen["sounds"] == 1
+    assert page.locator("#banner").inner_text().startswith(f"{word} {name}: separation is lost")
+    assert page.locator("#contacts li").first.inner_text().startswith(f"{word}, {name}, 2 o'clock")
+    page.keyboard.press(key)
+    answer = screen.taken(judged)
+    page.select_option("#turn-by", str(abs(by_deg)))
+    page.locator("#scope").focus()
+    page.keyboard.press(arrow)
+    turn = screen.taken("turn")
+    assert answer["time"] <= turn["time"] and answer["target"] == track
+    assert (name in page.locator("#banner").inner_text()) == (judged == "verified")
+    heading = "((App.state().own.heading + 180) % 360) - 180"
+    screen.when(f"Math.abs({heading} - ({by_deg})) < 0.5")
+    seen = screen.when("App.state().over", timeout=60_000)
+    assert seen["ended"] == "the scene has come to its end" and seen["waiting"] == 0
+    screen.close(session.authority)
+    session.ended()
+    rows = pq.read_table(session.out / "decisions.parquet").to_pylist()
+    assert [row["decision"] for row in rows[:3]] == ["shown", judged, "turn"]
+    assert {row["decision"] for row in rows[3:]} <= {"shown"}  # an alert that came again
+    assert math.degrees(rows[2]["turn_rad"]) == pytest.approx(by_deg) == turn["value"]
+    assert rows[0]["response_s"] < rows[1]["response_s"] <= rows[2]["response_s"]
+    assert (closest_m(session.out) > KEPT_M) == kept
+    dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=tmp_path / "again")
+    for table in session.out.glob("*.parquet"):
+        assert (tmp_path / "again" / table.name).read_bytes() == table.read_bytes(), table.name
+
+
+@pytest.fixture(scope="module")
+def alerted(browser, tmp_path_factory):
+    """A page with an alert on it, for what only looks and clicks; the scene goes on meanwhile."""
+    with pytest.MonkeyPatch.context() as patch:
+        sets = (*SETS, "title='''a title & " + HOSTILE + "'''",
+                f"blocks.traffic.intruders[0].name='{HOSTILE}'")  # fmt: skip
+        out = tmp_path_factory.mktemp("alerted") / "run"
+        session = Session(
+            patch, out, factor="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",)
+        )
+        screen = Screen(browser, session.address)
+        screen.page.keyboard.press("Enter")
+        screen.when("App.state().alerts.length")
+        yield session, screen
+        session.stop()
+        screen.close(session.authority)
+        session.ended()
+
+
+def test_names_carry_no_markup(alerted):
+    _, screen = alerted
+    page = screen.page
+    assert HOSTILE in page.locator("#contacts li").first.inner_text()
+    assert page.locator("h1").inner_text() == f"a title & {HOSTILE}"
+    assert page.locator("script").count() == 1
+
+
+def test_another_browser_watches_and_cannot_decide(browser, alerted):
+    session, _ = alerted
+    screen = Screen(browser, session.address)
+    assert screen.state()["role"] == "watcher"
+    screen.when("App.state().t !== null")
+    buttons = screen.page.locator("#decide button")
+    assert [button.is_disabled() for button in buttons.all()] == [True] * 6
+    screen.page.keyboard.press("ArrowRight")
+    screen.page.evaluate("Link.decide({ decision: 'turn', target: -1, value: 20 })")
+    screen.when("App.said.some(one => one.why === 'this page only watches')")
+    screen.close(session.authority)
+
+
+def test_a_page_of_another_origin_gets_no_socket(browser, alerted):
+    session, _ = alerted
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto("data:text/html,<p>hostile")
+    answer = page.evaluate(
+        "url => new Promise(done => { const s = new WebSocket(url);"
+        " s.onopen = () => done('open'); s.onerror = () => done('refused'); })",
+        f"ws://{session.authority}/socket?token={session.token}",
+    )
+    assert answer == "refused"
+    context.close()
+
+
+def test_everything_answers_to_the_keyboard(alerted):
+    _, screen = alerted
+    page = screen.page
+    page.locator("#theme").focus()
+    reached = []
+    for _ in range(20):
+        reached.append(page.evaluate("document.activeElement.id"))
+        page.keyboard.press("Tab")
+    wanted = "theme scope in out mute contacts verify reject turn-by left right climb-by up down"
+    assert [name for name in wanted.split() if name not in reached] == []
+    page.locator("#scope").focus()
+    theme = page.evaluate("document.documentElement.dataset.theme")
+    page.keyboard.press("d")
+    assert page.evaluate("document.documentElement.dataset.theme") != theme
+    before = screen.state()["range"]
+    page.keyboard.press("+")
+    assert screen.when(f"App.state().range < {before}")["range"] < before
+    page.keyboard.press("s")
+    assert page.locator("#mute").get_attribute("aria-pressed") == "true"
+    page.keyboard.press("n")
+    assert screen.state()["chosen"] == 0
+    for name in page.locator("button, select, canvas, ul").all():
+        told = [name.get_attribute("aria-label"), name.inner_text()]
+        assert any(told), name
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_words_and_symbols_stand_out_from_their_ground(alerted, theme):
+    """WCAG 2.2 AA: 4.5 to 1 for text (1.4.3), 3 to 1 for symbols (1.4.11)."""
+    _, screen = alerted
+    page = screen.page
+    page.evaluate("name => { document.documentElement.dataset.theme = name; }", theme)
+    script = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
+    colour = {
+        name: luminance(page.evaluate(script, name))
+        for name in ("ground", "panel", "ink", "faint", "caution", "warning", "eo", "ir", "radar",
+                     "sight", "traffic", "own", "symbol-caution", "symbol-warning", "on-symbol")
+    }  # fmt: skip
+    texts = ("ink", "faint", "caution", "warning", "eo", "ir", "radar", "sight", "traffic")
+    for name, under in itertools.product(texts, ("ground", "panel")):
+        assert ratio(colour[name], colour[under]) >= 4.5, (name, under)
+    for name in ("own", "symbol-caution", "symbol-warning"):
+        assert ratio(colour[name], colour["ground"]) >= 3.0, name
+    for name in ("symbol-caution", "symbol-warning"):
+        assert ratio(colour["on-symbol"], colour[name]) >= 3.0, name
+
+
+def ratio(one, other):
+    return (max(one, other) + 0.05) / (min(one, other) + 0.05)
+
+
+def luminance(colour):
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+
+def test_a_page_that_is_loaded_again_decides_still_and_lost_nothing(alerted):
+    _, screen = alerted
+    screen.page.locator("#scope").focus()
+    screen.page.keyboard.press("ArrowUp")
+    taken = screen.taken("climb")
+    screen.page.reload()
+    assert screen.when("App.state().role !== ''")["role"] == "operator"
+    first = screen.page.locator("#log li").first
+    assert first.inner_text() == f"{taken['time']:.2f} s: climb 1000 ft {HOSTILE}"
