@@ -15,7 +15,7 @@ from components.alerting.followed_tracks import FollowedTracks
 from components.alerting.lasting_memory import LastingMemory
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import AlertMemory
-from components.alerting.own_flight import OwnFlight
+from components.alerting.own_poses import OwnPoses
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
 from components.geometry.attitude import body_to_ned
@@ -107,7 +107,7 @@ class DaidalusAlerting(Component):
         self._configuration: Configuration = configuration
         self._alerter = configuration.alerters[self.p.alerter - 1]
         self._roster: Any = None
-        self._own = OwnFlight(self.context.ticks_per_s)
+        self._own = OwnPoses(self.context.ticks_per_s)
         self._followed = FollowedTracks(self._configuration["hysteresis_time"])
 
     def serves_replicas(self) -> bool:

@@ -10,7 +10,7 @@ from pydantic import Field
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out, smaller
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import Component, NonNegativeRational
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
@@ -64,6 +64,12 @@ class TurnOut(Component):
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
+        rate_deg_s = math.degrees(self._configuration["turn_rate"])
+        if 0.0 < rate_deg_s < SLOWEST_TURN_DEG_S:
+            raise ValueError(
+                f"turn_rate of its configuration is {rate_deg_s:g} deg/s: it must be at least "
+                f"{SLOWEST_TURN_DEG_S:g}, or 0 for 3"
+            )
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By replica, from when on it may turn again.
         self._free_from: dict[int, int] = {}
@@ -73,31 +79,33 @@ class TurnOut(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        ticks, told = [], []
-        replica = wake.replica
-        for place in np.flatnonzero(alerts.highest() >= self.p.level).tolist():
-            tick, run = int(wake.ticks[place]), int(replica[place])
-            if tick < self._free_from.get(run, 0):
-                continue
-            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-            manoeuvre = self._manoeuvre(alerts, place, entries)
-            if manoeuvre is not None:
-                ticks.append(tick)
-                told.append(manoeuvre)
-                self._free_from[run] = tick + self._pause_ticks
-        return Manoeuvres.of(ticks, told) if ticks else None
-
-    def _manoeuvre(self, alerts: AlertLevels, place: int, entries: slice) -> Manoeuvre | None:
-        """Return what leads out of the band, or None."""
-        conf = self._configuration
+        told: dict[int, Manoeuvre] = {}
+        alerted = np.flatnonzero(alerts.highest() >= self.p.level)
+        left = zip(alerted.tolist(), wake.replica[alerted].tolist(), strict=True)
+        waiting = list(left)
         kind = _KINDS[self.p.manoeuvre]
-        changes = changes_out(
-            kind, conf, self._alerter, alerts.own_motion, alerts.relative, place, entries,
-            alerts.deviations,
-        )  # fmt: skip
-        change = None if changes is None else smaller(changes)
-        if change is None:
-            return None
+        while waiting:
+            # The first row of every replica at which it is free, and then on to the next ones.
+            now: dict[int, int] = {}
+            later = []
+            for place, run in waiting:
+                if run in now:
+                    later.append((place, run))
+                elif wake.ticks[place] >= self._free_from.get(run, 0):
+                    now[run] = place
+            rows = list(now.values())
+            found = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+            for (run, place), changes in zip(now.items(), found, strict=True):
+                change = None if changes is None else smaller(changes)
+                if change is not None:
+                    told[place] = self._manoeuvre(change)
+                    self._free_from[run] = int(wake.ticks[place]) + self._pause_ticks
+            waiting = later
+        return Manoeuvres.at_rows(wake.ticks, told)
+
+    def _manoeuvre(self, change: float) -> Manoeuvre:
+        """Return what makes a change."""
+        conf = self._configuration
         if self.p.manoeuvre == "climb":
             beyond_m = math.copysign(self.p.beyond_m, change)
             rate_mps = conf["vertical_rate"] or _VERTICAL_RATE_MPS

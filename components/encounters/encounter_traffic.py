@@ -4,11 +4,14 @@ Which one it is is a parameter, so that a study has one encounter per replica. A
 function of its number: the same in every scene and condition.
 """
 
+from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from components.encounters.encounter_set import EncounterSet
@@ -19,6 +22,7 @@ from components.encounters.pairing import PairSampler
 from components.encounters.set_file import read_set
 from components.traffic.files import FileParameters, RecordedTraffic
 from components.traffic.traffic_file import TrafficFile
+from components.traffic.trajectory import SampledTrajectory
 from dsa_des.block.component import ScenePath
 
 
@@ -80,7 +84,7 @@ class _EncounterTraffic(RecordedTraffic):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
         if given[0] is not None:
             self.found = replace(self.found, reference_deg=given)
-        own, *others = self.found.flights(self.place, self.p.dynamics)
+        own, *others = _flights(self.found, self.place, self.p.dynamics)
         notes = [f"encounter {self.found.numbers[self.place]} of {len(self.found)}"]
         if self.found.skipped:
             notes.append(f"{self.found.skipped} damaged encounters of the set were skipped")
@@ -108,6 +112,18 @@ class ModelTraffic(_EncounterTraffic):
     Parameters = ModelParameters
     lockstep = True
 
+    @classmethod
+    def prepare(cls, parameters: Sequence[Any]) -> None:
+        """Make the encounters that many blocks will ask for, all at once."""
+        wanted: dict[Any, set[int]] = {}
+        for p in parameters:
+            wanted.setdefault(_model_key(p), set()).add(p.encounter)
+        for key, numbers in wanted.items():
+            new = np.array(sorted(n for n in numbers if (*key, n) not in _MADE), dtype=np.int64)
+            for run in np.split(new, np.flatnonzero(np.diff(new) != 1) + 1):
+                if len(run) > 1:
+                    _make(key, range(int(run[0]), int(run[-1]) + 1))
+
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter that a block's parameters name, and its place there.
@@ -118,18 +134,54 @@ def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
         If there is no such file, model or encounter.
     """
     if issubclass(cls, ModelTraffic):
-        intruder = parameters.intruder_file or parameters.file
-        found = _made(parameters.file, intruder, parameters.model_seed, parameters.encounter)
-        return found, 0
+        return _made(_model_key(parameters), parameters.encounter), 0
     found = read_set(parameters.file, parameters.skip_damaged)
     return found, found.place(parameters.encounter)
 
 
-@lru_cache(maxsize=4096)
-def _made(file: Path, intruder: Path, seed: int, number: int) -> EncounterSet:
-    rules = PairingRules()
-    pairs = _sampler(file, intruder, seed).pairs(range(number, number + 1))
-    return set_of_pairs(pairs, rules.closest_s, (0.0, 0.0), str(file))
+#: Encounters of models that were made last, each a set of its own, by model and number.
+_MADE: OrderedDict[Any, EncounterSet] = OrderedDict()
+#: Flights that were flown last, with their sets.
+_FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = OrderedDict()
+# So many are kept: a study asks for each encounter of a chunk several times.
+_MOST_MADE, _MOST_FLOWN = 4096, 1200
+
+
+def _kept(cache: OrderedDict[Any, Any], most: int, key: Any, value: Any) -> Any:
+    cache[key] = value
+    while len(cache) > most:
+        cache.popitem(last=False)
+    return value
+
+
+def _model_key(parameters: Any) -> tuple[Path, Path, int]:
+    intruder = parameters.intruder_file or parameters.file
+    return parameters.file, intruder, parameters.model_seed
+
+
+def _made(key: tuple[Path, Path, int], number: int) -> EncounterSet:
+    if (*key, number) not in _MADE:
+        _make(key, range(number, number + 1))
+    return _MADE[(*key, number)]
+
+
+def _make(key: tuple[Path, Path, int], numbers: range) -> None:
+    pairs, rules = _sampler(*key).pairs(numbers), PairingRules()
+    for place, number in enumerate(numbers):
+        one = pairs if len(numbers) == 1 else pairs.some(np.array([place]))
+        made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
+        _kept(_MADE, _MOST_MADE, (*key, number), made)
+
+
+def _flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:
+    """Return the flights of an encounter; traffic and metrics ask for the same ones."""
+    # Of a set put elsewhere what was read is the same: the arrays stand for it.
+    key = id(found.starts), found.reference_deg, place, dynamics
+    if key in _FLOWN:
+        return _FLOWN[key][1]
+    made: list[SampledTrajectory] = found.flights(place, dynamics)
+    _kept(_FLOWN, _MOST_FLOWN, key, (found, made))
+    return made
 
 
 @lru_cache(maxsize=4)

@@ -1,35 +1,35 @@
 """How the ownship gets out of the bands around it, of an alerting block's message."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
 from components.alert_configuration.margins import Deviations, margins
-from components.guidance.bands import GuidedIntruder, guidance
+from components.guidance.bands import Guidance, guidance_of_many
 from components.guidance.intervals import FULL_TURN
+from components.guidance.regions import GuidedIntruders
 from components.guidance.resolution import resolution
 from components.guidance.situation import State
-from components.well_clear.detection import some_bounds
-from dsa_des.arrays.types import FloatArray
+from components.messages.alerts import AlertLevels
+from dsa_des.arrays.types import IntArray
 
 _OWN = ("alt_m", "east_mps", "north_mps", "climb_mps")
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
+
+
+Changes = tuple[float, float]
 
 
 def changes_out(
     kind_name: str,
     configuration: Configuration,
     alerter: Alerter,
-    own_motion: Mapping[str, FloatArray],
-    relative: Mapping[str, FloatArray],
-    row: int,
-    entries: slice,
-    deviations: Mapping[str, FloatArray] | None = None,
-) -> tuple[float, float] | None:
-    """Return the smallest changes to either side that lead out of the bands at one instant.
+    alerts: AlertLevels,
+    rows: Sequence[int],
+) -> list[Changes | None]:
+    """Return the smallest changes to either side that lead out of the bands at some instants.
 
     Parameters
     ----------
@@ -37,42 +37,53 @@ def changes_out(
     configuration : Configuration
     alerter : Alerter
         Of all targets.
-    own_motion, relative : mapping
-        As in an alerting block's message: of the ownship (rows,), and ownship less target
-        (entries,).
-    row : int
-    entries : slice
-        Of that row.
-    deviations : mapping of (entries,), optional
-        Standard deviations by the fields of `components.alert_configuration.margins.Deviations`,
-        for levels that heed them.
+    alerts : AlertLevels
+    rows : sequence of int
+        Of the message; each is looked at by itself.
 
     Returns
     -------
-    (float, float) or None
+    list of (float, float) or None
         To the left or down, negative, and to the right or up, positive, rad, m/s or m; infinite
         where nothing there leads out. None where the own value needs no change or is not known yet.
     """
-    own_values: list[Any] = [np.asarray(own_motion[name][row]) for name in _OWN]
-    if not np.all(np.isfinite(own_values)):
-        return None
-    alt, *velocity = own_values
-    own = State(np.zeros(()), np.zeros(()), alt, *velocity)
-    parts = [relative[name][entries] for name in _RELATIVE]
+    found: list[Changes | None] = [None] * len(rows)
+    own = np.array([alerts.own_motion[name][rows] for name in _OWN]).reshape(len(_OWN), -1)
+    known = np.flatnonzero(np.isfinite(own).all(axis=0))
+    first = alerts.offsets[np.asarray(rows, dtype=np.int64)]
+    counts = alerts.offsets[np.asarray(rows, dtype=np.int64) + 1] - first
+    for count in np.flatnonzero(np.bincount(counts[known])).tolist():
+        alike = known[counts[known] == count]
+        zero = np.zeros(len(alike))
+        state = State(zero, zero, *own[:, alike])
+        intruders = [
+            _intruder(alerts, first[alike] + i, state, configuration, alerter) for i in range(count)
+        ]
+        every = guidance_of_many(kind_name, configuration, state, intruders)
+        for place, guided in zip(alike.tolist(), every, strict=True):
+            found[place] = _changes(guided, configuration["corrective_region"], kind_name == "hdir")
+    return found
+
+
+def _intruder(
+    alerts: AlertLevels,
+    entries: IntArray,
+    own: State,
+    configuration: Configuration,
+    alerter: Alerter,
+) -> GuidedIntruders:
+    """Return one intruder of each of some ownships."""
+    parts = [alerts.relative[name][entries] for name in _RELATIVE]
     bounds = None
-    if deviations:
-        of_row = Deviations(*(deviations[name][entries] for name in Deviations._fields))
-        bounds = margins(configuration, of_row, np.hypot(parts[0], parts[1]))
-    intruders = [
-        GuidedIntruder(
-            State(*(mine - part[i] for mine, part in zip(own, parts, strict=True))),
-            alerter,
-            bounds=some_bounds(bounds, i),
-        )
-        for i in range(len(parts[0]))
-    ]
-    found = guidance(kind_name, configuration, own, intruders)
-    region, cyclic = configuration["corrective_region"], kind_name == "hdir"
+    if alerts.deviations:
+        wrong = Deviations(*(alerts.deviations[name][entries] for name in Deviations._fields))
+        bounds = margins(configuration, wrong, np.hypot(parts[0], parts[1]))
+    state = State(*(mine - part for mine, part in zip(own, parts, strict=True)))
+    early = np.zeros(len(entries), dtype=np.int64)
+    return GuidedIntruders(state, alerter, early, bounds=bounds)
+
+
+def _changes(found: Guidance, region: str, cyclic: bool) -> Changes | None:
     way = resolution(found.bands, found.own_value, region, cyclic)
     if way is None:
         return None

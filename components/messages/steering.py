@@ -7,8 +7,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from components.messages.columns import DESCRIBED
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message, per_row
+
+#: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
+SLOWEST_TURN_DEG_S = 0.1
 
 
 class Manoeuvre(NamedTuple):
@@ -87,6 +90,15 @@ class Manoeuvres(Message):
         """Return the message of manoeuvres, each told at an instant."""
         parts = np.array(told, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
         return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
+
+    @classmethod
+    def at_rows(cls, ticks: IntArray, told: Mapping[int, Manoeuvre]) -> Self | None:
+        """Return the message of manoeuvres told at some of the instants `ticks`, by their places.
+
+        None without any.
+        """
+        rows = sorted(told)
+        return cls.of(ticks[rows].tolist(), [told[row] for row in rows]) if told else None
 
     @classmethod
     def initial(cls, values: Mapping[str, object]) -> Self:

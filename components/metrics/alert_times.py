@@ -1,6 +1,7 @@
 """Whether alerts come in time (``alert_times``): before well clear is lost, and only then.
 
-Flights are those of the traffic: where the ownship is steered, they are what it would have flown.
+Where the ownship is steered, losses are by default those of what it would have flown: an alert that
+was heeded is no nuisance.
 """
 
 from collections.abc import Mapping
@@ -10,9 +11,10 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.encounter import SizeParameters, losses_s, read_flights
+from components.metrics.encounter import STEP, SizeParameters, losses_s, read_flights
 from components.metrics.rows import TargetMetric, TargetParameters, is_named, of_target
 from components.metrics.separation import traffic_block
+from components.metrics.steered import ToldManoeuvres
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
@@ -28,8 +30,10 @@ class AlertTimeParameters(TargetParameters, SizeParameters):
     surprise_s: float = Field(
         default=5.0, ge=0, description="A level is a surprise sooner after the one below it, s."
     )
-    step_s: float = Field(
-        default=0.1, gt=0, le=10, description="Spacing of the times at which distances are taken."
+    step_s: float | None = STEP
+    steered: bool = Field(
+        default=False,
+        description="Take the flights as the ownship was told to fly them, not as planned.",
     )
 
 
@@ -49,6 +53,9 @@ class AlertTimes(TargetMetric):
         super().__init__(parameters, scene)
         traffic_block(scene)
         self._blocks = recorded_by(scene, "alerts")
+        if parameters.steered:
+            self._told = ToldManoeuvres(scene)
+            self.tables = {**self.tables, **self._told.tables}
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
@@ -68,7 +75,8 @@ class AlertTimes(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         read = partial(losses_s, self.p.sizes_m)
-        lost_s, nmac_s, _ = read_flights(group, self.p.step_s, self.p.target, read, 3)
+        told = self._told.of(group) if self.p.steered else None
+        lost_s, nmac_s, _ = read_flights(group, self.p.step_s, self.p.target, read, 3, told)
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

@@ -22,6 +22,7 @@ from components.metrics.separation import (
     separations,
     traffic_block,
 )
+from components.metrics.steered import Told, ToldManoeuvres
 from components.sensor.cut_off import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -35,6 +36,16 @@ _NOWHERE = (float("inf"), float("nan"), "")
 _BEFORE = ("detection", "declaration")
 _CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
 _WELL_CLEAR, _NMAC = PRESETS["astm_f3442"], PRESETS["nmac"]
+
+
+#: Of metrics of losses; ``step_s`` of None looks between samples too.
+STEP: Any = Field(
+    default=None,
+    gt=0,
+    le=10,
+    description="Take distances at this spacing only, s. By default entries are found between "
+    "samples too, to 1 ms.",
+)
 
 
 class EncounterParameters(DeclarationParameters):
@@ -85,13 +96,16 @@ class SizeParameters(Parameters):
 class WellClearParameters(EncounterParameters, SizeParameters):
     """Parameters of loss of well clear."""
 
+    step_s: float | None = STEP  # type: ignore[assignment]
+
 
 def read_flights(
     group: Group,
-    step_s: float,
+    step_s: float | None,
     target: str | None,
     read: Callable[[list[RelativeFlight]], tuple[float, ...]],
     width: int,
+    told: Mapping[int, Told] | None = None,
 ) -> FloatArray:
     """Return what `read` makes of every replica's flights, shape (width, replicas).
 
@@ -100,13 +114,15 @@ def read_flights(
     Parameters
     ----------
     group : Group
-    step_s : float
-        Spacing of the times at which distances are taken.
+    step_s : float or None
+        Spacing of the times at which distances are taken; None looks between them for losses.
     target : str or None
         Which one counts; None for all.
     read : callable
     width : int
         How many values it returns.
+    told : mapping, optional
+        What the ownship of a replica was told to fly; others fly on as they are.
     """
     known: dict[tuple[Any, ...], tuple[float, ...]] = {}
     values = np.empty((width, len(group)))
@@ -114,6 +130,10 @@ def read_flights(
     moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
     scenes = group.scenes if moved else [group.scene] * len(group)
     for number, scene in enumerate(scenes):
+        if told and number in told:
+            found = separations(scene, step_s, told[number])
+            values[:, number] = read([s for s in found if target in (None, s.name)])
+            continue
         key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
         if key not in known:
             found = separations(scene, step_s)
@@ -130,12 +150,15 @@ class _Encounter(TargetMetric):
         super().__init__(parameters, scene)
         traffic_block(scene)
         self.sensors = sensors_of(scene, parameters.sensors)
+        self._told = ToldManoeuvres(scene)
+        self.tables = {**self.tables, **self._told.tables}
 
     def of_flights(
         self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
     ) -> FloatArray:
-        """Return what `read` makes of every replica's flights, shape (width, replicas)."""
-        return read_flights(group, self.p.step_s, self.p.target, read, width)
+        """Return what `read` makes of every replica's flights as flown, (width, replicas)."""
+        told = self._told.of(group)
+        return read_flights(group, self.p.step_s, self.p.target, read, width, told)
 
 
 class ClosestApproach(_Encounter):

@@ -9,48 +9,33 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
-from components.messages.steering import Manoeuvre
-from components.metrics.encounter import SizeParameters, losses_s, read_flights
-from components.metrics.separation import separations, traffic_block
+from components.metrics.encounter import STEP, SizeParameters, losses_s, read_flights
+from components.metrics.separation import traffic_block
+from components.metrics.steered import ToldManoeuvres
 from dsa_des.arrays.types import AnyArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, Group, Metric, Result
-
-_TOLD = Manoeuvre._fields
 
 
 class RiskParameters(SizeParameters):
     """What counts as a loss of well clear, and as a near mid-air collision, and how it is found."""
 
-    step_s: float = Field(
-        default=0.1, gt=0, le=10, description="Spacing of the times at which distances are taken."
-    )
+    step_s: float | None = STEP
 
 
 class Mitigated(Metric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
     Parameters = RiskParameters
-    tables = {"manoeuvres": ("block", "time_s", *_TOLD)}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        traffic = traffic_block(scene).name
-        #: Block that steers → how long its word is on the way.
-        self._delays_s: dict[str, float] = {}
-        for wire in scene.wires:
-            if (wire.target, wire.input) == (traffic, "manoeuvres"):
-                if wire.jitter_s or wire.drop_probability or wire.queued or wire.delay_scans:
-                    raise ValueError(
-                        f"the wire from {wire.source!r} to {traffic!r} must have a fixed delay in "
-                        "seconds, without jitter, loss or a processor: when manoeuvres begin is "
-                        "not recorded"
-                    )
-                self._delays_s[wire.source] = float(wire.total_delay_s)
-        if not self._delays_s:
-            raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {traffic!r}")
+        self._told = ToldManoeuvres(scene)
+        if not self._told:
+            name = traffic_block(scene).name
+            raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
+        self.tables = {**self.tables, **self._told.tables}
 
     def results(self) -> list[Result]:
         """Return both events, nominal and mitigated."""
@@ -65,27 +50,10 @@ class Mitigated(Metric):
         """Return all of it for every replica."""
         read = partial(losses_s, self.p.sizes_m)
         nominal = read_flights(group, self.p.step_s, None, read, 3)[:2]
-        mitigated = nominal.copy()
-        for replica, told in self._manoeuvres(group).items():
-            scene = group.scenes[replica]
-            mitigated[:, replica] = read(separations(scene, self.p.step_s, told))[:2]
+        told = self._told.of(group)
+        mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]
         found: dict[str, AnyArray] = {}
         for k, name in enumerate(("well_clear_lost", "nmac")):
             found[f"{name}_nominal"] = (~np.isnan(nominal[k])).astype(float)
             found[f"{name}_mitigated"] = (~np.isnan(mitigated[k])).astype(float)
         return found
-
-    def _manoeuvres(self, group: Group) -> dict[int, list[tuple[float, Manoeuvre]]]:
-        """Return the manoeuvres of every replica that has any, and when they come, s."""
-        table: Any = group.tables["manoeuvres"]
-        found: dict[int, list[tuple[float, Manoeuvre]]] = {}
-        names = table["block"].names
-        rows = zip(
-            table["replica"].tolist(), table["block"].codes.tolist(), table["time_s"].tolist(),
-            *(table[name].tolist() for name in _TOLD), strict=True,
-        )  # fmt: skip
-        for replica, block, time_s, *told in rows:
-            came_s = time_s + self._delays_s[names[block]]
-            if came_s < group.duration_s[replica]:
-                found.setdefault(replica, []).append((came_s, Manoeuvre(*told)))
-        return {replica: sorted(told, key=lambda one: one[0]) for replica, told in found.items()}

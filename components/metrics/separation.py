@@ -22,6 +22,7 @@ from components.traffic.sample_times import (
 )
 from components.traffic.source import TrafficSource
 from components.traffic.steered_flight import SteeredFlight
+from components.well_clear.curved_flights import cylinder_spans
 from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -72,16 +73,23 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
+#: Spacing of the grid where none is given, s.
+STEP_S = 0.1
+# The speeds of turns and long legs hold to 2e-4, and the ownship's level plane turns with it.
+_SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
+
+
 def separations(
-    scene: Scene, step_s: float, told: Sequence[tuple[float, Manoeuvre]] = ()
+    scene: Scene, step_s: float | None, told: Sequence[tuple[float, Manoeuvre]] = ()
 ) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
     ----------
     scene : Scene
-    step_s : float
-        Spacing of the grid; the times at which the source itself has samples are added.
+    step_s : float or None
+        Spacing of the grid; the times at which the source itself has samples are added. None looks
+        between them for losses (`first_inside`), with a grid of `STEP_S` for all else.
     told : sequence of (time in s, Manoeuvre)
         What the ownship was told to fly, in order of time; by default it flies on.
     """
@@ -90,7 +98,7 @@ def separations(
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
-    count = regular_count(step_s, float(duration))
+    count = regular_count(step_s or STEP_S, float(duration))
     end_s = float(duration)
     if told:
         source.own = SteeredFlight(source.own)
@@ -110,19 +118,22 @@ class RelativeFlight:
     source : TrafficSource
     number : int
         Which of its targets.
-    step_s : float
-        Spacing of the grid.
+    step_s : float or None
+        Spacing of the grid; None also looks between its times.
     count : int
         Number of its times.
     end_s : float
         Of the run.
     """
 
-    def __init__(self, source: Any, number: int, step_s: float, count: int, end_s: float) -> None:
+    def __init__(
+        self, source: Any, number: int, step_s: float | None, count: int, end_s: float
+    ) -> None:
         self._source, self._number = source, number
         self._target = source.targets[number]
         self.name: str = self._target.name
-        self._step_s, self._count = step_s, count
+        self.between_samples = step_s is None
+        self._step_s, self._count = step_s or STEP_S, count
         self.end_s = end_s
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
@@ -152,6 +163,20 @@ class RelativeFlight:
             )  # fmt: skip
             found.append((float(north[1] - north[0]), float(east[1] - east[0])))
         return found
+
+    @property
+    def closing_mps(self) -> float:
+        """No distance of the two changes faster, m/s."""
+        fastest = float(self._source.own.max_speed_mps + self._target.max_speed_mps)
+        return fastest * _SPEED_MARGIN + _TURN_MARGIN_MPS
+
+    def at(self, time_s: FloatArray) -> Separation:
+        """Return the distances at some times."""
+        return _separation(self._source, self._target, time_s)
+
+    def states(self, time_s: FloatArray) -> tuple[Any, Any]:
+        """Return the states of ownship and target at some times."""
+        return self._source.own.at(time_s), self._target.at(time_s)
 
     def pieces(self) -> Iterator[Separation]:
         """Give the distances, about `MOST_AT_ONCE` at a time."""
@@ -219,12 +244,17 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
 def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """Return when a target first is within each pair of distances (exclusive), s; NaN if never.
 
+    A flight that looks between samples is asked by `components.well_clear.curved_flights`, with its
+    error bound; others at their times only.
+
     Parameters
     ----------
     flight : RelativeFlight
     *limits_m : (horizontal, vertical)
     """
     found = [float("nan")] * len(limits_m)
+    if flight.between_samples:
+        return [_first_between_samples(flight, *limits) for limits in limits_m]
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
             inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
@@ -233,3 +263,18 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
         if not any(map(isnan, found)):
             break
     return found
+
+
+def _first_between_samples(flight: RelativeFlight, horizontal_m: float, vertical_m: float) -> float:
+    """Return when a flight first is inside a cylinder, at any time at all, s; NaN if never."""
+
+    def apart(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        piece = flight.at(time_s)
+        return piece.horizontal_m, piece.vertical_m
+
+    first_s, last_s = (float(times[0]) for times in flight.present_s())
+    between_s = max(first_s, 0.0), min(last_s, flight.end_s)
+    spans = cylinder_spans(
+        apart, between_s, flight.closing_mps, horizontal_m, vertical_m, first_only=True
+    )
+    return float(spans[0, 0]) if len(spans) else float("nan")

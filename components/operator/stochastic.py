@@ -1,6 +1,7 @@
 """An operator who answers alerts as pilots were measured to (``operator.stochastic``)."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydantic import Field
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
@@ -40,7 +41,9 @@ class StochasticParameters(ConfParameters):
     turn_share: float = Field(
         default=0.65, ge=0, le=1, description="Probability of a turn instead of a climb or descent."
     )
-    turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
@@ -103,26 +106,22 @@ class Stochastic(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        ticks, told = [], []
         highest, replica = alerts.highest(), wake.replica
         own_ticks = wake.own_ticks(wake.ticks)
         # Without an alert, now or before, there is nothing to do.
         alerted = highest >= self.p.level
         busy = [run for run, mind in self._minds.items() if mind.since is not None]
         followed = np.isin(replica, np.union1d(replica[alerted], np.array(busy, dtype=np.int64)))
+        acting: list[tuple[int, Mind]] = []
         for place in np.flatnonzero(followed).tolist():
             run = int(replica[place])
             mind = self._minds.get(run, Mind(run))
             mind, acts = self._followed(mind, int(own_ticks[place]), int(highest[place]))
             self._minds[run] = mind
-            if not acts:
-                continue
-            entries = slice(int(alerts.offsets[place]), int(alerts.offsets[place + 1]))
-            manoeuvre = self._manoeuvre(mind, alerts, place, entries)
-            if manoeuvre is not None:
-                ticks.append(int(wake.ticks[place]))
-                told.append(manoeuvre)
-        return Manoeuvres.of(ticks, told) if ticks else None
+            if acts:
+                acting.append((place, mind))
+        told = self._told_at(alerts, acting)
+        return Manoeuvres.at_rows(wake.ticks, told)
 
     def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool]:
         """Take in the highest level of an instant; return also whether the operator acts at it."""
@@ -158,24 +157,31 @@ class Stochastic(Component):
             draws = np.array([self._draw(mind, self._response, k) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
-    def _manoeuvre(
-        self, mind: Mind, alerts: AlertLevels, place: int, entries: slice
-    ) -> Manoeuvre | None:
-        draws, turns = None, self.p.turn_share >= 0.5
-        if not self.p.deterministic:
-            turns = self._draw(mind, self._steering, 0) < self.p.turn_share
-            draws = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
+    def _told_at(
+        self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
+    ) -> dict[int, Manoeuvre]:
+        """Return what operators who act at some rows of the alerts steer, by row."""
+        by_turn: dict[int, bool] = {}
+        draws: dict[int, Draws | None] = {}
+        for place, mind in acting:
+            by_turn[place], draws[place] = self.p.turn_share >= 0.5, None
+            if not self.p.deterministic:
+                by_turn[place] = self._draw(mind, self._steering, 0) < self.p.turn_share
+                draws[place] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
+        found: dict[int, Manoeuvre] = {}
         # Who finds no way out by one kind tries the other.
-        for by_turn in (turns, not turns):
-            if 0.0 < self.p.turn_share < 1.0 or by_turn == turns:
-                changes = changes_out(
-                    "hdir" if by_turn else "alt", self._configuration, self._alerter,
-                    alerts.own_motion, alerts.relative, place, entries, alerts.deviations,
-                )  # fmt: skip
-                change = 0.0 if changes is None else steering(changes, by_turn, draws)
-                if change != 0.0:
-                    return self._told(change, by_turn)
-        return None
+        for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
+            for turns in (True, False):
+                rows = [n for n, it in by_turn.items() if n not in found and (it == turns) == first]
+                if not rows:
+                    continue
+                kind = "hdir" if turns else "alt"
+                every = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+                for row, changes in zip(rows, every, strict=True):
+                    change = 0.0 if changes is None else steering(changes, turns, draws[row])
+                    if change != 0.0:
+                        found[row] = self._told(change, turns)
+        return found
 
     def _told(self, change: float, by_turn: bool) -> Manoeuvre:
         if by_turn:

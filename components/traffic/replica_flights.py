@@ -21,6 +21,7 @@ def flown_by(face: Any, replicas: ReplicaRuns) -> Flown | None:
         As the first replica has it.
     replicas : ReplicaRuns
     """
+    type(face).prepare(replicas.parameters)
     parameters = getattr(face, "flown_of", None)
     found: Flown | None = None if parameters is None else parameters(replicas.parameters)
     return _made_one_by_one(face, replicas) if found is None else found

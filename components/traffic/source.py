@@ -141,6 +141,10 @@ class TrafficSource(SteeredOwnship):
                 speed_mps, self.targets, self.fleet, look.range_m
             )
 
+    @classmethod
+    def prepare(cls, parameters: Sequence[Any]) -> None:
+        """Do what can be done at once for blocks with these parameters, which will be made."""
+
     @property
     def says_truth(self) -> bool:
         """Whether the truth is recorded."""

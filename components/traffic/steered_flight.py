@@ -111,7 +111,7 @@ def flown_from(
     )
     along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
     speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
-    climb = float(around.alt_m[2] - around.alt_m[0]) / (2.0 * _BASE_S)
+    climb = 0.5 * float(around.alt_m[2] - around.alt_m[0]) / _BASE_S
     return ScriptedTrajectory(
         name,
         lat_deg=here[0],

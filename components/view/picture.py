@@ -27,7 +27,8 @@ class RunPicture:
     duration_s : float
     start_s : float
     sensors : list of dict
-        ``name``, ``colour``, ``marker``, and where known ``azimuth_deg`` and ``range_m``.
+        ``name``, ``colour``, ``marker``, and where known ``azimuth_deg`` and ``range_m``; of a
+        beam that sweeps clockwise over them ``sweep_s``, how long it takes from each scan on.
     targets : list of str
     tables : dict
         Columns of numbers by table: ``own``, ``truth``, ``scans``, ``detections``, ``fused``,

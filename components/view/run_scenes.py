@@ -3,6 +3,7 @@
 import json
 import tomllib
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -179,6 +180,11 @@ def _sensor(name: str, scene: dict[str, Any]) -> dict[str, Any]:
     if isinstance(limits, list) and len(limits) == 2:
         turned = float(block.get("mount_azimuth_deg", 0.0))
         found["azimuth_deg"] = [float(edge) + turned for edge in limits]
+    if block.get("beam_sweep") is True and "azimuth_deg" in found:
+        rate = Fraction(str(block["scan_rate_hz"])) * (
+            1 + Fraction(str(block.get("rate_error_ppm", 0))) / 10**6
+        )
+        found["sweep_s"] = float(1 / rate)
     if isinstance(block.get("range_km"), int | float):
         found["range_m"] = 1000.0 * block["range_km"]
     return found

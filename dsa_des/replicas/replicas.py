@@ -6,7 +6,7 @@ The scene is validated once; a replica validates again only what it changes.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -170,11 +170,75 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
     """
     if not replica.changes:
         return replace(scene, seed=replica.seed)
-    problems: list[Problem] = []
-    blocks, sections = dict(scene.blocks), dict(scene.sections)
-    duration = scene.duration_s
-    for key, value in replica.changes.items():
-        path = key_path(key)
+    paths = {key: key_path(key) for key in replica.changes}
+    try:
+        blocks, sections, duration = _all_changed(scene, replica.changes, paths)
+    except (ValidationError, ValueError, LookupError, TypeError):
+        problems: list[Problem] = []
+        blocks, sections, duration = _each_changed(scene, replica.changes, paths, problems)
+        if problems:
+            raise SceneError(problems) from None
+    wires = scene.wires
+    if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
+        wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
+    ticks_per_s = scene.ticks_per_s
+    if wires is not scene.wires or duration is not scene.duration_s or _times_differ(scene, blocks):
+        problems = []
+        ticks_per_s = check_times(SceneFile(scene.path, {}), blocks, wires, duration, problems)
+        if problems:
+            raise SceneError(problems)
+    return replace(
+        scene,
+        seed=replica.seed,
+        blocks=blocks,
+        sections=sections,
+        wires=wires,
+        duration_s=duration,
+        ticks_per_s=ticks_per_s,
+    )
+
+
+_Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
+
+
+def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
+    """Return blocks, sections and duration with all changes made at once, each table checked once.
+
+    Raises
+    ------
+    ValidationError, ValueError, LookupError, TypeError
+        If anything is wrong with any change.
+    """
+    blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
+    of_block: dict[str, dict[tuple[str | int, ...], Any]] = {}
+    for key, value in changes.items():
+        path = paths[key]
+        if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
+            of_block.setdefault(path[1], {})[path[2:]] = value
+        elif path[0] in sections and len(path) > 1:
+            sections[path[0]] = _changed(sections[path[0]], path[1:], value)
+        elif path == ("duration_s",):
+            duration = parse_rational(value)
+        else:
+            raise LookupError(key)
+    for name, mine in of_block.items():
+        block = blocks[name]
+        of_engine = BlockOptions.model_fields.keys() - block.cls.Parameters.model_fields.keys()
+        for path in [path for path in mine if path[0] in of_engine]:
+            block = replace(block, options=_changed(block.options, path, mine.pop(path)))
+        if mine:
+            block = replace(block, parameters=_changed_together(block.parameters, mine))
+        blocks[name] = block
+    return blocks, sections, duration
+
+
+def _each_changed(
+    scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any], problems: list[Problem]
+) -> _Changed:
+    """Make one change after the other, and say what is wrong with each."""
+    blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
+    for key, value in changes.items():
+        path = paths[key]
         try:
             if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
                 name = str(path[1])
@@ -193,25 +257,24 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
                 problems.append(_problem(scene, key, found.message, value))
         except (ValueError, LookupError, TypeError) as error:
             problems.append(_problem(scene, key, str(error), value))
-    wires = scene.wires
-    if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
-        wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
-    ticks_per_s = scene.ticks_per_s
-    if not problems:
-        ticks_per_s = check_times(SceneFile(scene.path, {}), blocks, wires, duration, problems)
-    if problems:
-        raise SceneError(problems)
-    return replace(
-        scene,
-        seed=replica.seed,
-        blocks=blocks,
-        sections=sections,
-        wires=wires,
-        duration_s=duration,
-        ticks_per_s=ticks_per_s,
-    )
+    return blocks, sections, duration
 
 
+def _times_differ(scene: Scene, blocks: Mapping[str, Block]) -> bool:
+    """Return whether exact times of any block are others than those of the scene."""
+    for name, block in scene.blocks.items():
+        one, other = block.parameters, blocks[name].parameters
+        if one is other:
+            continue
+        if block.cls.clock_of(one) != block.cls.clock_of(other):
+            return True
+        for what, value in other:
+            if isinstance(value, Fraction) and value != getattr(one, what):
+                return True
+    return False
+
+
+@lru_cache(maxsize=4096)
 def key_path(key: str) -> tuple[str | int, ...]:
     """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
     parts = unquoted(key).replace("[", ".").replace("]", "").split(".")
@@ -257,6 +320,37 @@ def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
     if isinstance(old, dict):
         return {**old, first: _changed(old.get(first), rest, value)}
     raise ValueError(f"{first!r}: there is no table around it")
+
+
+def _changed_together(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> Any:
+    """Return `old` with the values at many paths replaced; every model is validated once."""
+    if () in changes and len(changes) > 1:
+        raise ValueError  # a table and something in it: one after the other
+    if len(changes) == 1:
+        ((path, value),) = changes.items()
+        return _changed(old, path, value)
+    parts: dict[Any, dict[tuple[str | int, ...], Any]] = {}
+    for path, value in changes.items():
+        first, rest = path[0], path[1:]
+        if isinstance(old, list | tuple):
+            first, rest = _item(list(old), path)
+        parts.setdefault(first, {})[rest] = value
+    if isinstance(old, BaseModel):
+        model = type(old)
+        if not parts.keys() <= model.model_fields.keys():
+            raise LookupError
+        given = {name: getattr(old, name) for name in old.model_fields_set}
+        for name, mine in parts.items():
+            given[str(name)] = _changed_together(getattr(old, str(name)), mine)
+        return model.model_validate(given)
+    if isinstance(old, list | tuple):
+        items = list(old)
+        for place, mine in parts.items():
+            items[place] = _changed_together(items[place], mine)
+        return items
+    if isinstance(old, dict):
+        return {**old, **{n: _changed_together(old.get(n), mine) for n, mine in parts.items()}}
+    raise ValueError
 
 
 def _item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:

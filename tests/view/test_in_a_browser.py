@@ -13,6 +13,7 @@ from click.testing import CliRunner
 import dsa_des
 from components.examples import folder
 from components.view.command import view
+from tests.view.test_page import SCENE
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -173,3 +174,20 @@ def luminance(colour):
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
     linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
     return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+
+def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
+    scene = tmp_path / "scene.toml"
+    swept = "scan_rate_hz = 2\nbeam_sweep = true\nazimuth_deg = [-100, 120]"
+    text = SCENE.format(title="t", name="n").replace("scan_rate_hz = 2", swept)
+    scene.write_text(text)
+    dsa_des.run(dsa_des.load_scene(scene), out=tmp_path / "run")
+    assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
+    opened = browser.new_page()
+    opened.goto(f"file://{tmp_path / 'run.html'}")
+    found = [r for r in rows(tmp_path / "run", "detections", -1, 99) if r["block"] == "radar"]
+    for row in found[:4]:
+        opened.evaluate("t => App.seek(t)", row["illuminated_s"])
+        (beam,) = opened.evaluate("App.state().beams")
+        assert beam["azimuth_deg"] == pytest.approx(np.degrees(row["azimuth_rad"]), abs=1.5)
+    opened.close()

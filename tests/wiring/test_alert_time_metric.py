@@ -105,3 +105,30 @@ def test_distances_are_taken_so_often(tmp_path):
     """Between the tenths of a second at which scripted traffic knows its flights anyway."""
     fine = found(tmp_path, horizontal_m=499, step_s=0.05)
     assert fine["alert_to_loss_s"] + fine["first_alert_time_s"] == pytest.approx(30.05, abs=0.001)
+
+
+@covers("steered", of=KIND)
+def test_flights_may_be_those_as_flown(tmp_path):
+    """Told to turn, the ownship is not flown over: then the alert was for nothing."""
+    path = tmp_path / "one.conf"
+    recovery = "min_horizontal_recovery = 1 [m]\nmin_vertical_recovery = 1 [m]\n"
+    path.write_text(f"{CONF}{recovery}corrective_region = MID\n", encoding="utf-8")
+    scene = chain({}, targets=[behind("near", BEHIND_M, 60.0)], duration_s=50)
+    conf = {"conf": str(path)}
+    scene["blocks"] = {
+        "traffic": scene["blocks"]["traffic"],
+        "alarm": {"type": "alerting.daidalus", "scan_rate_hz": 4, **conf},
+        "avoidance": {"type": "avoidance.daidalus", **conf, "level": 1},
+    }
+    scene["wires"] = [
+        "traffic -> alarm -> avoidance",
+        {"from": "avoidance", "to": "traffic", "delay_s": 1, "holds": "nothing"},
+    ]
+    sizes = {"horizontal_m": 120, "vertical_m": 150, "nmac_horizontal_m": 60}
+    nuisance = [
+        measured(scene, {"metric": "alert_times", **sizes, "level": 1, "steered": steered})[
+            "alert_nuisance.alarm"
+        ]
+        for steered in (False, True)
+    ]
+    assert nuisance == [0, 1]

@@ -90,3 +90,23 @@ def test_without_a_loop_there_is_nothing_to_compare():
     open_loop = chain({"radar": RADAR}, targets=[crooked.ROLLING], duration_s=2)
     with pytest.raises(Exception, match="manoeuvres"):
         measured(open_loop, {"metric": "mitigated"})
+
+
+def test_other_metrics_are_of_the_flights_as_flown(flown):
+    """Loss, closest approach and severity of the steered flight, by the truth of its run."""
+    nearest = flown[:, 0].min()
+    sizes = {**SIZES, "horizontal_m": nearest * 1.01, "nmac_horizontal_m": nearest * 0.99}
+    lost = measured(scene(), {"metric": "well_clear", **sizes})
+    assert (lost["well_clear_lost"], lost["nmac"]) == (1, 0)
+    assert measured(scene(), "closest_approach")["closest_approach_m"] == pytest.approx(
+        np.hypot(*flown.T).min(), abs=0.5
+    )
+    alone = scene()
+    alone["wires"] = alone["wires"][:-1]
+    del alone["blocks"]["avoidance"]
+    alone["wires"] = [wire for wire in alone["wires"] if wire != "tracker -> avoidance"]
+    severe, less = (
+        measured(one, {"metric": "severity", "horizontal_m": 600.0, "tau_s": 0.0})["slowc_percent"]
+        for one in (alone, scene())
+    )
+    assert severe > less + 5.0 > 5.0

@@ -23,8 +23,8 @@ const Altitude = (() => {
         add(d.east_m[i], d.north_m[i], d.alt_m[i], { sensor: Data.sensors[d.sensor[i]] });
       }
     }
-    const far = Math.max(1000, ...marks.map((m) => m.far)) * 1.1;
-    const apart = Math.max(100, ...marks.map((m) => Math.abs(m.alt - own.alt))) * 1.2;
+    const far = marks.reduce((most, m) => Math.max(most, m.far), 1000) * 1.1;
+    const apart = marks.reduce((most, m) => Math.max(most, Math.abs(m.alt - own.alt)), 100) * 1.2;
     const left = 58, bottom = 18;
     const x = (m) => left + (m / far) * (width - left - 6);
     const y = (alt) => (height - bottom) / 2 - ((alt - own.alt) / apart) * ((height - bottom) / 2 - 4);
@@ -42,13 +42,13 @@ const Altitude = (() => {
       Symbols.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
         Symbols.colours.faint, "right");
     }
+    const batch = new Symbols.Batch();
     for (const m of marks) {
-      if (m.truth) {
-        Symbols.mark(c, "o", x(m.far), y(m.alt), 2, Symbols.colours.truth, true);
-      } else {
-        Symbols.mark(c, m.sensor.marker, x(m.far), y(m.alt), 4, m.sensor.colour, false);
-      }
+      const colour = m.truth ? Symbols.colours.truth : m.sensor.colour;
+      Symbols.outline(batch.path(colour, 1, Boolean(m.truth)), m.truth ? "s" : m.sensor.marker,
+        x(m.far), y(m.alt), m.truth ? 2 : 4);
     }
+    batch.draw(c);
     Symbols.aircraft(c, left, y(own.alt), Math.PI / 2, 7, Symbols.colours.own);
   }
   return { draw };

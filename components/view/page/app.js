@@ -41,9 +41,11 @@ const App = (() => {
     else seek(direction > 0 ? Data.duration_s : 0);
   }
 
-  function render() {
+  // Lists of all that is on screen are made for who looks at it by program only.
+  function render(listing = false) {
     const began = performance.now();
-    drawn = { t: state.t, detections: [], tracks: [], alerts: [], truth: [] };
+    drawn = { t: state.t, alerts: [] };
+    if (listing) Object.assign(drawn, { detections: [], tracks: [], truth: [] });
     Plan.draw(state.t, options, drawn);
     Altitude.draw(state.t, options);
     Timeline.draw(state.t);
@@ -196,7 +198,7 @@ const App = (() => {
 
   // What is on screen, for those who look at it by program.
   return {
-    state: () => { if (state.dirty) render(); return { ...drawn, playing: state.playing }; },
+    state: () => { render(true); return { ...drawn, playing: state.playing }; },
     seek, play, step, options,
     timing: () => ({ ...frames, mean_ms: frames.spent_ms / Math.max(1, frames.count) }),
   };

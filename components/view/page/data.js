@@ -56,7 +56,9 @@ const Data = (() => {
       i = end;
     }
   }
+  const known = { t: null, found: [] };
   function truths(t) {
+    if (known.t === t) return known.found;  // asked for by several parts of one picture
     const found = [];
     const c = tables.truth;
     for (const span of spans) {
@@ -69,6 +71,8 @@ const Data = (() => {
         });
       }
     }
+    known.t = t;
+    known.found = found;
     return found;
   }
 

@@ -2,6 +2,7 @@
 // The plan: east and north of the start, north or heading up.
 const Plan = (() => {
   const canvas = document.getElementById("plan");
+  const MOST_NAMES = 100;  // more names cover each other, and take longest to draw
   const LINES_FADE = 1;  // lines cover much of the plan, and fade soon
   const view = { east: 0, north: 0, perPixel: 40, turn: 0, width: 1, height: 1 };
 
@@ -59,68 +60,89 @@ const Plan = (() => {
     });
   }
 
+  // Where a sweeping beam looks: clockwise over the field of view, once from each scan on.
+  function beam(c, t, own, number, drawn) {
+    const sensor = Data.sensors[number], times = Data.scanTimes[number];
+    const last = Data.after(times, t) - 1;
+    if (!sensor.sweep_s || !sensor.azimuth_deg || last < 0) return;
+    const part = (t - times[last]) / sensor.sweep_s;
+    if (part > 1) return;
+    let [low, high] = sensor.azimuth_deg;
+    while (high <= low) high += 360;
+    const azimuth_deg = low + part * (high - low);
+    const bearing = own.heading + (azimuth_deg * Math.PI) / 180;
+    const far = sensor.range_m || view.perPixel * Math.hypot(view.width, view.height);
+    const [x, y] = place(own.east, own.north);
+    const [u, v] = place(own.east + far * Math.sin(bearing), own.north + far * Math.cos(bearing));
+    c.strokeStyle = sensor.colour;
+    c.lineWidth = 2;
+    c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+    drawn.beams.push({ sensor: sensor.name, azimuth_deg });
+  }
+
   function truth(c, t, options, drawn) {
-    const many = Data.targets.length > 100;
+    const few = Data.targets.length <= MOST_NAMES;
+    c.strokeStyle = Symbols.colours.truth;
+    c.lineWidth = 1;
+    c.beginPath();
     for (const one of Data.truths(t)) {
       const [x, y] = place(one.east, one.north);
       if (!inside(x, y)) continue;
-      drawn.truth.push({ target: one.target, east: one.east, north: one.north });
-      c.strokeStyle = Symbols.colours.truth;
-      c.lineWidth = 1;
-      c.beginPath();
+      if (drawn.truth) drawn.truth.push({ target: one.target, east: one.east, north: one.north });
       c.moveTo(x - 4, y); c.lineTo(x + 4, y);
       c.moveTo(x, y - 4); c.lineTo(x, y + 4);
       if (one.rate) {  // where it will be in ten seconds
         const [u, v] = place(one.east + 10 * one.rate[0], one.north + 10 * one.rate[1]);
         c.moveTo(x, y); c.lineTo(u, v);
       }
-      c.stroke();
-      if (!many || view.perPixel < 30) {
-        Symbols.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
-      }
+      if (few) Symbols.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
     }
+    c.stroke();
   }
 
   function detections(c, t, options, drawn) {
     const d = Data.tables.detections;
     const [from, to] = Data.recent("detections", t, options.fade);
     const far = view.perPixel * Math.hypot(view.width, view.height);
+    const batch = new Symbols.Batch();
     for (let i = from; i < to; i++) {
       const number = d.sensor[i];
       if (!options.sensors.has(number)) continue;
       const sensor = Data.sensors[number];
-      c.globalAlpha = Math.max(0.12, 1 - (t - d.time_s[i]) / options.fade);
       const ranged = Number.isFinite(d.east_m[i]);
-      drawn.detections.push({
-        sensor: sensor.name, target: Data.targets[d.target[i]] ?? null, time_s: d.time_s[i],
-        ranged, east_m: d.east_m[i], north_m: d.north_m[i], bearing_rad: d.bearing_rad[i],
-      });
+      if (drawn.detections) {
+        drawn.detections.push({
+          sensor: sensor.name, target: Data.targets[d.target[i]] ?? null, time_s: d.time_s[i],
+          ranged, east_m: d.east_m[i], north_m: d.north_m[i], bearing_rad: d.bearing_rad[i],
+        });
+      }
       if (ranged) {
         const [x, y] = place(d.east_m[i], d.north_m[i]);
-        if (inside(x, y)) Symbols.mark(c, sensor.marker, x, y, 5, sensor.colour, d.target[i] >= 0);
+        if (!inside(x, y)) continue;
+        const alpha = Math.max(0.12, 1 - (t - d.time_s[i]) / options.fade);
+        Symbols.outline(batch.path(sensor.colour, alpha, d.target[i] >= 0), sensor.marker, x, y, 5);
       } else if (Number.isFinite(d.bearing_rad[i]) && t - d.time_s[i] < LINES_FADE) {
-        c.globalAlpha = Math.max(0.15, 1 - (t - d.time_s[i]) / LINES_FADE);
+        const alpha = Math.max(0.15, 1 - (t - d.time_s[i]) / LINES_FADE);
         const [x, y] = place(d.from_east_m[i], d.from_north_m[i]);
         const [u, v] = place(d.from_east_m[i] + far * Math.sin(d.bearing_rad[i]),
           d.from_north_m[i] + far * Math.cos(d.bearing_rad[i]));
-        c.strokeStyle = sensor.colour;
-        c.lineWidth = 1;
-        c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+        const path = batch.path(sensor.colour, alpha, false, 1);
+        path.moveTo(x, y);
+        path.lineTo(u, v);
       }
     }
-    c.globalAlpha = 1;
+    batch.draw(c);
   }
 
-  function ellipse(c, x, y, track) {
+  function ellipse(path, x, y, track) {
     // 95 % of a normal distribution in two dimensions lie within 2.448 standard deviations.
     const { xx, xy, yy } = track;
     const mean = (xx + yy) / 2, part = Math.hypot((xx - yy) / 2, xy);
     const long = 2.448 * Math.sqrt(Math.max(mean + part, 0)) / view.perPixel;
     const short = 2.448 * Math.sqrt(Math.max(mean - part, 0)) / view.perPixel;
-    const angle = 0.5 * Math.atan2(2 * xy, xx - yy);
-    c.beginPath();
-    c.ellipse(x, y, long, short, -angle - view.turn, 0, 2 * Math.PI);
-    c.stroke();
+    const turn = -0.5 * Math.atan2(2 * xy, xx - yy) - view.turn;
+    path.moveTo(x + long * Math.cos(turn), y + long * Math.sin(turn));
+    path.ellipse(x, y, long, short, turn, 0, 2 * Math.PI);
   }
 
   // A track without a range: a dashed line with its name a third of the way to the edge.
@@ -140,28 +162,38 @@ const Plan = (() => {
     const k = Data.tables.tracks;
     const [from, to] = Data.latest("tracks", t);
     c.strokeStyle = Symbols.colours.track;
+    c.lineWidth = 1.5;
+    const sure = new Path2D(), tentative = new Path2D();
+    const few = to - from <= MOST_NAMES;
     for (let i = from; i < to; i++) {
       const label = k.number ? `#${k.number[i]}` : Data.targets[k.target[i]];
-      drawn.tracks.push({ label, time_s: k.time_s[i], east_m: k.east_m[i], north_m: k.north_m[i] });
+      if (drawn.tracks) {
+        drawn.tracks.push({ label, time_s: k.time_s[i], east_m: k.east_m[i],
+          north_m: k.north_m[i] });
+      }
       if (!Number.isFinite(k.east_m[i])) {
-        directionOnly(c, k, i, label);
+        directionOnly(c, k, i, few ? label : "");
         continue;
       }
       const [x, y] = place(k.east_m[i], k.north_m[i]);
       if (!inside(x, y)) continue;
-      if (k.tentative && k.tentative[i]) c.setLineDash([3, 3]);
-      Symbols.mark(c, "D", x, y, 8, Symbols.colours.track, false);
+      const path = k.tentative && k.tentative[i] ? tentative : sure;
+      Symbols.outline(path, "D", x, y, 8);
       if (k.variance_east_m2) {
-        ellipse(c, x, y, { xx: k.variance_east_m2[i], yy: k.variance_north_m2[i],
+        ellipse(path, x, y, { xx: k.variance_east_m2[i], yy: k.variance_north_m2[i],
           xy: k.covariance_m2[i] });
       }
       if (k.east_mps && Number.isFinite(k.east_mps[i])) {
         const [u, v] = place(k.east_m[i] + 10 * k.east_mps[i], k.north_m[i] + 10 * k.north_mps[i]);
-        c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
+        path.moveTo(x, y);
+        path.lineTo(u, v);
       }
-      c.setLineDash([]);
-      Symbols.text(c, label, x + 10, y - 6, Symbols.colours.track);
+      if (few) Symbols.text(c, label, x + 10, y - 6, Symbols.colours.track);
     }
+    c.stroke(sure);
+    c.setLineDash([3, 3]);
+    c.stroke(tentative);
+    c.setLineDash([]);
   }
 
   function alerts(c, t, drawn) {
@@ -199,7 +231,11 @@ const Plan = (() => {
     view.turn = options.headingUp ? own.heading : 0;
     if (options.follow) [view.east, view.north] = [own.east, own.north];
     rings(c, own);
-    if (options.fields) fields(c, own, options.sensors);
+    drawn.beams = [];
+    if (options.fields) {
+      fields(c, own, options.sensors);
+      for (const number of options.sensors) beam(c, t, own, number, drawn);
+    }
     if (options.truth) truth(c, t, options, drawn);
     detections(c, t, options, drawn);
     if (options.tracks) tracks(c, t, drawn);

@@ -14,31 +14,33 @@ const Symbols = (() => {
     return colours[`level${Math.min(Math.max(number, 1), 3)}`];
   }
 
+  // Markers are added to the path at a place; many of one kind are drawn at once.
   const paths = {
-    o: (c, r) => c.arc(0, 0, r, 0, 2 * Math.PI),
-    s: (c, r) => c.rect(-0.85 * r, -0.85 * r, 1.7 * r, 1.7 * r),
-    D: (c, r) => polygon(c, r, 4, 0),
-    d: (c, r) => polygon(c, 0.8 * r, 4, 0),
-    "^": (c, r) => polygon(c, r, 3, 0),
-    v: (c, r) => polygon(c, r, 3, Math.PI),
-    "<": (c, r) => polygon(c, r, 3, -Math.PI / 2),
-    ">": (c, r) => polygon(c, r, 3, Math.PI / 2),
-    p: (c, r) => polygon(c, r, 5, 0),
-    h: (c, r) => polygon(c, r, 6, 0),
-    8: (c, r) => polygon(c, r, 8, Math.PI / 8),
+    o: (c, x, y, r) => { c.moveTo(x + r, y); c.arc(x, y, r, 0, 2 * Math.PI); },
+    s: (c, x, y, r) => c.rect(x - 0.85 * r, y - 0.85 * r, 1.7 * r, 1.7 * r),
+    D: (c, x, y, r) => polygon(c, x, y, r, 4, 0),
+    d: (c, x, y, r) => polygon(c, x, y, 0.8 * r, 4, 0),
+    "^": (c, x, y, r) => polygon(c, x, y, r, 3, 0),
+    v: (c, x, y, r) => polygon(c, x, y, r, 3, Math.PI),
+    "<": (c, x, y, r) => polygon(c, x, y, r, 3, -Math.PI / 2),
+    ">": (c, x, y, r) => polygon(c, x, y, r, 3, Math.PI / 2),
+    p: (c, x, y, r) => polygon(c, x, y, r, 5, 0),
+    h: (c, x, y, r) => polygon(c, x, y, r, 6, 0),
+    8: (c, x, y, r) => polygon(c, x, y, r, 8, Math.PI / 8),
   };
-  function polygon(c, r, corners, turn) {
+  function polygon(c, x, y, r, corners, turn) {
     for (let i = 0; i < corners; i++) {
       const angle = turn + (2 * Math.PI * i) / corners;
-      c[i ? "lineTo" : "moveTo"](r * Math.sin(angle), -r * Math.cos(angle));
+      c[i ? "lineTo" : "moveTo"](x + r * Math.sin(angle), y - r * Math.cos(angle));
     }
     c.closePath();
   }
+  function outline(c, marker, x, y, r) {
+    (paths[marker] || paths.o)(c, x, y, r);
+  }
   function mark(c, marker, x, y, r, colour, filled) {
-    c.save();
-    c.translate(x, y);
     c.beginPath();
-    (paths[marker] || paths.o)(c, r);
+    outline(c, marker, x, y, r);
     if (filled) {
       c.fillStyle = colour;
       c.fill();
@@ -47,7 +49,35 @@ const Symbols = (() => {
       c.lineWidth = 1.5;
       c.stroke();
     }
-    c.restore();
+  }
+
+  // Paths by how they are drawn: those that look alike are drawn at once.
+  class Batch {
+    constructor() { this.groups = new Map(); }
+    path(colour, alpha, filled, width = 1.5) {
+      const shade = Math.ceil(alpha * 8);
+      const key = `${colour} ${shade} ${filled} ${width}`;
+      let group = this.groups.get(key);
+      if (!group) {
+        group = { path: new Path2D(), colour, alpha: Math.min(shade / 8, 1), filled, width };
+        this.groups.set(key, group);
+      }
+      return group.path;
+    }
+    draw(c) {
+      for (const group of this.groups.values()) {
+        c.globalAlpha = group.alpha;
+        if (group.filled) {
+          c.fillStyle = group.colour;
+          c.fill(group.path);
+        } else {
+          c.strokeStyle = group.colour;
+          c.lineWidth = group.width;
+          c.stroke(group.path);
+        }
+      }
+      c.globalAlpha = 1;
+    }
   }
 
   function aircraft(c, x, y, heading, size, colour) {
@@ -94,6 +124,6 @@ const Symbols = (() => {
     return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
   }
 
-  return { get colours() { return colours; }, readTheme, level, mark, aircraft, text, ready,
-    niceStep };
+  return { get colours() { return colours; }, readTheme, level, mark, outline, Batch, aircraft,
+    text, ready, niceStep };
 })();

@@ -14,7 +14,7 @@ _KEPT_POSES = 10_000
 _COLUMNS = ("_came", "_tick", "_place", "_attitude")
 
 
-class OwnFlight:
+class OwnPoses:
     """What has come of the ownship's poses, of one run or of many; those of each run together.
 
     Parameters
