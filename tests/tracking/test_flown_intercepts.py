@@ -1,4 +1,4 @@
-"""Flown intercepts tracked by radar and camera, as the docs' table has them (data kept elsewhere)."""
+"""Flown intercepts tracked by radar and camera, as in the table of docs/tracking.md."""
 
 import pytest
 
