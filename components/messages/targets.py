@@ -68,6 +68,7 @@ class TrafficStates(Message):
     run_time_s: FloatArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
+    may_hold = frozenset({"truth"})
 
     def tables(self) -> dict[str, Columns]:
         """Return the table of the truth where it is recorded."""
