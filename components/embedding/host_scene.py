@@ -64,7 +64,7 @@ def _is_traffic(cls: type[Component]) -> bool:
 
 
 #: Keys of sensors that need flights, and their values that do not.
-_NEEDS_FLIGHTS = {
+_NEEDS_FLIGHTS: dict[str, bool | str] = {
     "beam_sweep": False, "measures_range_rate": False, "moving_target_filter": "none"
 }  # fmt: skip
 
