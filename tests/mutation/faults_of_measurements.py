@@ -272,7 +272,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
-        ("ground-where-it-is-believed", "float(targets.own_attitude[",
+        ("ground-by-the-believed-attitude", "float(targets.own_attitude[",
          "float((targets.believed or {})["),
         ("ground-alarm-beam-axis", "(number + self._draws.uniform(key, scan, draw)) * size",
          "(number + 0.5) * size"),
