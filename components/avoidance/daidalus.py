@@ -10,7 +10,7 @@ from pydantic import Field
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out, smaller
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import Component, NonNegativeRational
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
@@ -64,6 +64,12 @@ class TurnOut(Component):
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
         self._configuration, self._alerter = self.p.read()
+        rate_deg_s = math.degrees(self._configuration["turn_rate"])
+        if 0.0 < rate_deg_s < SLOWEST_TURN_DEG_S:
+            raise ValueError(
+                f"turn_rate of its configuration is {rate_deg_s:g} deg/s: it must be at least "
+                f"{SLOWEST_TURN_DEG_S:g}, or 0 for 3"
+            )
         self._pause_ticks = int(self.p.pause_s * self.context.ticks_per_s)
         #: By replica, from when on it may turn again.
         self._free_from: dict[int, int] = {}

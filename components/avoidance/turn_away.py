@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 from pydantic import Field
 
-from components.messages.steering import Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.block.component import Component, NonNegativeRational, Parameters
 from dsa_des.block.ports import Input, Output
@@ -20,7 +20,9 @@ class TurnAwayParameters(Parameters):
     turn_deg: float = Field(
         default=30.0, gt=0, le=180, description="Change of heading, away from the nearest, deg."
     )
-    rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turn, deg/s.")
+    rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turn, deg/s."
+    )
     pause_s: NonNegativeRational = Field(
         default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
     )

@@ -57,6 +57,19 @@ class Weather(Parameters):
         description="Whether there is no daylight: cameras for visible light then see nothing.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to weather that there is not."""
+        said = []
+        if not self.wind_mps:
+            said += self.idle("wind_from_deg", because="wind_mps is 0")
+        if not self.rain_rate_mm_h:
+            said += self.idle("rain_top_m", because="rain_rate_mm_h is 0")
+        if not self.fog_water_g_m3:
+            said += self.idle(
+                "fog_base_m", "fog_top_m", "fog_temperature_c", because="fog_water_g_m3 is 0"
+            )
+        return said
+
     @model_validator(mode="after")
     def _fog_has_a_thickness(self) -> Self:
         if self.fog_top_m < self.fog_base_m:
@@ -172,3 +185,13 @@ class Terrain(Parameters):
         description="Height of the raster's zero above the ellipsoid, m: the geoid's undulation "
         "where altitudes are above the ellipsoid.",
     )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to ground that there is not."""
+        said = []
+        if self.raster is None:
+            said += self.idle("raster_offset_m", because="raster is not given")
+        if self.height_m is None:
+            clutter = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
+            said += self.idle(*clutter, because="height_m is not given")
+        return said

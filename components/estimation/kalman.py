@@ -17,12 +17,11 @@ from components.estimation.batched import (
     solve_lower,
     solve_upper,
     squared_length,
-    symmetric,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 
 # So many tracks are updated at a time: their matrices stay in the processor's cache.
-_TOGETHER = 384
+_TOGETHER = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,27 +165,39 @@ def gain_of(found: Innovation) -> FloatArray:
 
 
 def joseph(covariance: FloatArray, gain: FloatArray, found: Innovation) -> FloatArray:
-    """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n)."""
-    known = found.jacobian.shape[1]
-    left = -product(gain, found.jacobian)
+    """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n).
+
+    Its upper triangle is worked out and mirrored, so that it is symmetric to the bit. The product
+    on the left is P - K (P Hᵀ)ᵀ, with what the innovation knows of P Hᵀ.
+    """
+    size, known, many = len(gain), found.jacobian.shape[1], gain.shape[1]
+    shrunk = covariance[:, :known] - product_transposed(gain, found.cross[:known])
+    right = -product(gain, found.jacobian)  # of (I - K H), what is not of the identity
     for i in range(known):
-        left[i, i] += 1.0
-    shrunk = _applied(left, covariance)
-    spread = _applied(left, shrunk.swapaxes(0, 1))
+        right[i, i] += 1.0
     if found.spread.ndim == 2:
         weighted = gain * np.sqrt(found.spread)
-        spread += product_transposed(weighted, weighted)
+        other = weighted
     else:
-        spread += product_transposed(product(gain, found.spread), gain)
-    return symmetric(spread)
-
-
-def _applied(left: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return (left beside the rest of the identity) · matrix."""
-    known = left.shape[1]
-    found = product(left, matrix[:known])
-    found[known:] += matrix[known:]
-    return found
+        weighted, other = product(gain, found.spread), gain
+    whole = np.empty_like(covariance)
+    term = np.empty((size, covariance.shape[2]))
+    for j in range(size):
+        column, part = whole[: j + 1, j], term[: j + 1]
+        np.multiply(weighted[: j + 1, 0], other[j, 0], out=column)
+        for k in range(1, many):
+            np.multiply(weighted[: j + 1, k], other[j, k], out=part)
+            column += part
+        for k in range(known):
+            np.multiply(shrunk[: j + 1, k], right[j, k], out=part)
+            column += part
+        if j >= known:
+            column += covariance[: j + 1, j]
+            for k in range(many):
+                np.multiply(gain[: j + 1, k], found.cross[j, k], out=part)
+                column -= part
+        whole[j, :j] = whole[:j, j]
+    return whole
 
 
 def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:

@@ -97,6 +97,39 @@ def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray,
     return np.stack(found), jacobian
 
 
+def direction(
+    away: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances.
+
+    Parameters
+    ----------
+    away : (3, n)
+        North, east, down or nose, right, floor.
+    covariance : (3, 3, n)
+        Its upper triangle is read.
+
+    Returns
+    -------
+    azimuth_rad, elevation_rad, azimuth_variance_rad2, elevation_variance_rad2 : (n,) arrays
+        Variances by the derivatives of `linearised`.
+    """
+    x, y, z = away
+    distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
+    level = np.hypot(x, y)
+    safe = np.maximum(level, _ZENITH * distance)
+    c, s = x / safe, y / safe
+    across = s * s * covariance[0, 0] - 2.0 * c * s * covariance[0, 1] + c * c * covariance[1, 1]
+    # Along the unit vector in which the elevation grows.
+    a, b, up = c * (z / distance), s * (z / distance), -safe / distance
+    upward = a * a * covariance[0, 0] + b * b * covariance[1, 1] + up * up * covariance[2, 2]
+    upward += 2.0 * (a * b * covariance[0, 1] + up * (a * covariance[0, 2] + b * covariance[1, 2]))
+    return (
+        np.arctan2(y, x), np.arctan2(-z, level),
+        across / (safe * safe), upward / (distance * distance),
+    )  # fmt: skip
+
+
 def residual(measured: FloatArray, expected: FloatArray) -> FloatArray:
     """Return measured less expected, azimuth and elevation wrapped into (-pi, pi].
 

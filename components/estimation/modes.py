@@ -4,9 +4,11 @@ Between looks a target may change its model, as a Markov chain in continuous tim
 so that the mixing follows the time between looks whatever the sensors' scan rates.
 
 Sources: Blom, Bar-Shalom, IEEE Trans. AC 33 (1988); Bar-Shalom, Li, Kirubarajan (2001), §11.6.6.
-Models of different states are mixed by the components they share; what a model has alone keeps its
-own mean and spread (Granström, Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal
-dimension states*, IEEE Trans. AES 51 (2015), the unbiased choice).
+Models of different states are mixed by the components they share. What a target that enters a model
+has not had before, a turn rate or an acceleration, is what the model's own filter thinks of it
+(Granström, Willett, Bar-Shalom, *Systematic approach to IMM mixing for unequal dimension states*,
+IEEE Trans. AES 51 (2015), the unbiased choice), or 0 with a stated spread: the filter of a model
+that is not true is sure that there is no turn, and would learn of one late.
 """
 
 from collections.abc import Sequence
@@ -65,6 +67,7 @@ def mixed(
     covariances: Sequence[FloatArray],
     probabilities: FloatArray,
     transitions: FloatArray,
+    fresh: Sequence[float] = (),
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
     """Return what each model starts from, and the models' probabilities before the look.
 
@@ -76,6 +79,9 @@ def mixed(
     covariances : sequence of (d_i, d_i, n)
     probabilities : (modes, n)
     transitions : (modes, modes, n)
+    fresh : (modes,) of float, optional
+        Variance of what a model has besides position and velocity, in a target that enters it; by
+        default that is the model's own.
 
     Returns
     -------
@@ -90,12 +96,14 @@ def mixed(
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
         sizes = [_shared(states[i], states[j]) for i in range(many)]
-        given = [_filled(states[i], states[j], sizes[i]) for i in range(many)]
+        given = [_filled(states[i], states[j], sizes[i], bool(fresh)) for i in range(many)]
         state = _sum([w * x for w, x in zip(weights, given, strict=True)])
         covariance = np.zeros_like(covariances[j])
         for i in range(many):
             apart = given[i] - state
             whole = _filled_covariance(covariances[i], covariances[j], sizes[i])
+            if fresh and sizes[i] < len(whole):
+                _freshen(whole, fresh[j])
             covariance += weights[i] * (whole + apart[:, np.newaxis] * apart[np.newaxis])
         new_states.append(state)
         new_covariances.append(symmetric(covariance))
@@ -162,8 +170,10 @@ def _shared(one: FloatArray, other: FloatArray) -> int:
     return len(one) if len(one) == len(other) else 6
 
 
-def _filled(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
-    return given[:shared] if shared == len(own) else np.concatenate([given[:6], own[6:]])
+def _filled(given: FloatArray, own: FloatArray, shared: int, fresh: bool) -> FloatArray:
+    if shared == len(own):
+        return given[:shared]
+    return np.concatenate([given[:6], np.zeros_like(own[6:]) if fresh else own[6:]])
 
 
 def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> FloatArray:
@@ -173,6 +183,12 @@ def _filled_covariance(given: FloatArray, own: FloatArray, shared: int) -> Float
     whole[:6, :6] = given[:6, :6]
     whole[6:, 6:] = own[6:, 6:]
     return whole
+
+
+def _freshen(covariance: FloatArray, variance: float) -> None:
+    covariance[6:, 6:] = 0.0
+    for i in range(6, len(covariance)):
+        covariance[i, i] = variance
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:

@@ -10,6 +10,9 @@ from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message, per_row
 
+#: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
+SLOWEST_TURN_DEG_S = 0.1
+
 
 class Manoeuvre(NamedTuple):
     """One manoeuvre: a turn, a climb or descent, or another speed; what is not changed is 0.

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from components.messages.alerts import AlertLevels
 from components.messages.decisions import CLIMB, TURN, Decision, Decisions
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import ClockedParameters, Component, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
@@ -27,7 +27,9 @@ class ConsoleParameters(ClockedParameters):
     scan_rate_hz: PositiveRational = Field(
         default=Fraction(50), description="How often decisions are taken in, 1/s."
     )
-    turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )

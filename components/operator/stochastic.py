@@ -10,7 +10,7 @@ from pydantic import Field
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import changes_out
 from components.messages.alerts import AlertLevels
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
@@ -41,7 +41,9 @@ class StochasticParameters(ConfParameters):
     turn_share: float = Field(
         default=0.65, ge=0, le=1, description="Probability of a turn instead of a climb or descent."
     )
-    turn_rate_deg_s: float = Field(default=3.0, gt=0, description="Rate of turns, deg/s.")
+    turn_rate_deg_s: float = Field(
+        default=3.0, ge=SLOWEST_TURN_DEG_S, description="Rate of turns, deg/s."
+    )
     vertical_rate_mps: float = Field(
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )

@@ -81,6 +81,18 @@ class CameraParameters(SensorParameters):
         "with confidence 0 and no pixels.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors, false alarms and rates that there are not."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            of_signal = "noise_equivalent_contrast", "blur_pixels"
+            said += self.idle(*of_signal, because=f"errors is '{self.errors}'")
+        if not self.false_alarms_per_frame:
+            said += self.idle("marked_false_alarms", because="false_alarms_per_frame is 0")
+        if not self.dynamic_weight:
+            said += self.idle("rate", because="dynamic_weight is 0")
+        return said
+
     @model_validator(mode="after")
     def _noise_is_known(self) -> Self:
         if self.errors == "signal" and self.noise_equivalent_contrast is None:

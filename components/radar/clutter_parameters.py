@@ -64,6 +64,16 @@ class ClutterParameters(SensorParameters):
         "beyond the unambiguous velocity, wavelength * prf_hz / 4, folds back within.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a filter that there is not."""
+        said, kind = super().without_effect(), self.moving_target_filter
+        because = f"moving_target_filter is '{kind}'"
+        if kind != "filter_bank":
+            said += self.idle("filter_pulses", because=because)
+        if kind == "none":
+            said += self.idle("clutter_lock", "improvement_limit_db", because=because)
+        return said
+
     @model_validator(mode="after")
     def _one_threshold(self) -> Self:
         if self.cfar_reference_cells is not None and self.clutter_threshold == "noise":

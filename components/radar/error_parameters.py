@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from components.radar.resolution_parameters import ResolutionParameters
 from components.sensor.error_parameters import CorrelationTime, ErrorParameters
+from dsa_des.errors import Disagreements
 
 
 class RadarErrorParameters(ResolutionParameters):
@@ -42,12 +43,12 @@ class RadarErrorParameters(ResolutionParameters):
 
     @model_validator(mode="after")
     def _rate_is_measured(self) -> Self:
-        for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s"):
-            if not self.measures_range_rate and getattr(self, key):
-                raise ValueError(
-                    f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to "
-                    f"true, or leave {key} out"
-                )
+        Disagreements.refuse(
+            f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
+            f"or leave {key} out"
+            for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s")
+            if not self.measures_range_rate and getattr(self, key)
+        )
         return self
 
 
@@ -65,3 +66,10 @@ class SignalErrorParameters(RadarErrorParameters):
         description="How errors = 'signal' has angles measured: by beams at the same time, or by "
         "splitting one beam that scans over the target.",
     )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors by signal, where there are none."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
+        return said

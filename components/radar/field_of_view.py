@@ -7,19 +7,12 @@ from components.geometry.field_of_view import sector_width_rad
 from components.geometry.wrapping import TWO_PI
 from components.messages.reach import Reach
 from components.radar.resolution_cells import ResolutionCells, resolution_cells
+from components.radar.resolution_parameters import CELL_SIZES
 
 
 def azimuth_width_rad(reach: Reach) -> float:
     """Return the angle from the first to the second azimuth, clockwise, in (0, 2π]."""
     return min(sector_width_rad(*reach.azimuth_rad), TWO_PI)
-
-
-#: Keys of a cell's size, and of the beamwidth that comes before the grid step.
-_SIZES = (
-    ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
-    ("elevation_beamwidth_deg", "elevation_resolution_deg"),
-    ("", "range_resolution_m"),
-)
 
 
 def cell_size(parameters: Any) -> tuple[float, float, float]:
@@ -34,7 +27,9 @@ def cell_size(parameters: Any) -> tuple[float, float, float]:
     azimuth_rad, elevation_rad, range_m : float
         0 where neither is given.
     """
-    widths = [getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in _SIZES]
+    widths = [
+        getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in CELL_SIZES
+    ]
     return math.radians(widths[0]), math.radians(widths[1]), float(widths[2])
 
 
@@ -59,7 +54,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     """
     p = block.p
     azimuth_rad, elevation_rad, range_m = cell_size(p)
-    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), _SIZES, strict=True):
+    for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), CELL_SIZES, strict=True):
         if width == 0:
             raise ValueError(
                 f"{name} is 0: false alarms are counted by resolution cells, it must be above 0"

@@ -106,6 +106,13 @@ class LinkBudgetParameters(
             raise ValueError("cued_beam_first is true and beam_sweep is false: no beam sweeps")
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to false alarms that there are not."""
+        said = super().without_effect()
+        if not self.false_alarms:
+            said += self.idle("cell_false_alarm_probability", because="false_alarms is false")
+        return said
+
     @property
     def pulses_summed(self) -> int:
         """Pulses of a look that are summed non-coherently."""

@@ -61,6 +61,14 @@ class RangeBoundaryParameters(RadarParameters):
         description="Pulse repetition frequency, Hz; as frequency_hz.",
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to Doppler processing that there is not."""
+        said = super().without_effect()
+        if self.moving_target_filter == "none" and not self.range_rate_folds:
+            because = "moving_target_filter is 'none' and range_rate_folds is false"
+            said += self.idle("frequency_hz", because=because)
+        return said
+
     @model_validator(mode="after")
     def _carrier(self) -> Self:
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):

@@ -29,8 +29,10 @@ class OneReportByCell(Effect):
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``resolution_cells``."""
         p = block.p
-        if p.resolution_cells is None and p.tells_cells_apart:
-            return Verdict(True, "errors is 'signal', and resolution_cells not false")
+        if p.resolution_cells is None and p.errors != "grid":
+            if p.without_size:
+                return Verdict(False, f"{p.without_size[0]} is 0: a cell has no size")
+            return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
         return Verdict(
             p.tells_cells_apart, f"resolution_cells is {str(p.tells_cells_apart).lower()}"
         )

@@ -5,6 +5,14 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from components.sensor.parameters import SensorParameters
+from dsa_des.errors import Disagreements
+
+#: Keys of a cell's size: the beamwidth, which comes before the grid step.
+CELL_SIZES = (
+    ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
+    ("elevation_beamwidth_deg", "elevation_resolution_deg"),
+    ("", "range_resolution_m"),
+)
 
 
 class ResolutionParameters(SensorParameters):
@@ -16,26 +24,30 @@ class ResolutionParameters(SensorParameters):
     resolution_cells: bool | None = Field(
         default=None,
         description="Whether targets in one resolution cell (beam, or grid step) are one report, "
-        "of the strongest echo at the sum of their powers; by default where errors is 'signal'.",
+        "of the strongest echo at the sum of their powers; by default where errors is not 'grid' "
+        "and cells have a size.",
     )
 
     @property
     def tells_cells_apart(self) -> bool:
         """Whether targets of one resolution cell are one report."""
         if self.resolution_cells is None:
-            return getattr(self, "errors", "grid") == "signal"
+            return self.errors != "grid" and not self.without_size
         return self.resolution_cells
+
+    @property
+    def without_size(self) -> list[str]:
+        """Grid steps of 0 that no beamwidth stands for: such a cell has no size."""
+        return [
+            step
+            for beam, step in CELL_SIZES
+            if not (getattr(self, beam, None) or getattr(self, step))
+        ]
 
     @model_validator(mode="after")
     def _cells_have_a_size(self) -> Self:
-        for beam, step in (
-            ("azimuth_beamwidth_deg", "azimuth_resolution_deg"),
-            ("elevation_beamwidth_deg", "elevation_resolution_deg"),
-            ("", "range_resolution_m"),
-        ):
-            if self.resolution_cells and not (getattr(self, beam, None) or getattr(self, step)):
-                raise ValueError(
-                    f"{step} is 0 and resolution_cells is true: a cell has a size, it must be "
-                    "above 0"
-                )
+        Disagreements.refuse(
+            f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
+            for step in (self.without_size if self.resolution_cells else ())
+        )
         return self

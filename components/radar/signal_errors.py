@@ -10,6 +10,7 @@ from components.radar.measurement_accuracy import (
 )
 from components.radar.radar_equation import wavelength
 from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import Disagreements
 
 
 def heard(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
@@ -66,23 +67,23 @@ def check_signal_errors(p: Any) -> None:
     """
     if p.errors != "signal":
         return
-    for key in ("azimuth_beamwidth_deg", "elevation_beamwidth_deg"):
-        if getattr(p, key) is None:
-            raise ValueError(
-                f"errors is 'signal' and {key} is not given: errors of angles are a share of the "
-                "beam"
-            )
+    wrong = [
+        f"errors is 'signal' and {key} is not given: errors of angles are a share of the beam"
+        for key in ("azimuth_beamwidth_deg", "elevation_beamwidth_deg")
+        if getattr(p, key) is None
+    ]
     if not p.range_resolution_m:
-        raise ValueError(
+        wrong.append(
             "errors is 'signal' and range_resolution_m is 0: errors of range are a share of it, it "
             "must be above 0"
         )
     if p.measures_range_rate and _range_rate_resolution_m_s(p) is None:
-        raise ValueError(
+        wrong.append(
             "errors is 'signal', measures_range_rate is true and neither "
             "range_rate_resolution_m_s nor the time of a look (dwell_s, or pulses_per_dwell and "
             "prf_hz) is given: errors of range rate are a share of what Doppler resolves"
         )
+    Disagreements.refuse(wrong)
 
 
 def _range_rate_resolution_m_s(p: Any) -> float | None:

@@ -100,6 +100,14 @@ class SwerlingParameters(LinkBudgetParameters):
         self._check_cued()
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a fluctuation that there is not."""
+        said = super().without_effect()
+        if self.swerling in (0, 5):
+            fading = "fluctuation_correlation_s", "scintillation_extent_m"
+            said += self.idle(*fading, because=f"swerling is {self.swerling}: nothing fluctuates")
+        return said
+
     def _check_cued(self) -> None:
         given = [
             name

@@ -103,6 +103,16 @@ class TimeBudgetParameters(SensorParameters):
             self._check_scan_rate(beams)
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a budget of time, or to beams, that there are not."""
+        said = super().without_effect()
+        if self.budget != "dwell":
+            because = f"budget is {'not given' if self.budget is None else repr(self.budget)}"
+            said += self.idle("integration", because=because)
+        if self.azimuth_beamwidth_deg is None:
+            said += self.idle("beam_spacing", because="azimuth_beamwidth_deg is not given")
+        return said
+
     @property
     def beams(self) -> BeamPositions | None:
         """The beam positions of a scan over the field of view, where beamwidths are given."""

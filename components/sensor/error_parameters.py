@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from dsa_des.block.component import ClockedParameters
+from dsa_des.errors import Disagreements
 from dsa_des.time.gauss_markov import LONGEST_S
 
 CorrelationTime = Annotated[float, Field(gt=0, le=LONGEST_S)]
@@ -74,20 +75,32 @@ class ErrorParameters(ClockedParameters):
 
     @model_validator(mode="after")
     def _errors(self) -> Self:
+        wrong = []
         for name, unit in self.quantities.items():
             deviation, bias, lasts = self._keys(name, unit)
-            for key in (deviation, bias):
-                if self.errors == "grid" and getattr(self, key):
-                    raise ValueError(
-                        f"{key} is {getattr(self, key):g} and errors is 'grid', which knows no "
-                        f"errors but rounding: set errors to 'stated', or leave {key} out"
-                    )
+            wrong += [
+                f"{key} is {getattr(self, key):g} and errors is 'grid', which knows no errors but "
+                f"rounding: set errors to 'stated', or leave {key} out"
+                for key in (deviation, bias)
+                if self.errors == "grid" and getattr(self, key)
+            ]
             if getattr(self, lasts) is not None and not getattr(self, deviation):
-                raise ValueError(
+                wrong.append(
                     f"{lasts} is given and {deviation} is 0: there is nothing that lasts; give "
                     f"both or neither"
                 )
+        Disagreements.refuse(wrong)
         return self
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to errors that there are not."""
+        said = super().without_effect()
+        if self.errors == "grid":
+            return said + self.idle("quantised", "biases", because="errors is 'grid'")
+        biases = [self._keys(name, unit)[1] for name, unit in self.quantities.items()]
+        if not any(getattr(self, key) for key in biases):
+            said += self.idle("biases", because=f"none of {', '.join(biases)} is given")
+        return said
 
     @staticmethod
     def _keys(name: str, unit: str) -> tuple[str, str, str]:

@@ -121,6 +121,15 @@ class SensorParameters(ErrorParameters):
                 ) from error
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a rule of declaration that there is not."""
+        said, places = super().without_effect(), ("declare_speed_m_s", "declare_rate_deg_s")
+        if self.declare_m is None:
+            return said + self.idle("declare_by", *places, because="declare_m is not given")
+        if self.declares_by == "target":
+            said += self.idle(*places, because="looks at targets are counted (declare_by)")
+        return said
+
     @property
     def declares_by(self) -> Literal["target", "place"]:
         """What detections are counted of."""

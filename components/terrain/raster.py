@@ -63,7 +63,7 @@ class ElevationRaster:
         if count := int(np.count_nonzero(holes)):
             row, column = (int(i) for i in np.argwhere(holes)[0])
             raise ValueError(
-                f"{self.name} has {count:,} holes (nodes without a height), the first at latitude "
+                f"{self.name} has {_holes(count)} at latitude "
                 f"{self.south_deg + row * self.lat_step_deg:.6g}, longitude "
                 f"{self.west_deg + column * self.lon_step_deg:.6g}: every node must have a height; "
                 "fill them first"
@@ -143,3 +143,9 @@ class ElevationRaster:
         at = at + columns
         north = flat[at] * (1.0 - right) + flat[at + 1] * right
         return np.where(inside, south * (1.0 - up) + north * up, -np.inf), inside
+
+
+def _holes(count: int) -> str:
+    if count == 1:
+        return "1 hole (a node without a height)"
+    return f"{count:,} holes (nodes without a height), the first"

@@ -63,11 +63,15 @@ class FilterBank:
         Rates of changes of model; None for a single one.
     sigma : SigmaPoints, optional
         Take moments from sigma points; otherwise by linearisation.
+    fresh : (models,) of float
+        Variance of what each has besides position and velocity, in a target that enters it; empty
+        where that is what the model's own filter thinks.
     """
 
     models: tuple[Motion, ...]
     rates_per_s: FloatArray | None = field(default=None, compare=False)
     sigma: SigmaPoints | None = None
+    fresh: tuple[float, ...] = ()
 
     @property
     def sizes(self) -> list[int]:
@@ -80,7 +84,9 @@ class FilterBank:
         """Return states, covariances and models' probabilities after times (n,)."""
         if self.rates_per_s is not None:
             steps = modes.transition_probabilities(self.rates_per_s, dt_s)
-            states, covariances, weights = modes.mixed(states, covariances, weights, steps)
+            states, covariances, weights = modes.mixed(
+                states, covariances, weights, steps, self.fresh
+            )
         moved = [
             predict(model, x, p, dt_s)
             if self.sigma is None

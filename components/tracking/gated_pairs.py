@@ -40,7 +40,7 @@ def gated_pairs(
     detection: IntArray,
     of_detection: IntArray,
     looks: int,
-) -> list[GatedPairs]:
+) -> tuple[list[GatedPairs], FloatArray | None]:
     """Return the pairs of one look in whose gate they are, kind by kind.
 
     Parameters
@@ -57,11 +57,19 @@ def gated_pairs(
     detection, of_detection : (detections,)
         Their numbers in `scans`, and the look of each.
     looks : int
+
+    Returns
+    -------
+    pairs : list of GatedPairs
+    direction : (2, tracks) or None
+        Azimuth and elevation in body axes that the first model expects, where they were needed.
     """
-    found = []
+    found: list[GatedPairs] = []
+    direction = None
     for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
         kind, rows = kind_of(code)
         moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
+        direction = moments[0].expected[:2]
         mine = np.flatnonzero(codes == code)
         track, entry = _near(
             rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks
@@ -79,7 +87,8 @@ def gated_pairs(
         found.append(
             GatedPairs(track[inside], entry[inside], taken_pairs(said, inside.nonzero()[0]))
         )
-    return found
+    # Moments of sigma points are means over the points: not where the state itself is seen.
+    return found, direction if rules.bank.sigma is None else None
 
 
 def _near(
@@ -107,20 +116,32 @@ def _near(
         entry = np.repeat(some, size)
         start = np.cumsum(size) - size
         track = np.arange(len(entry)) - np.repeat(start - first[of_detection[some]], size)
-        near = np.zeros(len(entry), dtype=bool)
         cells = detection[entry]
-        for found in moments:
-            inside = np.ones(len(entry), dtype=bool)
-            for i, row in enumerate(rows[:3]):
-                apart = np.abs(scans.measured[row][cells] - found.expected[i][track])
-                if i < 2:
-                    apart = np.minimum(apart, np.abs(2.0 * np.pi - apart))
-                spread = found.total[i, i][track] + scans.variance[row][cells]
-                inside &= apart * apart <= threshold * spread
-            near |= inside
+        kept = [_inside(found, scans, rows, cells, track, threshold) for found in moments]
+        near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
         tracks.append(track[near])
         entries.append(entry[near])
     return np.concatenate(tracks), np.concatenate(entries)
+
+
+def _inside(
+    found: Moments,
+    scans: Scans,
+    rows: list[int],
+    cells: IntArray,
+    track: IntArray,
+    threshold: float,
+) -> IntArray:
+    """Return which pairs lie in the box about the gate of one model."""
+    left = np.arange(len(cells))
+    for i, row in enumerate(rows[:3]):
+        apart = np.abs(scans.measured[row][cells] - found.expected[i][track])
+        if i < 2:
+            apart = np.minimum(apart, np.abs(2.0 * np.pi - apart))
+        spread = found.total[i, i][track] + scans.variance[row][cells]
+        inside = (apart * apart <= threshold * spread).nonzero()[0]
+        left, cells, track = left[inside], cells[inside], track[inside]
+    return left
 
 
 def _parts(part: IntArray) -> list[tuple[int, int]]:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from components.association.assignment import global_nearest, nearest
+from components.association.clusters import alone
 from components.association.gates import gate_threshold
 from components.estimation.batched import log_determinant
 from components.tracking.filter_bank import innovation_squared
@@ -26,7 +27,9 @@ def updated_by_one(
     track = np.concatenate([one.track for one in kinds])
     entry = np.concatenate([one.detection for one in kinds])
     distance = np.concatenate([one.said.distance for one in kinds])
-    if rules.association == "nearest":
+    if bool(alone(track, entry).all()):
+        taken = np.arange(len(track))
+    elif rules.association == "nearest":
         taken = nearest(track, entry, distance)
     else:
         volume = np.concatenate([_log_volume(one) for one in kinds])

@@ -19,8 +19,15 @@ Model = Literal["velocity", "turn", "acceleration"]
 
 
 class InteractingParameters(TrackerParameters):
-    """Parameters of the tracker with interacting models."""
+    """Parameters of the tracker with interacting models.
 
+    Manoeuvres are the other models' work, so every model's own noise is small.
+    """
+
+    acceleration_intensity_m2_s3: float = Field(
+        default=0.1, gt=0,
+        description="Intensity of the white acceleration within `velocity`, m²/s³.",
+    )  # fmt: skip
     models: tuple[Model, ...] = Field(
         default=("velocity", "turn"),
         min_length=2,
@@ -31,22 +38,28 @@ class InteractingParameters(TrackerParameters):
     transition_rates_per_s: tuple[tuple[float, ...], ...] | None = Field(
         default=None,
         description="Rates from each model (row) to each (column), 1/s; the diagonal is not read. "
-        "By default velocity is left every 30 s and the others every 10 s, to any other alike.",
+        "By default velocity is left every 60 s and the others every 100 s, to any other alike.",
     )
     turn_acceleration_intensity_m2_s3: float = Field(
-        default=1.0, gt=0, description="Intensity of the white acceleration within a turn, m²/s³."
+        default=0.1, gt=0, description="Intensity of the white acceleration within a turn, m²/s³."
     )
     turn_rate_intensity_deg2_s3: float = Field(
-        default=0.5, gt=0, description="Intensity with which the rate of a turn drifts, deg²/s³."
+        default=0.01, gt=0, description="Intensity with which the rate of a turn drifts, deg²/s³."
     )
     jerk_intensity_m2_s5: float = Field(
         default=1.0, gt=0, description="Intensity of white jerk of `acceleration`, m²/s⁵."
     )
     start_turn_deg_s: float = Field(
-        default=3.0, gt=0, description="Standard deviation of a new track's turn rate, deg/s."
+        default=3.0,
+        gt=0,
+        description="Standard deviation of the turn rate of a new track, and of one that begins to "
+        "turn, deg/s.",
     )
     start_acceleration_m_s2: float = Field(
-        default=3.0, gt=0, description="That of its acceleration along each axis, m/s²."
+        default=3.0,
+        gt=0,
+        description="That of the acceleration along each axis of a new track, and of one that "
+        "begins to accelerate, m/s².",
     )
 
     @model_validator(mode="after")
@@ -86,6 +99,14 @@ class InteractingModels(Tracker):
         rates = p.transition_rates_per_s
         if rates is None:
             others = len(p.models) - 1
-            leave = [1.0 / 30.0 if name == "velocity" else 0.1 for name in p.models]
+            leave = [1.0 / 60.0 if name == "velocity" else 0.01 for name in p.models]
             rates = tuple(tuple(rate / others for _ in p.models) for rate in leave)
-        return FilterBank(tuple(known[name] for name in p.models), np.array(rates))
+        fresh = {
+            "velocity": 0.0,
+            "turn": float(np.radians(p.start_turn_deg_s)) ** 2,
+            "acceleration": p.start_acceleration_m_s2**2,
+        }
+        return FilterBank(
+            tuple(known[name] for name in p.models), np.array(rates),
+            fresh=tuple(fresh[name] for name in p.models),
+        )  # fmt: skip

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from components.estimation import modes
-from components.estimation.batched import product, product_transposed
 from components.estimation.frame import Place
-from components.estimation.measurement import Kind, linearised
+from components.estimation.measurement import direction
 from components.messages.columns import COVARIANCE
 from components.messages.state_tracks import StateTracks
 from components.tracking.life import existence
@@ -90,12 +89,11 @@ def state_tracks(
     store = _Columns(reported, order)
     models = len(reported[0].store.weights)
     state, covariance = store.state(models)
-    axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(look), axis=2)
-    seen, by_state = linearised(Kind(False), state, Place(places.position_m[:, look], axes))
-    position = np.stack(
-        [np.stack([covariance[min(i, j), max(i, j)] for j in range(3)]) for i in range(3)]
-    )
-    spread = product_transposed(product(by_state, position), by_state)
+    position = np.empty((3, 3, len(look)))
+    for i in range(3):
+        for j in range(i, 3):
+            position[i, j] = covariance[i, j]
+    seen = direction(state[:3] - places.position_m[:, look], position)
     unknown = ~store.plain("ranged")
     hidden = bool(unknown.any())
 
@@ -114,8 +112,8 @@ def state_tracks(
         existence=existence(score),
         azimuth_rad=seen[0] % (2.0 * np.pi),
         elevation_rad=seen[1],
-        azimuth_variance_rad2=spread[0, 0],
-        elevation_variance_rad2=spread[1, 1],
+        azimuth_variance_rad2=seen[2],
+        elevation_variance_rad2=seen[3],
         has_range=~unknown,
         age_s=(tick - store.plain("born_tick")) / per_s,
         state_s=(tick - begin) / per_s,

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from components.estimation.batched import squared_length
 from components.estimation.frame import Place
 from components.estimation.measurement import Kind, expected
 from components.messages.reach import EVALUATE
@@ -103,13 +104,13 @@ def looked_at(
     """Return tracks after association, and which detections lie in the gate of any."""
     place = places.take(looks[of])
     codes_here = codes[detection]
-    kinds = gated_pairs(
+    kinds, direction = gated_pairs(
         rules, part, of, place, scans, codes_here, detection, of_detection, len(looks)
     )
     gated = np.zeros(len(detection), dtype=bool)
     for one in kinds:
         gated[one.detection] = True
-    looked = _expected_looks(rules, part, of, scans, looks, place)
+    looked = _expected_looks(rules, part, of, scans, looks, place, direction)
     sensors = scans.contributors[detection]
     update = updated_by_all if rules.association == "jpda" else updated_by_one
     changed, hit, gain = update(rules, part, kinds, codes_here, sensors)
@@ -164,6 +165,7 @@ def _expected_looks(
     scans: Scans,
     looks: IntArray,
     place: Place,
+    direction: FloatArray | None,
 ) -> BoolArray:
     """Return which sensors looked where the tracks are that they see, (sensors, tracks)."""
     sensors = np.where(scans.tells_misses[looks], scans.sensors[looks], 0)
@@ -171,8 +173,11 @@ def _expected_looks(
     found = np.zeros((len(rules.fields), len(part)), dtype=bool)
     if used == 0:
         return found
-    azimuth, elevation, distance = expected(Kind(True), part.state0, place)
-    distance = np.where(part.ranged, distance, 0.0)
+    azimuth, elevation = (
+        expected(Kind(False), part.state0, place) if direction is None else direction
+    )
+    away = np.sqrt(squared_length(part.state0[:3] - place.position_m))
+    distance = np.where(part.ranged, away, 0.0)
     there = np.ones(len(part), dtype=bool)
     mine = sensors[of]
     sees = seeing(part.vain)

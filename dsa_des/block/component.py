@@ -44,6 +44,15 @@ def as_written(value: Fraction) -> int | float | str:
     return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
+def _in_words(value: Any) -> str:
+    """Return a parameter's value as a sentence holds it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(as_written(value)) if isinstance(value, Fraction) else repr(value)
+
+
 #: An exact rate or time: a number or text such as "30000/1001".
 Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(as_written)]
 PositiveRational = Annotated[Rational, Field(gt=0)]
@@ -88,6 +97,27 @@ class Parameters(BaseModel):
         """Refuse numbers that no physics can compute with (`dsa_des.block.limits`)."""
         refuse_extremes(info.field_name or "", value)
         return value
+
+    def without_effect(self) -> list[str]:
+        """Say which keys were given a value that changes nothing, and because of what."""
+        return []
+
+    def idle(self, *keys: str, because: str) -> list[str]:
+        """Return one sentence for each of some keys that is not at its default.
+
+        Parameters
+        ----------
+        *keys : str
+            That have no effect.
+        because : str
+            Which value of another key makes them so.
+        """
+        fields = type(self).model_fields
+        return [
+            f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"
+            for key in keys
+            if getattr(self, key) != fields[key].default
+        ]
 
 
 class ClockedParameters(Parameters):

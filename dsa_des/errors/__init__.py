@@ -3,6 +3,7 @@
 from dsa_des.errors.problems import (
     MOST_PROBLEMS,
     BlockFailure,
+    Disagreements,
     Lines,
     OutputError,
     Problem,
@@ -18,6 +19,7 @@ from dsa_des.errors.problems import (
 __all__ = [
     "MOST_PROBLEMS",
     "BlockFailure",
+    "Disagreements",
     "Lines",
     "OutputError",
     "Problem",

@@ -47,6 +47,26 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     return f"; allowed: {shown}"
 
 
+class Disagreements(ValueError):
+    """Several things that keys of one table disagree about, each a problem of its own.
+
+    Parameters
+    ----------
+    texts : iterable of str
+        One or more.
+    """
+
+    def __init__(self, texts: Iterable[str]) -> None:
+        self.texts = tuple(texts)
+        super().__init__("; ".join(self.texts))
+
+    @classmethod
+    def refuse(cls, texts: Iterable[str]) -> None:
+        """Raise them, if there are any."""
+        if found := tuple(texts):
+            raise cls(found)
+
+
 class Lines(str):
     """A message of several lines, each of which is printable already."""
 

@@ -10,9 +10,15 @@ _LONGEST = 500
 
 
 def warnings_of(simulation: Simulation) -> list[str]:
-    """Return what the blocks of a scene that is set up warn of, each with its block's name."""
+    """Return what the blocks of a scene that is set up warn of, each with its block's name.
+
+    Keys that change nothing come before what a block itself has to say.
+    """
     found: list[str] = []
+    for name, section in simulation.scene.sections.items():
+        found += [f"{name}: {text}" for text in section.without_effect()]
     for name, component in simulation.components.items():
+        found += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", found, component.warnings) or ():
             found.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
     return found

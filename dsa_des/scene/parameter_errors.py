@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from dsa_des.block.component import Parameters, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.scene.disagreements import all_disagreements
 from dsa_des.scene.scene_file import Key, SceneFile
 
 _MUST = "must be "
@@ -48,6 +49,9 @@ def explain(
             close = nearest(str(item["loc"][-1]), given)
             hint = f" ({close!r} is given)" if close else ""
             problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
+        elif not item["loc"] and item["type"] == "value_error":
+            texts = all_disagreements(model, item)
+            problems += [_refused(scene_file, at, text, item["input"]) for text in texts]
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)

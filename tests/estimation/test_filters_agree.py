@@ -167,7 +167,8 @@ def test_linear_models_are_the_exponential_of_white_noise(model):
     np.testing.assert_allclose(spread[:, :, 0], known, rtol=1e-12, atol=1e-13)
 
 
-def test_interacting_models_follow_the_textbook():
+@pytest.mark.parametrize("fresh", [(), (0.0, 1.7, 0.3)])
+def test_interacting_models_follow_the_textbook(fresh):
     """Three models of 6, 9 and 7 components over unequal times, against loops over matrices."""
     models = [ConstantVelocity(0.5), ConstantAcceleration(0.2), CoordinatedTurn(0.5, 1e-4)]
     rates = np.array([[0, 0.02, 0.05], [0.1, 0, 0.03], [0.07, 0.01, 0]])
@@ -190,6 +191,7 @@ def test_interacting_models_follow_the_textbook():
             [c[:, :, np.newaxis] for c in covariances],
             probabilities[:, np.newaxis],
             got[:, :, 1:],
+            fresh,
         )
         np.testing.assert_allclose(predicted[:, 0], probabilities @ steps, rtol=1e-12)
         for j, model in enumerate(models):
@@ -203,6 +205,9 @@ def test_interacting_models_follow_the_textbook():
                 x[:6] = states[i][:6]
                 c[:6, :6] = covariances[i][:6, :6]
                 c[:6, 6:] = c[6:, :6] = 0.0
+                if fresh:
+                    x[6:] = 0.0
+                    c[6:, 6:] = np.eye(model.size - 6) * fresh[j]
                 given.append((x, c))
             mean = sum(w * x for w, (x, _) in zip(mu, given, strict=True))
             spread = sum(

@@ -103,7 +103,7 @@ def test_a_way_out_is_kept_while_it_is_near_or_young():
 def test_the_preferred_side_changes_late():
     memory = ResolutionMemory({**VALUES, "persistence_preferred_vs": 0.5}, "vs")
     sides = []
-    for now_s, low, high in [(0, -4, 3), (2, -2, 3), (4, -2, 3)]:
+    for now_s, low, high in [(0, -4, 3), (2, -4, 5), (4, -4, 5)]:
         found = Resolution(float(low), float(high), high <= -low)
         sides.append(memory.step(float(now_s), found, red(low, high), 0.0, None).prefers_high)
     assert sides == [True, True, False]

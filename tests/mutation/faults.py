@@ -1,5 +1,6 @@
 """All faults, group by group."""
 
+import faults_of_alerting
 import faults_of_clocks
 import faults_of_columns
 import faults_of_effects
@@ -15,7 +16,7 @@ from fault import Fault
 _GROUPS = (
     faults_of_wiring, faults_of_frames, faults_of_units, faults_of_clocks, faults_of_effects,
     faults_of_metrics, faults_of_studies, faults_of_columns, faults_of_measurements,
-    faults_of_encounters,
+    faults_of_encounters, faults_of_alerting,
 )  # fmt: skip
 
 FAULTS: list[Fault] = [fault for group in _GROUPS for fault in group.FAULTS]

@@ -262,8 +262,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/operator/stochastic.py", "wiring/test_operator.py::"
         "test_what_is_drawn_is_by_the_decision_not_by_how_often_an_alert_was_seen",
-        ("draws-of-no-decision", "held = tick - self._since >=",
-         "self._decisions += 1\n        held = tick - self._since >="),
+        ("draws-of-no-decision", "mind = mind._replace(since=since)",
+         "mind = mind._replace(since=since, decisions=mind.decisions + 1)"),
     ),
     *in_file(
         _GROUP, "components/terrain/rays.py",

@@ -172,8 +172,8 @@ def test_false_alarms_are_binomial_and_have_no_target(scene):
     assert np.abs(degrees).max() <= 110 + 1e-9
     assert abs(degrees.mean()) < 4 * 127 / math.sqrt(len(false) * 4)
     assert min(row["snr_db"] for row in false) >= 10 * math.log10(-math.log(2e-6) - 1) - 1e-9
-    # After the true ones of their scan.
-    order = [(row["tick"], row["target"] is None) for row in rows]
+    # In the order of what was measured in their scan.
+    order = [(row["tick"], row["range_m"], row["azimuth_rad"]) for row in rows]
     assert order == sorted(order)
 
 

@@ -11,6 +11,8 @@ from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
 
 from components.operator.pilot_model import CLIMB, TURN, Draws, response_s, steering
+from dsa_des import load_scene
+from dsa_des.errors import SceneError
 
 KIND = ("operator.stochastic",)
 FIXED = {"deterministic": True, "turn_share": 1.0, "level": 1}
@@ -164,3 +166,10 @@ def test_the_side_is_the_smaller_one_four_times_of_five():
     assert steering((-math.inf, 0.2), True, Draws(0.9, 0.0, 0.5)) > 0.0
     assert steering((-math.inf, math.inf), True, None) == 0.0
     assert steering((-10.0, 20.0), False, None) == pytest.approx(-10.0 - CLIMB.fixed)
+
+
+def test_a_turn_that_no_flight_can_have_is_refused_before_the_run(tmp_path):
+    with pytest.raises(SceneError, match=r"turn_rate_deg_s.*greater than or equal to 0.1"):
+        load_scene(scene(tmp_path, turn_rate_deg_s=0.001))
+    with pytest.raises(SceneError, match=r"turn_rate of its configuration is 0.001 deg/s"):
+        run(by_bands(tmp_path, rate_deg_s=0.001))

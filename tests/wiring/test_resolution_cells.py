@@ -159,12 +159,13 @@ BEAM = {
     ("keys", "merges"),
     [({}, False), ({"resolution_cells": True}, True), ({"errors": "signal"}, True),
      ({"errors": "signal", "resolution_cells": False}, False),
-     ({"errors": "stated", "azimuth_error_deg": 0.1}, False)],
+     ({"errors": "stated", "azimuth_error_deg": 0.1}, True),
+     ({"errors": "stated", "azimuth_error_deg": 0.1, "range_resolution_m": 0.0}, False)],
 )  # fmt: skip
 def test_beams_are_the_cells_where_they_are_given(keys, merges):
-    """And where errors follow from the signal, targets of one cell are one report by default."""
+    """Where errors are not the grid's, targets of one cell that has a size are one by default."""
     found: dict[int, dict[str, dict]] = {}
-    radar = sensor("radar.threshold", **BEAM, **keys)
+    radar = sensor("radar.threshold", **{**BEAM, **keys})
     for row in rows(run(chain({"radar": radar}, targets=TARGETS, duration_s=4))):
         found.setdefault(row["scan"], {})[row["target"]] = row
     apart = {

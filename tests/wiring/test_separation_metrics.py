@@ -9,6 +9,8 @@ from covering import covers
 from wired import HEARS_ALL, chain, measured
 
 FOOT_M = 0.3048
+#: Losses are looked for between samples too, or at a spacing only.
+WAYS = ({"metric": "well_clear"}, {"metric": "well_clear", "step_s": 0.1})
 
 
 def abeam(horizontal_m: float, vertical_m: float, name: str = "abeam") -> dict:
@@ -26,28 +28,31 @@ def encounter(*targets: dict, duration_s: float = 2) -> dict:
     return chain({"radar": HEARS_ALL}, targets=targets, duration_s=duration_s)
 
 
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("vertical_m", [74.0, -74.0])
-def test_well_clear_is_lost_by_horizontal_distance(vertical_m):
+def test_well_clear_is_lost_by_horizontal_distance(vertical_m, way):
     """606 m apart on the level the slant range is beyond 2000 ft, and well clear is lost."""
     assert math.hypot(606.0, 74.0) > 2000 * FOOT_M > 606.0
-    found = measured(encounter(abeam(606.0, vertical_m)), "well_clear")
+    found = measured(encounter(abeam(606.0, vertical_m)), way)
     assert (found["well_clear_lost"], found["nmac"]) == (1, 0)
     assert found["well_clear_loss_time_s"] == 0
 
 
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("vertical_m", [29.5, -29.5])
-def test_a_near_collision_is_one_by_horizontal_distance(vertical_m):
+def test_a_near_collision_is_one_by_horizontal_distance(vertical_m, way):
     assert math.hypot(150.5, 29.5) > 500 * FOOT_M > 150.5
-    assert measured(encounter(abeam(150.5, vertical_m)), "well_clear")["nmac"] == 1
+    assert measured(encounter(abeam(150.5, vertical_m)), way)["nmac"] == 1
 
 
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
     ("horizontal_m", "vertical_m", "lost", "nmac"),
     [(612, 10, 0, 0), (300, 78, 0, 0), (300, -78, 0, 0), (154, 10, 1, 0), (100, 32, 1, 0),
      (70, -32, 1, 0), (20, 70, 1, 0), (140, 20, 1, 1)],
 )  # fmt: skip
-def test_each_limit_is_that_of_its_own_distance(horizontal_m, vertical_m, lost, nmac):
-    found = measured(encounter(abeam(horizontal_m, vertical_m)), "well_clear")
+def test_each_limit_is_that_of_its_own_distance(horizontal_m, vertical_m, lost, nmac, way):
+    found = measured(encounter(abeam(horizontal_m, vertical_m)), way)
     assert (found["well_clear_lost"], found["nmac"]) == (lost, nmac)
 
 
@@ -73,13 +78,14 @@ def test_sizes_may_be_chosen(sizes, lost, nmac):
     assert (found["well_clear_lost"], found["nmac"]) == (lost, nmac)
 
 
-def test_well_clear_is_lost_when_the_level_distance_says_so():
+@pytest.mark.parametrize("way", [{}, {"step_s": 0.02}])
+def test_well_clear_is_lost_when_the_level_distance_says_so(way):
     """A crossing target, against the first of many dense times by pymap3d."""
     crossing = {
         "name": "crossing", "east_m": -900.0, "north_m": -700.0, "up_m": 60.0,
         "heading_deg": 75.0, "speed_mps": 55.0, "climb_mps": 3.0,
     }  # fmt: skip
-    found = measured(encounter(crossing, duration_s=14), {"metric": "well_clear", "step_s": 0.02})
+    found = measured(encounter(crossing, duration_s=14), {"metric": "well_clear", **way})
     times = np.arange(0.0, 14.0, 0.05)
     apart = [crooked.ned(crossing, t) for t in times]
     level = np.array([math.hypot(north, east) for north, east, _ in apart])

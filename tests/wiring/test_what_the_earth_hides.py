@@ -253,7 +253,7 @@ def test_rasters_that_do_not_fit_the_flight_are_named(name, crest, own, says, tm
 @pytest.mark.parametrize(
     ("terrain", "says"),
     [
-        ({"raster": "S42W180.hgt"}, "raster.*1 holes"),
+        ({"raster": "S42W180.hgt"}, "raster.*1 hole "),
         ({"raster": "nowhere.hgt"}, "raster.*nowhere.hgt"),
         ({"refraction": "air"}, "refraction.*four_thirds"),
         ({"raster_offset_m": 900}, "raster_offset_m.*200"),

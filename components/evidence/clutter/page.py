@@ -54,9 +54,10 @@ the target's resolution cell and says no more: on a grid it has the grid point o
 the cell is wider than the grid. With a resolution of 0 there is no cell, and reports are exact, as
 in the thesis.
 
-`resolution_cells = true` makes targets in one cell of the grid (azimuth, elevation, range) one
-report: that of the strongest echo, looked at with the sum of their powers. By default each target
-has its own, as in the thesis. Filters do not tell two targets of one cell apart.
+Targets in one resolution cell (beam or grid step, by range) are one report: that of the strongest
+echo, looked at with the sum of their powers. So it is by default where `errors` is not `"grid"` and
+cells have a size, and with `resolution_cells = true`; with `false`, and in the thesis, each target
+has its own. Filters do not tell two targets of one cell apart.
 
 ## Clutter
 
