@@ -136,7 +136,7 @@ def read_flights(
             continue
         key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
         if key not in known:
-            found = separations(scene, step_s)
+            found = group.once(("separations", step_s, *key), partial(separations, scene, step_s))
             known[key] = read([s for s in found if target in (None, s.name)])
         values[:, number] = known[key]
     return values
