@@ -16,6 +16,7 @@ import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
+from components.evidence.benchmark import encounters
 from components.evidence.benchmark.measure import pin
 from components.evidence.benchmark.track_updates import LOOKS, updates
 from components.examples import folder
@@ -104,6 +105,34 @@ RATES = (
         2e4,
         100 * LOOKS,
         _tracks_of_one_run,
+    ),
+    Rate(
+        "replicas",
+        "replicas of 120 s, an intruder, 5, 20 and 2 Hz, other phases, all recorded",
+        1000,
+        1000,
+        encounters.replicas,
+    ),
+    Rate(
+        "flights",
+        "encounters of 120 s with other flights, two intruders, three sensors at 1 Hz, open loop",
+        1000,
+        1000,
+        encounters.flights,
+    ),
+    Rate(
+        "loop",
+        "the same in a closed loop of tracker, alerting and pilot, lookahead 0.5 s",
+        333,
+        1000,
+        encounters.loop,
+    ),
+    Rate(
+        "risk",
+        "encounters of 180 s of a model, radar, tracker and alerting, nominal and mitigated",
+        167,
+        512,
+        encounters.risk,
     ),
 )
 
