@@ -9,6 +9,8 @@ import numpy as np
 from components.aircraft.aircraft import Roster
 from components.cdti.camera_picture import silhouette
 from components.cdti.own_flight import OwnNow
+from components.geometry.attitude import ned_to_body
+from components.messages.alerts import TRACKS_FROM
 from components.messages.detections import Detections
 from components.messages.targets import TrafficStates
 from components.optical.camera import Camera
@@ -17,7 +19,9 @@ from dsa_des.block.component import Component
 from dsa_des.text.safe_text import printable
 
 # When, where in body axes, how far, how large, how far above the threshold.
-_COLUMNS = ("time_s", "azimuth_rad", "elevation_rad", "range_m", "pixels", "margin")
+_COLUMNS = 6
+#: A picture belongs to a track if it was taken so near to its direction, so lately.
+NEAR_RAD, LATELY_S = math.radians(3.0), 2.0
 
 
 class CameraSights:
@@ -45,7 +49,7 @@ class CameraSights:
         if len(real) == 0:
             return
         seen = self._seen.get(block)
-        seen = np.full((len(message.roster), 6), np.nan) if seen is None else seen.copy()
+        seen = np.full((len(message.roster), _COLUMNS), np.nan) if seen is None else seen.copy()
         seen[message.target[real]] = np.stack([
             message.measured_ticks()[real] / ticks_per_s, message.azimuth_rad[real],
             message.elevation_rad[real], message.true_range_m[real],
@@ -53,10 +57,27 @@ class CameraSights:
         ], axis=1)  # fmt: skip
         self._seen[block] = seen
 
-    def picture(self, target: int, time_s: float, own: OwnNow) -> dict[str, Any] | None:
-        """Return the newest picture of a target, or None where no camera has seen it."""
+    def picture(
+        self, contact: int, toward: tuple[float, float] | None, time_s: float, own: OwnNow
+    ) -> dict[str, Any] | None:
+        """Return the newest picture of a contact, or None where no camera has seen it.
+
+        Parameters
+        ----------
+        contact : int
+            Of a tracker that knows no targets the picture nearest to its direction is taken.
+        toward : (bearing, elevation) or None
+            Of the contact, rad.
+        time_s : float
+        own : OwnNow
+        """
         states, roster = self.states, self._roster
-        if roster is None or states is None or not 0 <= target < len(roster):
+        if roster is None or states is None:
+            return None
+        target = contact
+        if contact >= TRACKS_FROM:
+            target = -1 if toward is None else self._nearest(toward, time_s, own)
+        if not 0 <= target < len(roster):
             return None
         names = [n for n, seen in self._seen.items() if math.isfinite(seen[target, 0])]
         if not names:
@@ -83,7 +104,7 @@ class CameraSights:
         contrast = (margin + camera.p.threshold) / strength if strength > 0.0 else 0.0
         up = elevation + own.pitch_rad * math.cos(azimuth) - own.roll_rad * math.sin(azimuth)
         return {
-            "target": target,
+            "target": contact,
             "sensor": printable(name),
             "infrared": camera.areas == "ir",
             "age": round(max(time_s - seen_s, 0.0), 2),
@@ -95,6 +116,26 @@ class CameraSights:
             "fuselage": np.round(drawn.fuselage, 2).tolist(),
             "wing": np.round(drawn.wing, 2).tolist(),
         }
+
+    def _nearest(self, toward: tuple[float, float], time_s: float, own: OwnNow) -> int:
+        """Return the target that a camera saw lately nearest to a direction, -1 for none."""
+        north, east = math.cos(toward[0]), math.sin(toward[0])
+        level, up = math.cos(toward[1]), math.sin(toward[1])
+        line = np.array(ned_to_body(
+            level * north, level * east, -up, own.heading_rad, own.pitch_rad, own.roll_rad
+        ))  # fmt: skip
+        best, least = -1, math.cos(NEAR_RAD)
+        for seen in self._seen.values():
+            azimuth, elevation = seen[:, 1], seen[:, 2]
+            level_seen = np.cos(elevation)
+            along = np.stack([
+                level_seen * np.cos(azimuth), level_seen * np.sin(azimuth), -np.sin(elevation)
+            ], axis=1) @ line  # fmt: skip
+            along = np.where(time_s - seen[:, 0] < LATELY_S, along, -1.0)
+            place = int(np.argmax(along))
+            if along[place] > least:
+                best, least = place, float(along[place])
+        return best
 
 
 def _dip_rad(alt_m: float) -> float:

@@ -8,13 +8,12 @@ import numpy as np
 from components.cdti.own_flight import OwnFlight, OwnNow
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
+from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-#: A tracker's own numbers stand above those of the scene's targets.
-TRACKS_FROM = 1_000_000
 #: A range that was measured counts for so long when only directions follow, s.
 RANGE_HELD_S = 3.0
 

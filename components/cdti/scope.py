@@ -15,7 +15,7 @@ from components.cdti.camera_sights import CameraSights
 from components.cdti.contacts import Contacts, contacts_of_lines, contacts_of_states
 from components.cdti.lost_area import lost_area
 from components.cdti.own_flight import OwnFlight
-from components.messages.alerts import AlertLevels
+from components.messages.alerts import AlertLevels, contact_name
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
@@ -109,15 +109,16 @@ class Scope:
     def _take_alerts(self, message: AlertLevels) -> None:
         last = message.take(slice(len(message) - 1, len(message)))
         time_s = int(last.tick[0]) / self._per_s
-        on = {int(t) for t, level in zip(last.target, last.level, strict=True) if level > 0}
+        contacts = last.contacts()
+        on = {int(t) for t, level in zip(contacts, last.level, strict=True) if level > 0}
         self._since = {t: self._since.get(t, time_s) for t in sorted(on)}
         times = [last.times[name] for name in sorted(last.times)]
         with np.errstate(invalid="ignore"):
-            to_loss = np.fmin.reduce(times) if times else np.full(len(last.target), np.nan)
+            to_loss = np.fmin.reduce(times) if times else np.full(len(contacts), np.nan)
         self._name(last.roster.names)
         self._alerts = _Alerts(
             time_s,
-            last.target,
+            contacts,
             last.level,
             np.array([last.relative[name] for name in _RELATIVE]),
             float(last.own_motion["alt_m"][0]),
@@ -133,11 +134,9 @@ class Scope:
         """The ownship's altitude; infinite before it is known."""
         return math.inf if self._own.now is None else self._own.now.alt_m
 
-    def name_of(self, target: int) -> str | None:
-        """Return a target's name as the scene has it; empty for none, None if there is none."""
-        if target < 0:
-            return ""
-        return self._names[target] if target < len(self._names) else None
+    def name_of(self, contact: int) -> str | None:
+        """Return a contact's name as the run has it; empty for none, None if there is none."""
+        return contact_name(self._names, contact)
 
     def picture(self, time_s: float, chosen: int) -> dict[str, Any]:
         """Return what is shown at an instant, for JSON: m, deg, s, north and east of the ownship.
@@ -176,8 +175,19 @@ class Scope:
             "contacts": shown,
             "alerts": said,
             "area": area,
-            "camera": self._sights.picture(chosen, time_s, own),
+            "camera": self._sights.picture(chosen, self._toward(chosen), time_s, own),
         }
+
+    def _toward(self, contact: int) -> tuple[float, float] | None:
+        """Return the bearing and elevation of a contact as it was seen last, rad."""
+        contacts = self._contacts
+        if contacts is None:
+            return None
+        place = np.flatnonzero(contacts.number == contact)
+        if len(place) == 0:
+            return None
+        bearing, elevation = contacts.toward[place[0]].tolist()
+        return bearing, elevation
 
     def _said(self, alerts: _Alerts) -> list[dict[str, Any]]:
         """Return the alerts that are on, the most urgent first."""

@@ -12,6 +12,8 @@ from dsa_des.block.message import Message, Text, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
 MOST_LEVELS = 4
+#: A tracker's own numbers stand above those of the scene's targets, where both name contacts.
+TRACKS_FROM = 1_000_000
 _TIMES = {f"time_to_level_{level}_s": "float64" for level in range(1, MOST_LEVELS + 1)}
 
 
@@ -69,3 +71,23 @@ class AlertLevels(Message):
         found = np.zeros(len(self), dtype=np.int64)
         np.maximum.at(found, np.repeat(np.arange(len(self)), np.diff(self.offsets)), self.level)
         return found
+
+    def contacts(self) -> IntArray:
+        """Return whom each entry is about, as those who look at a display know them, (entries,).
+
+        The place of the target; where a tracker's states are believed, which know no targets,
+        `TRACKS_FROM` and the track's number.
+        """
+        return TRACKS_FROM + self.numbers["track"] if "track" in self.numbers else self.target
+
+
+def contact_name(names: tuple[str, ...], contact: int) -> str | None:
+    """Return the name of a contact: of a target as the scene has it, else "track 7".
+
+    Empty for -1, none; None where there is no such target.
+    """
+    if contact >= TRACKS_FROM:
+        return f"track {contact - TRACKS_FROM}"
+    if contact < 0:
+        return ""
+    return names[contact] if contact < len(names) else None

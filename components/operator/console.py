@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.messages.alerts import AlertLevels
+from components.messages.alerts import AlertLevels, contact_name
 from components.messages.decisions import CLIMB, TURN, Decision, Decisions
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import ClockedParameters, Component, PositiveRational
@@ -88,9 +88,9 @@ class Console(Component):
     def _after(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
         """Return the alerts that are on once a row of levels has come."""
         now = {}
-        level = alerts.level[entries]
+        level, contacts = alerts.level[entries], alerts.contacts()[entries]
         for place in np.flatnonzero(level > 0).tolist():
-            name = alerts.roster.names[int(alerts.target[entries][place])]
+            name = contact_name(alerts.roster.names, int(contacts[place])) or ""
             began = self._alerts.get(name)
             now[name] = _Alert(int(level[place]), tick if began is None else began.tick)
         return now

@@ -12,6 +12,8 @@ from components.cdti import crew as crew_module
 from components.cdti import session as session_module
 from components.examples import folder
 
+#: Of the session's tracker, whose first track is that of the intruder's direction.
+TRACKS = 1_000_000
 SCENE = str(folder() / "operator" / "session.toml")
 #: Begun when the camera already sees the intruder, and without what no test looks at.
 LATER = (

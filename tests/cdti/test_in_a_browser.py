@@ -14,7 +14,7 @@ import pytest
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 pytest.importorskip("websockets", reason="needs the package websockets")
-from live import Session  # noqa: E402
+from live import TRACKS, Session  # noqa: E402
 
 import dsa_des  # noqa: E402
 
@@ -103,21 +103,21 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     seen = screen.when("App.state().lines.length && !App.state().symbols.length")
     assert seen["lines"][0]["bearing"] == pytest.approx(50.2, abs=3) and not seen["alerts"]
     seen = screen.when("App.state().alerts.length && App.state().symbols.length")
-    (symbol,) = seen["symbols"]
-    assert (symbol["shape"], symbol["tag"], seen["alerts"][0]["level"]) == ("square", "+01", 3)
-    assert seen["sounds"] == 1
-    assert page.locator("#banner").inner_text().startswith("WARNING crossing: separation is lost")
-    assert (
-        page.locator("#contacts li").first.inner_text().startswith("WARNING, crossing, 2 o'clock")
-    )
+    alert = seen["alerts"][0]
+    track, name = alert["target"], f"track {alert['target'] - TRACKS}"
+    (symbol,) = [one for one in seen["symbols"] if one["number"] == track]
+    shape, word = {2: ("circle", "CORRECTIVE"), 3: ("square", "WARNING")}[alert["level"]]
+    assert (symbol["shape"], symbol["tag"]) == (shape, "+01") and seen["sounds"] == 1
+    assert page.locator("#banner").inner_text().startswith(f"{word} {name}: separation is lost")
+    assert page.locator("#contacts li").first.inner_text().startswith(f"{word}, {name}, 2 o'clock")
     page.keyboard.press(key)
     answer = screen.taken(judged)
     page.select_option("#turn-by", str(abs(by_deg)))
     page.locator("#scope").focus()
     page.keyboard.press(arrow)
     turn = screen.taken("turn")
-    assert answer["time"] <= turn["time"] and answer["target"] == 0
-    assert (page.locator("#banner").inner_text() == "") == (judged == "rejected")
+    assert answer["time"] <= turn["time"] and answer["target"] == track
+    assert (name in page.locator("#banner").inner_text()) == (judged == "verified")
     heading = "((App.state().own.heading + 180) % 360) - 180"
     screen.when(f"Math.abs({heading} - ({by_deg})) < 0.5")
     seen = screen.when("App.state().over", timeout=60_000)
@@ -142,7 +142,9 @@ def alerted(browser, tmp_path_factory):
         sets = (*SETS, "title='''a title & " + HOSTILE + "'''",
                 f"blocks.traffic.intruders[0].name='{HOSTILE}'")  # fmt: skip
         out = tmp_path_factory.mktemp("alerted") / "run"
-        session = Session(patch, out, factor="8", duration="600", sets=sets)
+        session = Session(
+            patch, out, factor="8", duration="600", sets=sets, swaps=("tracker=tracking.stub",)
+        )
         screen = Screen(browser, session.address)
         screen.page.keyboard.press("Enter")
         screen.when("App.state().alerts.length")

@@ -18,7 +18,7 @@ const App = (() => {
   function may() { return state.role === "operator" && scene.console && !state.over; }
   function decide(decision, value) {
     if (!may()) return;
-    const target = state.chosen >= 0 && state.chosen < 1000000 ? state.chosen : -1;
+    const target = state.chosen;
     if (value === undefined && target < 0) return;
     const content = { decision, target };
     if (value !== undefined) content.value = value;
@@ -32,7 +32,7 @@ const App = (() => {
   function choose(number) {
     if (number === state.chosen) return;
     state.chosen = number;
-    Link.send({ type: "chosen", target: number < 1000000 ? number : -1 });
+    Link.send({ type: "chosen", target: number });
     if (number >= 0 && levels.get(number) && may()) decide("looked");
     state.dirty = true;
   }
