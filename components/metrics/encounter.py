@@ -6,6 +6,7 @@ horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 f
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
