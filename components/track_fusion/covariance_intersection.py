@@ -13,6 +13,7 @@ from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_states import fused_states
+from components.track_fusion.ladder import RULE
 from components.track_fusion.local_tracks import LocalTracks, local_tracks
 from components.track_fusion.matching import MatchRules, matched, without_strays
 from components.track_fusion.told_tracks import (
@@ -133,6 +134,7 @@ class CovarianceIntersection(Component):
     windowed = True
     lockstep = True
     rewindable = True
+    ladders = (RULE,)
 
     def setup(self) -> None:
         """Start with no tracks, and learn who sends them."""

@@ -13,6 +13,7 @@ from components.messages.reach import Reach
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.filter_bank import FilterBank
+from components.tracking.ladder import LADDERS
 from components.tracking.late_looks import (
     Before,
     Memory,
@@ -61,6 +62,7 @@ class Tracker(Component):
     Parameters = TrackerParameters
     windowed = True
     rewindable = True
+    ladders = LADDERS
 
     def bank(self) -> FilterBank:
         """Return the filters; a subclass may say otherwise."""

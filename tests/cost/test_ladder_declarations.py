@@ -34,7 +34,6 @@ def test_rungs_fill_the_same_contract(type_name, ladder):
 
 def test_every_sensor_transform_and_fusion_has_a_ladder():
     without = {name for name in registered() if not find(name).ladders}
-    without -= {"fusion.covariance_intersection"}  # TODO-central
     without -= {"fusion.pass_through"}  # puts nothing together: there is nothing to be exact about
     assert without.isdisjoint({name for name in registered() if name.split(".")[0] in (
         "radar", "optical", "geometry", "fusion")})  # fmt: skip

@@ -1,0 +1,150 @@
+"""The ladders of trackers: which filter, whose detection is whose, what becomes of late looks."""
+
+from typing import Any
+
+import numpy as np
+
+from components.estimation.covariance_intersection import distance_squared
+from components.estimation.frame import place_in_frame
+from components.estimation.measurement import position_of
+from components.messages.columns import COVARIANCE
+from components.messages.detections import POSE
+from components.messages.fused import FusedDetections
+from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
+from components.messages.true_entries import true_entries
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.block.component import Component
+from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.wake import Wake
+
+# A track farther from a target than this is not taken to be of it.
+_NEAR_M = 1000.0
+_POSITION = ("north_m", "east_m", "down_m")
+_VELOCITY = ("north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return how far the confirmed track of each detected target is from it.
+
+    Rungs have other tracks, so they are compared with the truth and not with each other: at every
+    instant at which a target was detected and tracks are told, the nearest confirmed track with a
+    range, carried back to when that was measured. Not what the tracker sees: the truth comes from
+    what it was given, after it has run.
+    """
+    fused: Any = wake["fused"]
+    if fused is None:
+        return {"position": np.empty((0, 0)), "nees": np.empty((0, 0))}
+    shape = (len(wake), len(fused.roster))
+    found = {name: np.full(shape, np.nan) for name in ("position", "nees")}
+    told: Any = block.run(wake)
+    fused = true_entries(fused)
+    if told is None or len(fused.target) == 0:
+        return found
+    row_of_track = np.repeat(np.searchsorted(wake.ticks, told.tick), np.diff(told.offsets))
+    row_of_entry = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
+    held = told.has_range & np.isin(told.track_status, (CONFIRMED, COASTED))
+    track = np.flatnonzero(held)
+    first = np.searchsorted(row_of_track[track], row_of_entry, side="left")
+    many = np.searchsorted(row_of_track[track], row_of_entry, side="right") - first
+    entry = np.repeat(np.arange(len(row_of_entry)), many)
+    start = np.cumsum(many) - many
+    mine = track[np.arange(len(entry)) - np.repeat(start - first, many)]
+    if len(entry) == 0:
+        return found
+    error, back_s = _apart(fused, entry, told, mine, wake)
+    distance = np.sqrt((error**2).sum(axis=0))
+    # The nearest of each entry's tracks, the first of equals.
+    order = np.lexsort((distance, entry))
+    begins = np.ones(len(order), dtype=bool)
+    begins[1:] = entry[order][1:] != entry[order][:-1]
+    best = order[begins]
+    best = best[distance[best] <= _NEAR_M]
+    row, target = row_of_entry[entry[best]], fused.target[entry[best]]
+    found["position"][row, target] = distance[best]
+    spread = np.empty((3, 3, len(best)))
+    for (i, j), name in COVARIANCE.items():
+        if j < 3:
+            spread[i, j] = spread[j, i] = told.covariance[name][mine[best]]
+    nees = distance_squared(error[:, best], spread) / 3.0
+    # A covariance is not carried back: of late detections only the position counts.
+    found["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
+    return found
+
+
+def _apart(
+    fused: FusedDetections, entry: IntArray, told: StateTracks, mine: IntArray, wake: Wake
+) -> tuple[FloatArray, FloatArray]:
+    """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
+    span = wake.span_ticks or 1 << 62
+    measured_s = (fused.measured_tick[entry] % span) / wake.ticks_per_s
+    lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
+    origin: Any = tuple(getattr(told, name)[mine] for name in _ORIGIN)
+    turned: Any = tuple(attitude)
+    place = place_in_frame(origin, (lat, lon, alt), turned)
+    true = np.stack(
+        [fused.true_azimuth_rad[entry], fused.true_elevation_rad[entry], fused.true_range_m[entry]]
+    )
+    there, _ = position_of(true, place)
+    back_s = told.state_s[mine] - measured_s
+    position = np.stack([getattr(told, name)[mine] for name in _POSITION])
+    velocity = np.stack([getattr(told, name)[mine] for name in _VELOCITY])
+    return position - back_s * velocity - there, np.abs(back_s)
+
+
+def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the same for the reference: what its sensors measure is part of it."""
+    row, target = cells.T
+    return {name: values[row, target] for name, values in measure(block, wake, block).items()}
+
+
+def _to_the_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
+    return values
+
+
+_QUANTITIES = (
+    Quantity("position", "m", _to_the_truth),
+    Quantity("nees", "1", _to_the_truth),
+)
+
+FILTER = Ladder(
+    "filter",
+    (
+        Rung("ekf", "extended Kalman filter, nearly constant velocity", "tracking.ekf"),
+        Rung("ukf", "unscented Kalman filter, nearly constant velocity", "tracking.ukf"),
+        Rung("imm", "interacting models: straight and turning", "tracking.imm"),
+    ),
+    "imm",
+    _QUANTITIES,
+    measure,
+    truth,
+)  # fmt: skip
+
+ASSOCIATION = Ladder(
+    "association",
+    (
+        Rung("nearest", "the nearest pair first", parameters={"association": "nearest"}),
+        Rung("gnn", "the least sum over all", parameters={"association": "gnn"}),
+        Rung("jpda", "all in the gate, weighed", parameters={"association": "jpda"}),
+    ),
+    "jpda",
+    _QUANTITIES,
+    measure,
+    truth,
+)
+
+LATENESS = Ladder(
+    "lateness",
+    (
+        Rung("drop", "late looks are left out", parameters={"late": "drop"}),
+        Rung("one_step", "late looks correct the state once", parameters={"late": "one_step"}),
+        Rung("rerun", "all since a late look is worked on again", parameters={"late": "rerun"}),
+    ),
+    "rerun",
+    _QUANTITIES,
+    measure,
+    truth,
+)
+
+#: Of every tracker that estimates states.
+LADDERS = (FILTER, ASSOCIATION, LATENESS)
