@@ -375,7 +375,8 @@ FAULTS = [
         _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
         ("ground-and-noise-twice", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
          "extra = pfa * 1.2"),
-        ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")]', '("yaw", "pitch", "yaw")]'),
+        ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")\n        ]',
+         '("yaw", "pitch", "yaw")\n        ]'),
         ("ground-in-the-neighbour-s-range", "depth + beam * self._cells.range", "beam + 0 * depth"),
     ),
     *in_file(
