@@ -6,6 +6,7 @@ horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 f
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ def read_flights(
             continue
         key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
         if key not in known:
-            found = separations(scene, step_s)
+            found = group.once(("separations", step_s, *key), partial(separations, scene, step_s))
             known[key] = read([s for s in found if target in (None, s.name)])
         values[:, number] = known[key]
     return values

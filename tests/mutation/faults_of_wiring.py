@@ -427,7 +427,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/avoidance/turn_away.py", "wiring/test_turning_away.py",
         ("rate-is-the-turn", "math.radians(self.p.rate_deg_s)", "math.radians(self.p.turn_deg)"),
-        ("never-pauses", "self._free_from = tick + self._pause_ticks", "self._free_from = tick"),
+        ("never-pauses", "self._free_from[run] = tick + self._pause_ticks",
+         "self._free_from[run] = tick"),
     ),
     *in_file(
         _GROUP, "components/traffic/scripted.py",
