@@ -181,3 +181,36 @@ def show(**options: Any) -> None:
     from components.encounters.show_command import show_set
 
     show_set(**options)
+
+
+@encounters.command()
+@click.argument("file", metavar="SET.parquet")
+@click.option(
+    "--levels",
+    required=True,
+    metavar="A,B,...",
+    help="Falling scores: below A is the first stage, below B the second, ...",
+)
+@click.option(
+    "--copies",
+    required=True,
+    metavar="N,N,...",
+    help="How many copies are expected outside of all stages, in the first, ... Weights undo it.",
+)
+@click.option(
+    "--scores", metavar="TABLE", help="Table or folder of a study with the column encounter."
+)
+@click.option(
+    "--score",
+    metavar="COLUMN",
+    help="Its column; less is nearer to the event [default: the least distance of the flights, in "
+    "sizes of the NMAC cylinder].",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--out", required=True, metavar="SET.parquet", help="The set of copies.")
+@plain_errors
+def split(**options: Any) -> None:
+    """Make a set in which encounters that matter stand more often, with weights that undo it."""
+    from components.encounters.split_command import split_encounters
+
+    split_encounters(**options)
