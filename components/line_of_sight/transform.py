@@ -30,7 +30,8 @@ from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
-_PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+_TURNED = ("yaw_rad", "pitch_rad", "roll_rad")
+_PLACE = ("lat_deg", "lon_deg", "alt_m", *_TURNED)
 
 # Cells worked on together: the two dozen arrays in flight then stay in the processor's cache,
 # which was measured to be three times faster than whole windows.
@@ -128,6 +129,7 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed=self._believed(states),
+            own_attitude={name: getattr(states, f"own_{name}") for name in _TURNED},
             revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
         )

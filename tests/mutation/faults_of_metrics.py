@@ -60,6 +60,12 @@ FAULTS = [
          "2.0 * (apart(after) - apart(before)) / lasts_s"),
     ),
     *in_file(
+        _GROUP, "components/metrics/relative_states.py", (_SEPARATION,),
+        ("begin-of-the-segment", "float(begin[first] + span.begin_s[first])",
+         "float(span.begin_s[first])"),
+        ("segments-end-with-the-piece", "0.0, end - begin)", "0.0, np.inf)"),
+    ),
+    *in_file(
         _GROUP, "components/metrics/steered.py", ("wiring/test_mitigated_metric.py",),
         ("told-is-flown-at-once", "came_s = time_s + self._delays_s[names[block]]",
          "came_s = time_s"),

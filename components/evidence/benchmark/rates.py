@@ -16,6 +16,7 @@ import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
+from components.evidence.benchmark import encounters
 from components.evidence.benchmark.measure import pin
 from components.evidence.benchmark.other_trackers import by_stone_soup, plainly
 from components.evidence.benchmark.track_updates import LOOKS, updates
@@ -113,6 +114,34 @@ RATES = (
         100 * LOOKS,
         _tracks_of_one_run,
         {"a plain loop": lambda quick: plainly(10 if quick else 100)},
+    ),
+    Rate(
+        "replicas",
+        "replicas of 120 s, an intruder, 5, 20 and 2 Hz, other phases, all recorded",
+        1000,
+        1000,
+        encounters.replicas,
+    ),
+    Rate(
+        "flights",
+        "encounters of 120 s with other flights, two intruders, three sensors at 1 Hz, open loop",
+        1000,
+        1000,
+        encounters.flights,
+    ),
+    Rate(
+        "loop",
+        "the same in a closed loop of tracker, alerting and pilot, lookahead 0.5 s",
+        333,
+        1000,
+        encounters.loop,
+    ),
+    Rate(
+        "risk",
+        "encounters of 180 s of a model, radar, tracker and alerting, nominal and mitigated",
+        167,
+        512,
+        encounters.risk,
     ),
 )
 
