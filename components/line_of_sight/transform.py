@@ -17,7 +17,7 @@ from pydantic import Field
 from components.geometry.line_of_sight import LineOfSight
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
-from components.line_of_sight.ladder import ATTITUDE, EARTH
+from components.line_of_sight.ladder import ATTITUDE, EARTH, REFRACTION
 from components.line_of_sight.rung_choice import REFERENCE
 from components.line_of_sight.rung_planning import PickedModels, pick_rung
 from components.line_of_sight.true_reach import true_reach_m
@@ -76,7 +76,7 @@ class Transform(Component):
         "bends": "(own, seen, attitude) -> seen: lines of sight along bent rays",
     }
     effects = (NavigationErrors(), *EARTH_EFFECTS)
-    ladders = (EARTH, ATTITUDE)
+    ladders = (EARTH, ATTITUDE, REFRACTION)
     #: The type's own model of the Earth.
     earth: ClassVar[str]
 
