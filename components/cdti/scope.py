@@ -96,11 +96,17 @@ class Scope:
         elif isinstance(message, AlertLevels):
             self._take_alerts(message)
         elif self._believed is not None and isinstance(message, self._believed):
-            last = message.take(slice(len(message) - 1, len(message)))
-            if isinstance(last, StateTracks):
-                self._contacts = contacts_of_states(last, self._own, self._per_s)
-            else:
-                self._contacts = contacts_of_lines(last, self._own, self._per_s, self._contacts)
+            self._take_contacts(message)
+
+    def _take_contacts(self, message: Message) -> None:
+        count = len(message)
+        if isinstance(message, StateTracks):
+            last = message.take(slice(count - 1, count))
+            self._contacts = contacts_of_states(last, self._own, self._per_s)
+        elif isinstance(message, Tracks | FusedDetections):
+            for row in range(count):  # a range counts on in the rows after it
+                one = message.take(slice(row, row + 1))
+                self._contacts = contacts_of_lines(one, self._own, self._per_s, self._contacts)
 
     def _name(self, names: tuple[str, ...]) -> None:
         if names is not self._names:

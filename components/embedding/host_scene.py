@@ -63,6 +63,39 @@ def _is_traffic(cls: type[Component]) -> bool:
     return alone and any(issubclass(message, TrafficStates) for message in sends)
 
 
+#: Keys of sensors that need flights, and their values that do not.
+_NEEDS_FLIGHTS: dict[str, bool | str] = {
+    "beam_sweep": False, "measures_range_rate": False, "moving_target_filter": "none"
+}  # fmt: skip
+
+
+def refuse_other_instants(scene: Scene) -> None:
+    """Refuse sensors that ask where aircraft are between the calls of a host.
+
+    Raises
+    ------
+    SceneError
+        With a problem for each key.
+    """
+    problems = [
+        Problem(
+            str(scene.path), f"blocks.{name}.{key}",
+            "needs to know where aircraft are between the calls of a host program, which says "
+            f"where they are at its calls only: set it to {_written(off)}", value,
+        )
+        for name, block in scene.blocks.items()
+        for key, off in _NEEDS_FLIGHTS.items()
+        if (value := getattr(block.parameters, key, off)) != off
+        and getattr(block.parameters, "enabled", True)
+    ]  # fmt: skip
+    if problems:
+        raise SceneError(problems)
+
+
+def _written(value: bool | str) -> str:
+    return repr(value) if isinstance(value, str) else str(value).lower()
+
+
 def source_of(scene: Scene) -> str:
     """Return the name of the block that the host replaces.
 

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
+from components.messages.reach import farthest_look
 from components.messages.targets import TrafficStates
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.ports import Output
@@ -52,6 +53,15 @@ class HostTraffic(Component):
     def natural_duration_s(self) -> Fraction:
         """Return a length for scenes that give none."""
         return _NO_END_S
+
+    def setup(self) -> None:
+        """Refuse sensors that ask where aircraft are at instants of which a host says nothing."""
+        if farthest_look(consumer.request for consumer in self.context.consumers).lasts_s > 0.0:
+            raise ValueError(
+                "a sensor needs to know where aircraft are at instants between the host's calls, "
+                "as beam_sweep, measures_range_rate and moving_target_filter do: a host program "
+                "says where they are at its calls only"
+            )
 
     @property
     def width(self) -> int:

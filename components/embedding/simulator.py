@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.aircraft.aircraft import Aircraft
-from components.embedding.host_scene import load_for_host, planes_known_to, source_of, with_host
+from components.embedding.host_scene import (
+    load_for_host,
+    planes_known_to,
+    refuse_other_instants,
+    source_of,
+    with_host,
+)
 from components.embedding.planes import FixedPath, number_of, plane_of
 from components.embedding.result import EncounterResult, Sighting, sightings_of
 from components.embedding.states import checked_rows, traffic_states
@@ -45,7 +51,7 @@ class Simulator:
     ------
     SceneError
         With every problem of the scene; also if it needs more than an open-loop chain (feedback,
-        delays, shared processors), or has no fusion.
+        delays, shared processors), or flights between the host's calls, or has no fusion.
     """
 
     def __init__(
@@ -59,6 +65,7 @@ class Simulator:
     ) -> None:
         self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed)
         self._source = source_of(self.scene)
+        refuse_other_instants(self.scene)
         self._planes = planes_known_to(self.scene)
         self._fixed: dict[int, FixedPath] = {}
         #: One chain for all planes, or one for each when the host calls plane by plane.

@@ -36,8 +36,8 @@ from components.encounters.track_rules import Commands, TrackError, TrackRules
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Pairs that are made together, and attempts of them that are looked at together.
-PAIRS_AT_ONCE = 4096
-_FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 4096, 6, 256
+PAIRS_AT_ONCE = 6144
+_FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 6144, 6, 256
 _COURSES, _COURSES_FROM = 40, 4
 _MOST_ATTEMPTS = 1_000_000
 
@@ -135,11 +135,11 @@ class PairSampler:
             passed = len(hopeful) / len(rows)
             rows, tries = rows[hopeful], tries[hopeful]
             attempt[left] += many
-            done, pairs = self._flights(wanted[rows], tries, narrow, bound)
+            done, kept, pairs = self._flights(wanted[rows], tries, narrow, bound)
             if pairs is not None:
                 # Of several that are accepted the first attempt counts.
                 fresh, first = np.unique(rows[done], return_index=True)
-                parts.append(pairs.some(first))
+                parts.append(pairs.some(kept[first]))
                 left = np.setdiff1d(left, fresh, assume_unique=True)
             if len(left) and attempt[left].max() > _MOST_ATTEMPTS:
                 raise TrackError(
@@ -184,10 +184,10 @@ class PairSampler:
 
     def _flights(
         self, numbers: IntArray, attempts: IntArray, narrow: IntArray, bound: FloatArray
-    ) -> tuple[IntArray, Pairs | None]:
-        """Return which proposals are accepted, and the pairs that they are."""
+    ) -> tuple[IntArray, IntArray, Pairs | None]:
+        """Return which proposals are accepted, and which of some pairs they are."""
         if not len(numbers):
-            return numbers, None
+            return numbers, numbers, None
         rules, cpa = self.rules, self.rules.closest_s
         # Whoever breaks a rule alone is not flown with the other.
         own = self._flight(0, numbers, attempts)
@@ -219,7 +219,7 @@ class PairSampler:
             climb = flight.commands.climb_ft_s[:, done]
             done = done[self._rules[k].inside(summed(altitude[k, done], climb))]
         if not len(done):
-            return done, None
+            return done, done, None
         commands = [f.commands.some(done) for f in both]
         for k, c in enumerate(commands):
             c.altitude_ft[:] = altitude[k, done]
@@ -227,7 +227,7 @@ class PairSampler:
         more = self._draws.few(numbers[rows], _COURSES_FROM + 2 * _COURSES, attempts[rows])
         pairs = self._paired(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
         kept = self._kept(pairs).nonzero()[0]
-        return rows[kept], pairs.some(kept)
+        return rows[kept], kept, pairs
 
     def _flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
         """Return what tracks of one aircraft command, and which keep their own rules."""

@@ -55,7 +55,7 @@ class RiskRatios(Mitigated):
         weight = cluster = None
         if self._weight is not None:
             found += self._weight.results()
-            weight, cluster = "encounter_weight", "encounter"
+            weight, cluster = "encounter_weight", "encounter_family"
         for by in self.p.by:
             found.append(Result(f"encounter_{by}", CLASS, f"class of its {by}"))
         for name in _EVENTS:

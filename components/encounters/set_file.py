@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.encounters.encounter_set import EVENTS, LISTS, STATE, TRACKS, EncounterSet
+from components.encounters.splitting import FAMILY
 from components.encounters.streamed_file import streamed
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
@@ -27,6 +28,7 @@ _KEYS = ("encounter", "weight", "aircraft")
 #: Columns that a set may have besides: geometry at the closest approach, and classes.
 EXTRA = (
     "horizontal_miss_m", "vertical_miss_m", "closest_s", "course_deg", "bearing_deg", "geometry",
+    FAMILY,
 )  # fmt: skip
 _LARGEST_BYTES = 16 * 2**30
 _MOST_SAID = 20

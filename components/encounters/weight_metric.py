@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.encounters.encounter_traffic import chosen_encounter
+from components.encounters.splitting import FAMILY
 from components.metrics.separation import traffic_block
 from dsa_des.arrays.types import AnyArray
 from dsa_des.scene.scene import Scene
@@ -30,17 +31,21 @@ class EncounterWeight(Metric):
             )
 
     def results(self) -> list[Result]:
-        """Return number and weight."""
+        """Return number, weight and family."""
         return [
             Result("encounter", NUMBER, "number of the encounter"),
             Result("encounter_weight", NUMBER, "how often it happens in the airspace"),
+            Result("encounter_family", NUMBER, "encounter of which it is a copy, or itself"),
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return both for every replica."""
-        numbers, weights = np.empty(len(group)), np.empty(len(group))
+        """Return all three for every replica."""
+        numbers, weights, families = np.empty((3, len(group)))
         for row, scene in enumerate(group.scenes):
             block = traffic_block(scene)
             found, place = chosen_encounter(block.cls, block.parameters)
             numbers[row], weights[row] = found.numbers[place], found.weights[place]
-        return {"encounter": numbers, "encounter_weight": weights}
+            families[row] = found.extra.get(FAMILY, found.numbers)[place]
+        return {
+            "encounter": numbers, "encounter_weight": weights, "encounter_family": families,
+        }  # fmt: skip

@@ -1,4 +1,4 @@
-"""The ladders of the coordinate transform: the Earth's shape, and the ownship's attitude."""
+"""The ladders of the coordinate transform: the Earth's shape, the attitude, and bent rays."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from components.sensor.ladder_values import (
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.block.ladder import Ladder, Quantity, Rung
+from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
 from dsa_des.block.wake import Wake
 
 _MRAD_PER_DEG = 1e3 * np.pi / 180.0
@@ -40,10 +40,19 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     }
 
 
+def _straight(block: Any) -> str:
+    """Say that rays are straight where the scene says so; nothing where they bend."""
+    terrain = block.context.sections.get("terrain")
+    bends = terrain is not None and terrain.refraction != "none"
+    return "" if bends else "[terrain] refraction is 'none': rays are straight"
+
+
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
     """Return a transform's errors against the line of sight at 40 digits (needs mpmath)."""
     from components.high_precision.line_of_sight import line_of_sight_errors
 
+    if not _straight(block):
+        raise Unavailable("nothing more exact is known of bent rays")
     states, seen = wake["states"], block.run(wake)
     errors = []
     for row, target in cells.tolist():
@@ -103,4 +112,18 @@ ATTITUDE = Ladder(
     QUANTITIES,
     measure,
     truth,
+)  # fmt: skip
+
+
+REFRACTION = Ladder(
+    "refraction",
+    (
+        Rung("none", "straight rays", sections={"terrain": {"refraction": "none"}}),
+        Rung("four_thirds", "rays as over an Earth of 4/3 its radius (ITU-R P.834)",
+             sections={"terrain": {"refraction": "four_thirds"}}),
+    ),
+    "four_thirds",
+    QUANTITIES,
+    measure,
+    applies=_straight,
 )  # fmt: skip

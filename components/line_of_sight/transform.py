@@ -17,7 +17,7 @@ from pydantic import Field
 from components.geometry.line_of_sight import LineOfSight
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.line_of_sight.earth_effects import EARTH_EFFECTS, Bends, Hides
-from components.line_of_sight.ladder import ATTITUDE, EARTH
+from components.line_of_sight.ladder import ATTITUDE, EARTH, REFRACTION
 from components.line_of_sight.rung_choice import REFERENCE
 from components.line_of_sight.rung_planning import PickedModels, pick_rung
 from components.line_of_sight.true_reach import true_reach_m
@@ -30,7 +30,8 @@ from dsa_des.block.message import Message
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
-_PLACE = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")
+_TURNED = ("yaw_rad", "pitch_rad", "roll_rad")
+_PLACE = ("lat_deg", "lon_deg", "alt_m", *_TURNED)
 
 # Cells worked on together: the two dozen arrays in flight then stay in the processor's cache,
 # which was measured to be three times faster than whole windows.
@@ -75,7 +76,7 @@ class Transform(Component):
         "bends": "(own, seen, attitude) -> seen: lines of sight along bent rays",
     }
     effects = (NavigationErrors(), *EARTH_EFFECTS)
-    ladders = (EARTH, ATTITUDE)
+    ladders = (EARTH, ATTITUDE, REFRACTION)
     #: The type's own model of the Earth.
     earth: ClassVar[str]
 
@@ -128,6 +129,7 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed=self._believed(states),
+            own_attitude={name: getattr(states, f"own_{name}") for name in _TURNED},
             revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
             **self._as_seen(own, states, states.present),
         )

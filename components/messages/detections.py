@@ -176,6 +176,7 @@ class Detections(Message):
     row_table = "scans"
     described = DESCRIBED
     entry_table = "detections"
+    may_hold = frozenset({"looks"})
 
     scan: IntArray = per_row(column="int64", in_entries=True)
     evaluated: IntArray = per_row(column="int64")

@@ -68,6 +68,7 @@ class TrafficStates(Message):
     run_time_s: FloatArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
+    may_hold = frozenset({"truth"})
 
     def tables(self) -> dict[str, Columns]:
         """Return the table of the truth where it is recorded."""
@@ -105,6 +106,9 @@ class RelativeTargets(Message):
         What the ownship believes of itself: ``lat_deg``, ``lon_deg``, ``alt_m``, ``yaw_rad``,
         ``pitch_rad``, ``roll_rad``; the truth where its navigation has no error. None from a
         block that does not say.
+    own_attitude : dict of (rows,), or None
+        How the ownship is truly turned: ``yaw_rad``, ``pitch_rad``, ``roll_rad``, NED to body; for
+        what is not a target. None from a block that does not say.
     revisit : KnownFlights or None
         The targets at other instants than those of the rows, as each row knows their flights.
     hidden : (rows, targets) of bool, or None
@@ -129,6 +133,7 @@ class RelativeTargets(Message):
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
+    own_attitude: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: KnownFlights | None = per_row(default=None, kw_only=True)
     state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
     hidden: BoolArray | None = per_row(default=None, kw_only=True)

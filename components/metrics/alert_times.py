@@ -5,13 +5,12 @@ was heeded is no nuisance.
 """
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from components.metrics.encounter import STEP, SizeParameters, losses_s, read_flights
+from components.metrics.encounter import STEP, SizeParameters, read_flights
 from components.metrics.rows import TargetMetric, TargetParameters, is_named, of_target
 from components.metrics.separation import traffic_block
 from components.metrics.steered import ToldManoeuvres
@@ -74,9 +73,10 @@ class AlertTimes(TargetMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        read = partial(losses_s, self.p.sizes_m)
         told = self._told.of(group) if self.p.steered else None
-        lost_s, nmac_s, _ = read_flights(group, self.p.step_s, self.p.target, read, 3, told)
+        lost_s, nmac_s, _ = read_flights(
+            group, self.p.step_s, self.p.target, self.p.losses_s, 3, told
+        )
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from components.metrics.declaration import ANY, DECLARED, DeclarationParameters, declarations
+from components.metrics.relative_states import first_violation_s
 from components.metrics.rows import TargetMetric, sensors_of
 from components.metrics.run_ends import SCANS
 from components.metrics.separation import (
@@ -71,6 +72,13 @@ class SizeParameters(Parameters):
         le=1e6,
         description="Difference in height below which well clear is lost, m.",
     )
+    tau_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=600,
+        description="Modified tau below which well clear is lost too, s (DO-365: 35). 0: distances "
+        "alone.",
+    )
     nmac_horizontal_m: float = Field(
         default=_NMAC.horizontal_m,
         gt=0,
@@ -91,6 +99,10 @@ class SizeParameters(Parameters):
             (self.horizontal_m, self.vertical_m),
             (self.nmac_horizontal_m, self.nmac_vertical_m),
         )
+
+    def losses_s(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
+        """Return when well clear is first lost, when a collision first threatens, and 0, s."""
+        return losses_s(self.sizes_m, flights, self.tau_s)
 
 
 class WellClearParameters(EncounterParameters, SizeParameters):
@@ -136,7 +148,7 @@ def read_flights(
             continue
         key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
         if key not in known:
-            found = separations(scene, step_s)
+            found = group.once(("separations", step_s, *key), partial(separations, scene, step_s))
             known[key] = read([s for s in found if target in (None, s.name)])
         values[:, number] = known[key]
     return values
@@ -221,8 +233,9 @@ class WellClear(_Encounter):
 
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
+        tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
         found = [
-            Result("well_clear_lost", EVENT, self._said(self.p.sizes_m[0], _WELL_CLEAR)),
+            Result("well_clear_lost", EVENT, self._said(self.p.sizes_m[0], _WELL_CLEAR) + tau),
             Result("nmac", EVENT, self._said(self.p.sizes_m[1], _NMAC)),
             Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
@@ -237,7 +250,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, partial(losses_s, self.p.sizes_m), 3)
+        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, 3)
         lost_at_start = in_scan(lost_s, begun_s)
         found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
@@ -262,11 +275,22 @@ def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
 
 
 def losses_s(
-    sizes_m: tuple[tuple[float, float], ...], flights: list[RelativeFlight]
+    sizes_m: tuple[tuple[float, float], ...], flights: list[RelativeFlight], tau_s: float = 0.0
 ) -> tuple[float, ...]:
-    """Return when well clear is first lost, when a collision first threatens, and the start, s."""
+    """Return when well clear is first lost, when a collision first threatens, and the start, s.
+
+    Parameters
+    ----------
+    sizes_m : ((horizontal, vertical) of well clear, those of a collision)
+    flights : list of RelativeFlight
+    tau_s : float
+        Modified tau of well clear; 0 for a cylinder.
+    """
     if not flights:
         return (float("nan"),) * 3
     first = np.array([first_inside(flight, *sizes_m) for flight in flights])
+    if tau_s > 0.0:
+        volume = Volume(*sizes_m[0], horizontal_time_s=tau_s)
+        first[:, 0] = [first_violation_s(flight, volume) for flight in flights]
     lost_s, collision_s = np.fmin.reduce(first).tolist()
     return lost_s, collision_s, 0.0

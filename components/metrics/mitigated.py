@@ -5,12 +5,11 @@ for a risk ratio (`components.metrics.risk`).
 """
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from components.metrics.encounter import STEP, SizeParameters, losses_s, read_flights
+from components.metrics.encounter import STEP, SizeParameters, read_flights
 from components.metrics.separation import traffic_block
 from components.metrics.steered import ToldManoeuvres
 from dsa_des.arrays.types import AnyArray
@@ -48,7 +47,7 @@ class Mitigated(Metric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        read = partial(losses_s, self.p.sizes_m)
+        read = self.p.losses_s
         nominal = read_flights(group, self.p.step_s, None, read, 3)[:2]
         told = self._told.of(group)
         mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]

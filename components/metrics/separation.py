@@ -32,6 +32,8 @@ from dsa_des.time.randomness import Streams
 
 #: Times looked at together: it bounds the memory, however long the run.
 MOST_AT_ONCE = 65_536
+# Times of a flight that are kept for metrics that ask for them again.
+_KEPT = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +137,7 @@ class RelativeFlight:
         self.between_samples = step_s is None
         self._step_s, self._count = step_s or STEP_S, count
         self.end_s = end_s
+        self._known: list[Separation] | None = None
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""
@@ -179,7 +182,15 @@ class RelativeFlight:
         return self._source.own.at(time_s), self._target.at(time_s)
 
     def pieces(self) -> Iterator[Separation]:
-        """Give the distances, about `MOST_AT_ONCE` at a time."""
+        """Give the distances, about `MOST_AT_ONCE` at a time; those of a short run are kept."""
+        if self._count > _KEPT:
+            yield from self._pieces()
+            return
+        if self._known is None:
+            self._known = list(self._pieces())
+        yield from self._known
+
+    def _pieces(self) -> Iterator[Separation]:
         samples = self._samples()
         after_s = 0.0
         for start in range(0, self._count, MOST_AT_ONCE):
@@ -254,7 +265,12 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """
     found = [float("nan")] * len(limits_m)
     if flight.between_samples:
-        return [_first_between_samples(flight, *limits) for limits in limits_m]
+        for number, limits in enumerate(limits_m):
+            # Who never comes into a cylinder comes into none within it.
+            before = zip(limits_m[:number], found[:number], strict=True)
+            if not any(isnan(t) and a >= limits[0] and b >= limits[1] for (a, b), t in before):
+                found[number] = _first_between_samples(flight, *limits)
+        return found
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
             inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.geometry.ellipsoid import north_east_up
 from components.metrics.encounter import read_flights
+from components.metrics.relative_states import relative_states
 from components.metrics.rows import TargetMetric, TargetParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.metrics.steered import ToldManoeuvres
@@ -21,8 +21,6 @@ from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Result
 
-# Velocities are differences of positions so far apart, s.
-_BASE_S = 0.05
 # The best of the grid is looked at again with this much finer steps to both sides.
 _FINER = 50
 
@@ -146,34 +144,3 @@ class Severity(TargetMetric):
         step_s = self.p.step_s / _FINER
         about = time_s + step_s * np.arange(-_FINER, _FINER + 1)
         return np.clip(about, max(first_s, 0.0), min(last_s, flight.end_s))
-
-
-def relative_states(flight: RelativeFlight, time_s: FloatArray) -> tuple[FloatArray, ...]:
-    """Return where the ownship is relative to a target, and how fast, at some times.
-
-    Returns
-    -------
-    six of (n,)
-        East, north in the ownship's level plane and difference of altitudes, m, and their rates,
-        m/s: ownship less target.
-    """
-    first_s, last_s = (float(times[0]) for times in flight.present_s())
-    before = np.maximum(time_s - _BASE_S, max(first_s, 0.0))
-    after = np.minimum(time_s + _BASE_S, last_s)
-    here, _ = flight.states(time_s)
-    origin = _place(here)
-
-    def apart(at_s: FloatArray) -> FloatArray:
-        mine, theirs = map(_place, flight.states(at_s))
-        own, other = (north_east_up(*origin, *place) for place in (mine, theirs))
-        return np.stack([own[1] - other[1], own[0] - other[0], mine[2] - theirs[2]])
-
-    now = apart(time_s)
-    lasts_s = np.where(after > before, after - before, 1.0)
-    rate = (apart(after) - apart(before)) / lasts_s
-    return (*now, *rate)
-
-
-def _place(state: Any) -> list[FloatArray]:
-    parts = state.lat_deg, state.lon_deg, state.alt_m
-    return [np.ascontiguousarray(part, dtype=np.float64) for part in parts]

@@ -27,7 +27,7 @@ class ClutterAlarms(Effect):
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
     ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
     be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
-    where the ownship believes to look; behind a moving-target filter none is reported.
+    where the radar truly looks; behind a moving-target filter none is reported.
     """
 
     lockstep = True
@@ -153,12 +153,13 @@ class GroundReports:
         self, targets: RelativeTargets, row: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
         """Return the cells that the ground crosses the threshold in, and their CNR."""
-        believed = targets.believed
-        if believed is None:
+        if targets.own_attitude is None:
             raise ValueError("clutter's false alarms need to know how the ownship is turned")
         own_alt_m = float(targets.own_alt_m[row])
         height_m = own_alt_m - self._terrain.height_m
-        turned = [float(believed[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")]
+        turned = [
+            float(targets.own_attitude[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")
+        ]
         elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
         parts = [
             (depth + beam * self._cells.range, *self._clutter(height_m, own_alt_m, depth, away))

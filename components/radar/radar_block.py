@@ -75,6 +75,8 @@ class Radar(Sensor):
     def request(self, port: str) -> Any:
         """Ask for the targets in our reach; a sweeping beam decides for itself when that is."""
         reach = super().request(port)
+        if not self.p.enabled:
+            return reach
         lasts_s = LASTS_S if self._rates or self.built("Doppler") else 0.0
         if self._sweep is None:
             return replace(reach, lasts_s=lasts_s)

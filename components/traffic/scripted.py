@@ -13,7 +13,9 @@ from components.geometry.enu import enu_to_geodetic
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.flight_protocols import Trajectory
+from components.traffic.flown_together import Flown
 from components.traffic.legs import ScriptedTrajectory
+from components.traffic.replica_flights import flown
 from components.traffic.sample_times import (
     RegularTimes,
     SampleTimes,
@@ -187,6 +189,25 @@ class ScriptedTraffic(TrafficSource):
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
 
+    def flown_of(self, parameters: Sequence[Any]) -> Flown | None:
+        """Return the flights of replicas with these parameters, where all only fly straight on."""
+        if self.wind is not None:
+            return None
+        own = [p.ownship for p in parameters]
+        crafts = [craft for p in parameters for craft in p.intruders]
+        width = len(self.roster)
+        if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
+            return None
+        for first in range(0, len(crafts), max(1, width)):
+            mine = crafts[first : first + width]
+            if Roster.of([(craft.name, craft) for craft in mine]) != self.roster:
+                return None
+        places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
+        references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
+        ownships = flights_of(_starts(own, places, None))
+        targets = flights_of(_starts(crafts, _known(crafts, references), None)) if crafts else []
+        return flown(ScriptedFleet(ownships), ScriptedFleet(targets), ownships, targets)
+
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""
         step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
@@ -243,6 +264,20 @@ def _intruders(
     crafts: Sequence[Intruder], reference: tuple[float, float, float], wind: Wind | None
 ) -> Sequence[ScriptedTrajectory]:
     """Return the flights of all intruders; starts given as offsets are converted together."""
+    known = _known(crafts, np.tile(np.array(reference), (len(crafts), 1)))
+    if crafts and not any(craft.legs for craft in crafts):
+        return flights_of(_starts(crafts, known, wind))
+    return [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
+
+
+def _known(crafts: Sequence[Intruder], references: FloatArray) -> list[tuple[float, float, float]]:
+    """Return where intruders start, each with its offset from a reference (n, 3) of its own.
+
+    Raises
+    ------
+    ValueError
+        If a start is given in part only, or twice.
+    """
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []
     for craft in crafts:
@@ -258,43 +293,45 @@ def _intruders(
                 f"intruder {craft.name!r}: its start must be given as lat_deg, lon_deg and alt_m, "
                 "or as east_m, north_m and up_m from the ownship's start"
             )
-    converted = iter(_geodetic(offsets, reference))
-    known = [next(converted) if start is None else start for start in starts]
-    if crafts and not any(craft.legs for craft in crafts):
-        return flights_of(_starts(crafts, known, wind))
-    return [_intruder(craft, at, reference, wind) for craft, at in zip(crafts, known, strict=True)]
+    relative = np.array([start is None for start in starts], dtype=bool)
+    converted = iter(_geodetic(offsets, references[relative]))
+    return [next(converted) if start is None else start for start in starts]
 
 
 def _starts(
-    crafts: Sequence[Intruder], known: list[tuple[float, float, float]], wind: Wind | None
+    crafts: Sequence[Flight], known: list[tuple[float, float, float]], wind: Wind | None
 ) -> Starts:
     """Return flights without legs as columns."""
     lat_deg, lon_deg, alt_m = np.array(known, dtype=np.float64).T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:
-        values = [getattr(craft, name) for craft in crafts]
+        values = [getattr(craft, name, None) for craft in crafts]
         return np.array([default if v is None else v for v in values], dtype=np.float64)
 
     return Starts(
-        [craft.name for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
-        np.array([over_the_ground_mps(craft, craft.name, wind) for craft in crafts]),
+        [_name(craft) for craft in crafts], lat_deg, lon_deg, alt_m, column("heading_deg"),
+        np.array([over_the_ground_mps(craft, _name(craft), wind) for craft in crafts]),
         column("climb_mps"), column("start_time_s"),
         column("end_time_s", np.inf),
         np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
     )  # fmt: skip
 
 
+def _name(flight: Flight) -> str:
+    return getattr(flight, "name", "ownship")
+
+
 def _geodetic(
-    offsets: list[tuple[float, float, float]], reference: tuple[float, float, float]
+    offsets: list[tuple[float, float, float]], references: FloatArray
 ) -> list[tuple[float, float, float]]:
     east, north, up = np.array(offsets).reshape(-1, 3).T
     lat, lon, alt = enu_to_geodetic(
         east,
         north,
         up,
-        reference_lat_deg=reference[0],
-        reference_lon_deg=reference[1],
-        reference_alt_m=reference[2],
+        reference_lat_deg=references[:, 0],
+        reference_lon_deg=references[:, 1],
+        reference_alt_m=references[:, 2],
     )
     return list(zip(lat.tolist(), lon.tolist(), alt.tolist(), strict=True))
 

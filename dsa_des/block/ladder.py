@@ -67,6 +67,9 @@ class Rung:
     shared : mapping
         Parameters that are set here and in the reference this rung is compared with, for a rung
         that answers the same question only in another setting.
+    sections : mapping of mappings
+        Keys of the scene's tables that are set, by table: what a model is told by the scene and
+        not by its block.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Rung:
         default_factory=dict
     )
     shared: Mapping[str, Any] = field(default_factory=dict)
+    sections: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def changes(self, block: Mapping[str, Any]) -> dict[str, Any]:
         """Return the parameters to set in a scene's block.

@@ -166,6 +166,9 @@ class Message:
     #: whose columns do not writes it, and `tables`, itself.
     recorded: ClassVar[Mapping[str, Mapping[str, str]]] = _DerivedRecorded()  # type: ignore[assignment]
 
+    #: Tables that `tables` may hold besides; other types declare them (`Component.also_records`).
+    may_hold: ClassVar[frozenset[str]] = frozenset()
+
     #: Unit, frame and meaning of recorded columns, table → column → texts: metadata of the tables.
     described: ClassVar[Mapping[str, Mapping[str, tuple[str, str, str]]]] = {}
 

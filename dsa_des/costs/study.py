@@ -218,7 +218,11 @@ def _targets(values: Values, ladder: Ladder) -> int:
 
 def _same_block(run: RungRun, variants: Variants, block: str) -> bool:
     mine, scenes = run.scene.blocks[block], variants.scene.blocks[block]
-    return mine.cls is scenes.cls and mine.parameters == scenes.parameters
+    return (
+        mine.cls is scenes.cls
+        and mine.parameters == scenes.parameters
+        and run.scene.sections == variants.scene.sections
+    )
 
 
 def _tie(costs: list[RungCost]) -> None:

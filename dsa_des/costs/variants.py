@@ -96,6 +96,10 @@ class Variants:
             if problems:
                 raise Unavailable("; ".join(_brief(problem) for problem in problems))
         _set(scene_file, choice.block, values)
+        for table, keys in choice.rung.sections.items():
+            for key, value in keys.items():
+                scene_file.data.setdefault(table, {})[key] = value
+                scene_file.sources[(table, key)] = COMMAND_LINE
 
 
 def _set(scene_file: SceneFile, block: str, values: Mapping[str, Any]) -> None:

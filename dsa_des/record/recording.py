@@ -98,7 +98,8 @@ class Recorder:
         """
         for listener in self.listeners:
             listener(block, message)
-        if self._wanted is not None and self._pending.keys().isdisjoint(message.recorded):
+        wanted = self._pending.keys()
+        if self._wanted is not None and wanted.isdisjoint({*message.recorded, *message.may_hold}):
             return
         for table, columns in message.tables().items():
             self._declared.check(block, table, columns, type(message).__name__)

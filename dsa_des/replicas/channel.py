@@ -20,7 +20,7 @@ from dsa_des.time.randomness import Stream
 from dsa_des.time.timeline import ReplicaTime, first_scan
 
 # So many messages are kept before the last row of each replica is sought in them.
-_MOST_PASSED = 8
+_MOST_PASSED = 16
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,9 @@ class ReplicaChannel(Channel):
             rows = last_at_or_before(new[0], ticks)
             if bool((new[0][rows] == ticks).all()):
                 # What has come at the very instant is held: what was before need not be looked up.
-                if len(self._passed) > _MOST_PASSED:
+                if self._time.side_by_side and self._of_all(new[0]):
+                    self._passed, self._last = [new], None  # nothing older is held by any replica
+                elif len(self._passed) > _MOST_PASSED:
                     self._remember(ticks)
                 return new[1], rows
         if self._last is not None:
@@ -150,6 +152,13 @@ class ReplicaChannel(Channel):
         rows[arrivals[rows] // self._span != ticks // self._span] = -1
         self._remember(ticks)
         return message, rows
+
+    def _of_all(self, arrivals: IntArray) -> bool:
+        """Whether there is a row of every replica, of rows in order of replica."""
+        if len(arrivals) < self._time.replicas:
+            return False
+        replica = arrivals // self._span
+        return 1 + int(np.count_nonzero(replica[1:] != replica[:-1])) == self._time.replicas
 
     def _remember(self, ticks: IntArray) -> None:
         """Keep of what has passed the last row of each replica that may ask for it."""

@@ -3,7 +3,7 @@
 The scene is validated once; a replica validates again only what it changes.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -26,6 +26,9 @@ from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.steps import no_item, place_of, unquoted
 from dsa_des.time.clock import parse_rational
 
+# Replicas that run together, and scans that they have together.
+_MOST_TOGETHER, _MOST_ROWS = 1024, 4e6
+_A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None
 
@@ -98,9 +101,25 @@ def run_replicas(
             found.append(None)
         except SceneError as error:
             found.append(Failed(str(error)))
-    together: Sequence[Recorded | Failed] | None = _together(scenes, wanted)
-    ran = iter(together or [_run(one, wanted) for one in scenes])
-    return [next(ran) if one is None else one for one in found]
+    ran: list[Recorded | Failed] = []
+    for part in _at_once(scenes):
+        together: Sequence[Recorded | Failed] | None = _together(part, wanted)
+        ran += together or [_run(one, wanted) for one in part]
+    outcomes = iter(ran)
+    return [next(outcomes) if one is None else one for one in found]
+
+
+def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
+    """Part replicas into as many as may run together: what they record is held in memory."""
+    if not scenes:
+        return
+    first = scenes[0]
+    rates = [block.cls.clock_of(block.parameters) for block in first.blocks.values()]
+    per_s = float(sum(spec.rate_hz for spec in rates if spec is not None))
+    rows = max(1.0, per_s * float(first.duration_s or _A_LONG_RUN_S))
+    most = max(1, min(_MOST_TOGETHER, int(_MOST_ROWS / rows)))
+    for start in range(0, len(scenes), most):
+        yield scenes[start : start + most]
 
 
 def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:

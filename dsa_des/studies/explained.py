@@ -142,11 +142,15 @@ def _rung(scene: Scene, name: str, ladder: Ladder) -> str:
             changes = rung.changes(table)
         except Unavailable:
             continue
-        same_type = rung.type_name in ("", block.type_name)
-        if same_type and all(table.get(key) == value for key, value in changes.items()):
+        same = rung.type_name in ("", block.type_name) and all(
+            getattr(scene.sections.get(section), key, None) == value
+            for section, keys in rung.sections.items()
+            for key, value in keys.items()
+        )
+        if same and all(table.get(key) == value for key, value in changes.items()):
             reference = " (the reference)" if rung.name == ladder.reference else ""
             best = f"{ladder.name}: {rung.name}, {rung.what}{reference}"
-            if changes or rung.type_name:
+            if changes or rung.type_name or rung.sections:
                 return best
     return best
 

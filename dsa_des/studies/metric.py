@@ -280,28 +280,43 @@ def _metric(name: str, found: Any) -> type[Metric]:
 
 
 def recorded_by(scene: Scene, table: str) -> list[str]:
-    """Return the blocks of a scene whose outputs record rows of a table, sorted by name."""
-    return [
-        name
-        for name, cls in sorted(scene.classes.items())
-        if any(table in output.message.recorded for output in cls.outputs.values())
-    ]
+    """Return the blocks of a scene that can record rows of a table, sorted by name."""
+    return [name for name, cls in sorted(scene.classes.items()) if table in _tables_of(cls)]
+
+
+def _tables_of(cls: type[Component]) -> set[str]:
+    """Return the tables that a block's outputs record, and those that it may record besides."""
+    messages = [*(output.message for output in cls.outputs.values()), *cls.also_records]
+    return {table for message in messages for table in message.recorded}
 
 
 def check_tables(metric: type[Metric], scene: Scene) -> None:
     """Raise ValueError unless some block of the scene records each table the metric reads."""
     for table in metric.tables:
         if not recorded_by(scene, table):
-            known = {
-                name
-                for cls in scene.classes.values()
-                for output in cls.outputs.values()
-                for name in output.message.recorded
-            }
+            known = set().union(*(_tables_of(cls) for cls in scene.classes.values()))
             raise ValueError(
                 f"needs a block whose output records {table!r}; this scene's blocks record "
                 f"{', '.join(sorted(known)) or 'nothing'}"
             )
+
+
+def check_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
+    """Raise ValueError unless blocks that are set up record each table the metric reads."""
+    recorded = {
+        table
+        for block in blocks.values()
+        for message in block.records()
+        for table in message.recorded
+    }
+    for table in sorted(set(metric.tables) - recorded):
+        asked = [
+            f"; [{name}] {table} = true asks for it"
+            for name, section in metric.scene.sections.items()
+            if table in type(section).model_fields
+        ]
+        raise ValueError(f"needs the table {table!r}, which this scene does not record"
+                         + "".join(asked))  # fmt: skip
 
 
 def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:

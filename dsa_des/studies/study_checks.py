@@ -11,7 +11,15 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile
 from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.metric import CLASS, NUMBER, SHARE, TRIALS, Metric, Result
+from dsa_des.studies.metric import (
+    CLASS,
+    NUMBER,
+    SHARE,
+    TRIALS,
+    Metric,
+    Result,
+    check_recorded,
+)
 from dsa_des.studies.series_figure import of_series
 from dsa_des.studies.study import Study
 
@@ -98,7 +106,9 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
         for spec in study.metrics:
             try:
                 if wrong is None or spec.place in wrong:
-                    spec.build(scene).check(blocks)
+                    metric = spec.build(scene)
+                    check_recorded(metric, blocks)
+                    metric.check(blocks)
             except ValueError as error:
                 refused[spec.place] = str(error)
         wrong = refused

@@ -160,7 +160,7 @@ class _StudyReader:
             requirements=read_requirements(
                 self.data.get("requirements", []), axes, self.column, self.add
             ),
-            runs_per_chunk=self.whole("runs_per_chunk", max(1, min(128, -(-runs // 32))), low=1),
+            runs_per_chunk=self.whole("runs_per_chunk", max(1, min(512, -(-runs // 32))), low=1),
             base=base,
             tables=resolved(self.data, swaps),
         )

@@ -331,3 +331,19 @@ def test_the_engine_finds_the_interface_by_its_registered_name():
     assert issubclass(HostDriven, object)
     with pytest.raises(AttributeError, match="Simulater"):
         dsa_des.embed.Simulater  # noqa: B018
+
+
+def test_sensors_that_ask_for_flights_are_refused_when_the_host_sets_up(configs):
+    """One report names each key; nothing is left to fail at the first call."""
+    sets = ["blocks.radar.beam_sweep=true", "blocks.radar.measures_range_rate=true",
+            "blocks.radar.moving_target_filter=single_canceller",
+            "blocks.radar.prf_hz=9000"]  # fmt: skip
+    with pytest.raises(SceneError) as caught:
+        Simulator(configs / "first_light.toml", sets=sets)
+    said = [str(problem) for problem in caught.value.problems]
+    assert len(said) == 3
+    for key, off in (("beam_sweep", "false"), ("measures_range_rate", "false"),
+                     ("moving_target_filter", "'none'")):  # fmt: skip
+        (line,) = (line for line in said if f"blocks.radar.{key}" in line)
+        assert line.endswith(f"set it to {off}")
+    Simulator(configs / "first_light.toml", sets=[*sets, "blocks.radar.enabled=false"])

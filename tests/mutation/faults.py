@@ -3,6 +3,7 @@
 import faults_of_alerting
 import faults_of_clocks
 import faults_of_columns
+import faults_of_consoles
 import faults_of_effects
 import faults_of_encounters
 import faults_of_frames
@@ -16,7 +17,7 @@ from fault import Fault
 _GROUPS = (
     faults_of_wiring, faults_of_frames, faults_of_units, faults_of_clocks, faults_of_effects,
     faults_of_metrics, faults_of_studies, faults_of_columns, faults_of_measurements,
-    faults_of_encounters, faults_of_alerting,
+    faults_of_encounters, faults_of_alerting, faults_of_consoles,
 )  # fmt: skip
 
 FAULTS: list[Fault] = [fault for group in _GROUPS for fault in group.FAULTS]

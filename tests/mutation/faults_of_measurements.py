@@ -271,8 +271,9 @@ FAULTS = [
         ("arch-of-flat", " * np.clip(level, 0.0, 1.0) / (8.0", " / (8.0"),
     ),
     *in_file(
-        _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py::"
-        "test_each_cell_of_a_radar_mounted_askew_reports_its_own_ground",
+        _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
+        ("ground-by-the-believed-attitude", "float(targets.own_attitude[",
+         "float((targets.believed or {})["),
         ("ground-alarm-beam-axis", "(number + self._draws.uniform(key, scan, draw)) * size",
          "(number + 0.5) * size"),
     ),

@@ -375,7 +375,8 @@ FAULTS = [
         _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
         ("ground-and-noise-twice", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
          "extra = pfa * 1.2"),
-        ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")]', '("yaw", "pitch", "yaw")]'),
+        ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")\n        ]',
+         '("yaw", "pitch", "yaw")\n        ]'),
         ("ground-in-the-neighbour-s-range", "depth + beam * self._cells.range", "beam + 0 * depth"),
     ),
     *in_file(
@@ -426,7 +427,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/avoidance/turn_away.py", "wiring/test_turning_away.py",
         ("rate-is-the-turn", "math.radians(self.p.rate_deg_s)", "math.radians(self.p.turn_deg)"),
-        ("never-pauses", "self._free_from = tick + self._pause_ticks", "self._free_from = tick"),
+        ("never-pauses", "self._free_from[run] = tick + self._pause_ticks",
+         "self._free_from[run] = tick"),
     ),
     *in_file(
         _GROUP, "components/traffic/scripted.py",

@@ -92,7 +92,7 @@ def test_a_metric_needs_its_port(small: Path) -> None:
     Path("small.toml").write_text(scene[:cut])
     output = refused("study.toml")
     assert "metrics[1] = 'fused_share': needs a block whose output records 'fused'" in output
-    assert "this scene's blocks record detections, scans" in output
+    assert "this scene's blocks record detections, looks, scans, truth" in output
     assert "metrics[3] = 'track_updates'" in output  # all problems at once
 
 

@@ -132,3 +132,12 @@ def test_flights_may_be_those_as_flown(tmp_path):
         for steered in (False, True)
     ]
     assert nuisance == [0, 1]
+
+
+@covers("tau_s", of=KIND)
+def test_well_clear_may_be_lost_by_time(tmp_path):
+    """At 40 m/s: (r² - D²) / (r v) is 6 s at r = 633 m, 26.7 s after the start."""
+    got = found(tmp_path, tau_s=6.0)
+    range_m = 0.5 * (240.0 + math.sqrt(240.0**2 + 4 * 500.0**2))
+    lost_s = (BEHIND_M - range_m) / CLOSING_MPS
+    assert got["first_alert_time_s"] + got["alert_to_loss_s"] == pytest.approx(lost_s, abs=0.05)

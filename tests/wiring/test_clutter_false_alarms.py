@@ -150,6 +150,19 @@ def test_each_cell_of_a_radar_mounted_askew_reports_its_own_ground(mean):
         assert abs(sum(beyond) - wanted) < 2.58 * spread
 
 
+def test_a_wrong_belief_moves_no_ground():
+    """Errors of navigation change what the ownship makes of a report, not what is reported."""
+    found = {}
+    for bias_deg in (0.0, 9.0):
+        done = run(chain(
+            {"r": sensor("radar.threshold", **RADAR, clutter_threshold="noise")}, ownship=STILL,
+            terrain=TERRAIN, duration_s=0.2,
+            navigation={"attitude_bias_deg": [3.0, bias_deg, -bias_deg]},
+        ))  # fmt: skip
+        found[bias_deg] = done["detections"].select(["scan", "azimuth_rad", "range_m", "snr_db"])
+    assert found[0.0].num_rows > 20 and found[0.0].equals(found[9.0])
+
+
 def test_windows_change_nothing():
     radar = sensor("radar.threshold", **RADAR, clutter_threshold="noise")
     scene = chain({"r": radar}, terrain=TERRAIN, duration_s=0.5)

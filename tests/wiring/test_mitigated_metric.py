@@ -110,3 +110,10 @@ def test_other_metrics_are_of_the_flights_as_flown(flown):
         for one in (alone, scene())
     )
     assert severe > less + 5.0 > 5.0
+
+
+@covers("tau_s", of=KIND)
+def test_time_counts_in_both():
+    """Passed too far aside to be within 300 m, but so fast at first that tau is short."""
+    assert events(horizontal_m=100.0)["well_clear_lost_mitigated"] == 0
+    assert events(horizontal_m=100.0, tau_s=60.0)["well_clear_lost_mitigated"] == 1

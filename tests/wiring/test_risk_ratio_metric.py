@@ -29,6 +29,11 @@ def test_ratios_are_those_of_the_events_in_their_sizes():
     assert math.isnan(ratios(scene(), vertical_m=45.0)[LOSS])
 
 
+@covers("tau_s", of=KIND)
+def test_time_counts_in_the_ratio():
+    assert [ratios(scene(), horizontal_m=100.0, tau_s=s)[LOSS] for s in (0.0, 60.0)] == [0, 1]
+
+
 @covers("step_s", of=KIND)
 def test_a_coarse_step_steps_over_what_is_short():
     sparse = scene()

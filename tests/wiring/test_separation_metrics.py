@@ -139,3 +139,26 @@ def test_the_closest_approach_is_not_where_the_level_distance_is_smallest():
     assert abs(int(np.argmin(slant)) - int(np.argmin(level))) > 5
     assert found["closest_approach_m"] == pytest.approx(slant.min(), abs=0.05)
     assert found["closest_approach_time_s"] == pytest.approx(times[int(np.argmin(slant))])
+
+
+@covers("tau_s", of=("[metric well_clear]",))
+def test_well_clear_is_lost_by_modified_tau():
+    """Against the definition at dense times by pymap3d; a target that turns away is not lost."""
+    crossing = {
+        "name": "crossing", "east_m": -2500.0, "north_m": -2300.0, "up_m": 60.0,
+        "heading_deg": 60.0, "speed_mps": 55.0, "climb_mps": 3.0,
+    }  # fmt: skip
+    keys = {"metric": "well_clear", "horizontal_m": 400.0, "vertical_m": 110.0, "tau_s": 9.0}
+    found = measured(encounter(crossing, duration_s=30), keys)
+    times = np.arange(0.0, 30.0, 0.02)
+    place = np.array([crooked.ned(crossing, t)[:2] for t in times])
+    v = np.gradient(place, times, axis=0)
+    q, p, a = (place**2).sum(1), (place * v).sum(1), (v**2).sum(1)
+    cross = place[:, 0] * v[:, 1] - place[:, 1] * v[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        soon = (p < 0) & ((400.0**2 - q) / p <= 9.0) & (400.0**2 * a >= cross**2)
+    expected = times[np.argmax((q <= 400.0**2) | soon)]
+    assert 5.0 < expected < 28.0
+    assert found["well_clear_loss_time_s"] == pytest.approx(expected, abs=0.1)
+    later = measured(encounter(crossing, duration_s=30), {**keys, "tau_s": 0.0})
+    assert later["well_clear_loss_time_s"] > expected + 2.0

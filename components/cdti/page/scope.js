@@ -118,7 +118,7 @@ const Scope = (() => {
     const words = `${sensor.name} ${+(sensor.range / 1000).toFixed(1)} km`;
     const side = sensor.kind === "radar" ? low + (high - low) * 0.2 : low + (high - low) * 0.8;
     const angle = side * rad;
-    Symbols.text(c, words, x0 + (r - 12) * Math.sin(angle), y0 - (r - 12) * Math.cos(angle),
+    Symbols.text(c, words, x0 + (r - 34) * Math.sin(angle), y0 - (r - 14) * Math.cos(angle),
       Symbols.colours[sensor.kind], "center");
   }
 
@@ -165,7 +165,9 @@ const Scope = (() => {
     c.lineWidth = number === chosen ? 3 : 1.5;
     c.stroke();
     const [x, y] = at(bearing, range * 0.9);
-    Symbols.text(c, `${scene.name(number)} no range`, x + 5, y, Symbols.colours.sight);
+    const left = x > canvas.clientWidth / 2;
+    Symbols.text(c, `${scene.name(number)} no range`, left ? x - 8 : x + 8, y,
+      Symbols.colours.sight, left ? "right" : "left");
     drawn.lines.push({ number, bearing, level });
   }
 
@@ -211,7 +213,10 @@ const Scope = (() => {
       if (arrow) Symbols.text(c, arrow, x + 17, y + 5, colour, "left", 16);
       const words = level ? `${scene.name(number)} ${Symbols.WORDS[Math.min(level, 3)]}`
         : scene.name(number);
-      Symbols.text(c, words, x + (arrow ? 28 : 20), y + (up >= 0 ? 16 : -8), colour);
+      const low = y + (up >= 0 ? 16 : -8), away = arrow ? 28 : 20;
+      c.font = "12px system-ui, sans-serif";
+      const fits = x + away + c.measureText(words).width < canvas.clientWidth;
+      Symbols.text(c, words, fits ? x + away : x - 20, low, colour, fits ? "left" : "right");
     }
     drawn.symbols.push({ number, x, y, level, shape: Symbols.shape(level, course !== null), tag,
       arrow, off });

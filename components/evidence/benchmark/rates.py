@@ -7,8 +7,8 @@ anew for every rate.
 import argparse
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
@@ -16,7 +16,9 @@ import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
+from components.evidence.benchmark import encounters
 from components.evidence.benchmark.measure import pin
+from components.evidence.benchmark.other_trackers import by_stone_soup, plainly
 from components.evidence.benchmark.track_updates import LOOKS, updates
 from components.examples import folder
 from components.guidance.bands import guidance_of_many
@@ -39,6 +41,9 @@ class Rate:
         How many at once.
     prepare : callable
         From the count to what does them.
+    beside : mapping, optional
+        By name what does the same work otherwise: from whether it has to be quick to how many are
+        done and what does them, or to None where it is not installed.
     """
 
     name: str
@@ -46,6 +51,9 @@ class Rate:
     wanted: float
     count: int
     prepare: Callable[[int], Callable[[], object]]
+    beside: Mapping[str, Callable[[bool], tuple[int, Callable[[], object]] | None]] = field(
+        default_factory=dict
+    )
 
 
 def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[State, State]:
@@ -97,6 +105,7 @@ RATES = (
         5e5,
         4000 * LOOKS,
         _tracks_in_lock_step,
+        {"a plain loop": lambda quick: plainly(4), "Stone Soup": lambda quick: by_stone_soup(4)},
     ),
     Rate(
         "track_updates_alone",
@@ -104,6 +113,35 @@ RATES = (
         2e4,
         100 * LOOKS,
         _tracks_of_one_run,
+        {"a plain loop": lambda quick: plainly(10 if quick else 100)},
+    ),
+    Rate(
+        "replicas",
+        "replicas of 120 s, an intruder, 5, 20 and 2 Hz, other phases, all recorded",
+        1000,
+        1000,
+        encounters.replicas,
+    ),
+    Rate(
+        "flights",
+        "encounters of 120 s with other flights, two intruders, three sensors at 1 Hz, open loop",
+        1000,
+        1000,
+        encounters.flights,
+    ),
+    Rate(
+        "loop",
+        "the same in a closed loop of tracker, alerting and pilot, lookahead 0.5 s",
+        333,
+        1000,
+        encounters.loop,
+    ),
+    Rate(
+        "risk",
+        "encounters of 180 s of a model, radar, tracker and alerting, nominal and mitigated",
+        167,
+        512,
+        encounters.risk,
     ),
 )
 
@@ -111,14 +149,23 @@ RATES = (
 def measured(rate: Rate, quick: bool, repeats: int) -> dict[str, Any]:
     """Return how many are done in a second of CPU, the median of some repetitions."""
     count = rate.count // 10 if quick else rate.count
-    do = rate.prepare(count)
+    beside = {}
+    for name, prepare in rate.beside.items():
+        other = prepare(quick)
+        if other is not None:
+            beside[name] = _per_s(*other, 1 if quick else min(repeats, 2))
+    per_s = _per_s(count, rate.prepare(count), repeats)
+    return {"scene": rate.name, "per_s": per_s, "wanted": rate.wanted, "beside": beside}
+
+
+def _per_s(count: int, do: Callable[[], object], repeats: int) -> float:
     do()
     found = []
     for _ in range(repeats):
         started = time.process_time()
         do()
         found.append(count / (time.process_time() - started))
-    return {"scene": rate.name, "per_s": median(found), "wanted": rate.wanted}
+    return median(found)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -33,20 +33,27 @@ class Listening(ExtendedKalman):
         return super().run(wake)
 
 
-def updates(replicas: int, targets: int) -> Callable[[], object]:
-    """Return what tracks all targets of some replicas anew, gating and association included.
+def heard(replicas: int, targets: int) -> Listening:
+    """Return the tracker of a run of some replicas, with all that it was given.
 
     Three sensors see every target at every look.
     """
     scene = dsa_des.load_scene(_scene(targets))
     simulation = lock_step([scene_of(scene, Replica(1 + i, {})) for i in range(replicas)])
     simulation.run()
-    heard: Any = simulation.components["tracker"]
+    block: Any = simulation.components["tracker"]
+    assert isinstance(block, Listening)
+    return block
+
+
+def updates(replicas: int, targets: int) -> Callable[[], object]:
+    """Return what tracks all targets of some replicas anew, gating and association included."""
+    known = heard(replicas, targets)
 
     def track() -> None:
-        block = ExtendedKalman(heard.name, heard.p, heard.context)
+        block = ExtendedKalman(known.name, known.p, known.context)
         block.setup()
-        for wake in heard.kept:
+        for wake in known.kept:
             block.run(wake)
 
     return track

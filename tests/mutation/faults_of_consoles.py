@@ -1,0 +1,71 @@
+"""Faults of the operator's console and display: who is let in, what is decided, what is where."""
+
+from fault import in_file
+
+_GROUP = "consoles"
+_CONSOLE = "wiring/test_console.py"
+_PICTURE = "cdti/test_picture.py"
+_ADMISSION = "cdti/test_admission.py"
+_SESSION = "cdti/test_session.py"
+_MESSAGES = "cdti/test_page_messages.py"
+
+FAULTS = [
+    *in_file(
+        _GROUP, "components/operator/console.py", _CONSOLE,
+        ("response-from-the-start", "ticks / per_s - began,", "ticks / per_s,"),
+        ("alert-begins-anew-at-every-row", "tick if began is None else began.tick", "tick"),
+        ("turn-flown-at-another-rate", "math.radians(self.p.turn_rate_deg_s)",
+         "math.radians(3.0)"),
+        ("climb-flown-at-another-rate", "climb_rate_mps=self.p.vertical_rate_mps",
+         "climb_rate_mps=2.54"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/recorded.py", _CONSOLE,
+        ("recorded-decision-a-scan-late", 'scans[-1], side="right"', 'scans[-1], side="left"'),
+    ),
+    *in_file(
+        _GROUP, "components/operator/decision_table.py", _CONSOLE,
+        ("decisions-in-any-order", "read.time_s < found[-1][0]", "read.time_s < 0.0"),
+        ("wall-time-forgotten", "turn_rad, climb_m, self.wall_time_s)", "turn_rad, climb_m)"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/admission.py", _ADMISSION,
+        ("token-decides-twice", "self._fresh = False\n            self._key",
+         "self._fresh = True\n            self._key"),
+        ("any-key-decides", "if self._key and _same(key, self._key):", "if self._key and key:"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/server.py", _SESSION,
+        ("any-origin", '!= [f"http://{self.authority}"]:', "== []:"),
+        ("any-host", "if hosts != [self.authority]:", "if not hosts:"),
+        ("pictures-without-end", "if self._sent - self._drawn >= _AHEAD:", "if False:"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/crew.py", _SESSION,
+        ("who-watches-decides", "if page.role != OPERATOR:", "if False:"),
+        ("decision-said-again-counts-twice", "if known is not None:", "if known == 1:"),
+        ("run-never-pauses", "return self._pauses and self._operators == 0", "return False"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/page_messages.py", _MESSAGES,
+        ("anything-more-is-taken", 'extra="forbid", strict=True', "strict=True"),
+        ("text-for-a-number", 'extra="forbid", strict=True', 'extra="forbid"'),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/contacts.py", _PICTURE,
+        ("range-held-for-ever", "<= RANGE_HELD_S]", "<= 1e9]"),
+        ("contact-from-an-unbanked-ownship", "body_to_ned(*body, *pose[:, 3:].T)",
+         "body_to_ned(*body, pose[:, 3], 0.0 * pose[:, 3], 0.0 * pose[:, 3])"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/lost_area.py", _PICTURE,
+        ("loss-as-if-the-ownship-stood", "- own_mps[0]\n", "\n"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/camera_picture.py", _PICTURE,
+        ("picture-that-does-not-roll", "_body_to_ned(own_attitude_rad).T",
+         "_body_to_ned(own_attitude_rad * np.array([1.0, 1.0, 0.0])).T"),
+        ("plate-as-deep-as-wide", "areas.horizontal_m2 * PLATE_ASPECT_RATIO",
+         "areas.horizontal_m2 * 1.0"),
+    ),
+]  # fmt: skip
