@@ -117,6 +117,15 @@ def test_which_tracks_cue_and_how_often():
     assert [r["time_s"] for r in told(cues={"every_s": 1.5})] == [0.0, 1.5, 3.0]
 
 
+def test_cues_are_of_when_the_tracks_come():
+    scene = cued(cues={"lasts_s": 1.0})
+    scene["wires"].remove("tracker -> cues")
+    scene["wires"].append({"from": "tracker", "to": "cues", "delay_s": 0.7})
+    found = rows(run(scene), "cues")
+    assert found[0]["time_s"] == pytest.approx(0.7)
+    assert {round(row["time_s"] - row["state_s"], 9) for row in found} == {0.7}
+
+
 def looked(target="rolling", **keys):
     """The last look at a target, with what was decided and measured."""
     return [r for r in rows(run(cued(**keys)), "looks", block="sensor") if r["target"] == target][
@@ -244,3 +253,34 @@ def test_a_loop_is_the_same_whatever_its_windows():
     for other in tables[1:]:
         for name in ("detections", "state_tracks", "cues"):
             assert other[name].combine_chunks().equals(tables[0][name].combine_chunks()), name
+
+
+@pytest.mark.parametrize("late", ["drop", "one_step"])
+def test_replicas_of_a_loop_are_the_same_together_as_alone(late):
+    """Looks of the spotter come late, so that the tracker has to remember those of the other."""
+    import pyarrow.compute as pc
+
+    from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.replicas.lockstep import lock_step
+    from dsa_des.replicas.replicas import Replica, scene_of
+    from dsa_des.running.simulation import Simulation
+
+    grid = {"azimuth_resolution_deg": 0.5, "elevation_resolution_deg": 0.5,
+            "range_resolution_m": 20.0}  # fmt: skip
+    scene = cued("radar.swerling", cued_dwell_factor=3.0, power_w=1e3, **grid,
+                 spotter={"latency_s": 0.7}, tracker={"late": late})  # fmt: skip
+    scene["wires"].append("sensor -> fusion")
+    loaded = dsa_des.load_scene(scene)
+    scenes = [scene_of(loaded, Replica(loaded.seed + i, {})) for i in range(2)]
+
+    def tables(kind, what):
+        sink = MemorySink()
+        kind(what, recorder=Recorder([sink])).run()
+        return {name: table.combine_chunks() for name, table in sink.tables().items()}
+
+    together = tables(lock_step, scenes)
+    for number, one in enumerate(scenes):
+        alone = tables(Simulation, one)
+        for name in ("detections", "state_tracks", "cues"):
+            mine = together[name].filter(pc.equal(together[name]["replica"], number))
+            assert mine.drop_columns(["replica"]).combine_chunks().equals(alone[name]), name
