@@ -124,13 +124,13 @@ const Scope = (() => {
       Symbols.colours[sensor.kind], "center");
   }
 
-  // Directions in which separation would be lost, on the outer ring: the thicker the more urgent.
+  // Directions in which separation would be lost, inside the outer ring: the thicker the more urgent.
   const BANDS = { FAR: ["symbol-caution", 3, []], MID: ["symbol-caution", 6, []],
     NEAR: ["symbol-warning", 9, []], RECOVERY: ["sight", 6, [6, 4]] };
   function band(c, x0, y0, outer, heading, [low, high, region]) {
     const [colour, width, dash] = BANDS[region] || BANDS.FAR;
     c.beginPath();
-    c.arc(x0, y0, outer + 3 + width / 2, (low - heading - 90) * rad, (high - heading - 90) * rad);
+    c.arc(x0, y0, outer - 2 - width / 2, (low - heading - 90) * rad, (high - heading - 90) * rad);
     c.strokeStyle = Symbols.colours[colour];
     c.lineWidth = width;
     c.setLineDash(dash);
