@@ -18,7 +18,7 @@ class GuidanceBands(Message):
     Parameters
     ----------
     offsets : (rows + 1,)
-    kind : (entries,) of int
+    band : (entries,) of int
         Place in `BAND_KINDS`.
     region : (entries,) of int
         Place in `BAND_REGIONS`.
@@ -32,7 +32,7 @@ class GuidanceBands(Message):
     entry_table = "bands"
 
     offsets: IntArray
-    kind: IntArray = per_entry(column="text", name="band", value=lambda m: Text(m.kind, BAND_KINDS))
+    band: IntArray = per_entry(column="text", value=lambda m: Text(m.band, BAND_KINDS))
     region: IntArray = per_entry(column="text", value=lambda m: Text(m.region, BAND_REGIONS))
     low_rad: FloatArray = per_entry(column="float64")
     high_rad: FloatArray = per_entry(column="float64")
