@@ -14,9 +14,10 @@ _SIDES = (-1.0, 1.0)
 class ResolutionMemory:
     """The memory of one kind of resolutions of one ownship.
 
-    An earlier way out is kept as long as what lies between it and the new one is not red, and it is
-    young, or near the new one, or had a larger recovery cylinder. The preferred side changes only
-    when it is no longer young and the other way is clearly shorter.
+    An earlier way out is kept as long as what lies between it and the new one is not red, and there
+    has not been one on its side for long, or it is near the new one, or had a larger recovery
+    cylinder. The preferred side changes only when it is no longer young and the other way is
+    clearly shorter.
 
     Parameters
     ----------
@@ -76,7 +77,9 @@ class ResolutionMemory:
             if keeps and self._keeps(side, new, bands, own_value, now_s, shrinks):
                 continue
             if self._kept[side] != new:
-                self._kept[side], self._since_s[side] = new, now_s
+                if not math.isfinite(self._kept[side]):
+                    self._since_s[side] = now_s
+                self._kept[side] = new
             self._shrinks[side] = shrinks
         low, high = self._kept
         return Resolution(low, high, self._prefers(now_s, own_value, low, high))
@@ -97,6 +100,8 @@ class ResolutionMemory:
         if not self._free_between(side, new, old, far, bands):
             return False
         young = now_s - self._since_s[side] < self._persistence_s
+        if not young and far < 0.0:  # by less than what is one place
+            return False
         return young or self._shrinks[side] < shrinks or abs(far) <= self._near
 
     def _away(self, side: int, edge: float, own_value: float) -> float:

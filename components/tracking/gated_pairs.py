@@ -25,9 +25,12 @@ _MOST_PAIRS = 1 << 20
 class GatedPairs:
     """The pairs of one kind of measurement, by index among all tracks and detections of a step."""
 
+    kind: Kind
     track: IntArray
     detection: IntArray
     said: PairMeasurement
+    #: What else was measured, of tracks without a range: ranges and their variances.
+    ranges: tuple[FloatArray, FloatArray] | None = None
 
 
 def gated_pairs(
@@ -66,27 +69,40 @@ def gated_pairs(
     """
     found: list[GatedPairs] = []
     direction = None
+    blind = bool((~part.ranged).any())
     for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
-        kind, rows = kind_of(code)
-        moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
-        direction = moments[0].expected[:2]
         mine = np.flatnonzero(codes == code)
-        track, entry = _near(
-            rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks
-        )
-        if len(track) == 0:
-            continue
-        cells = detection[entry]
-        said = rules.bank.measure(
-            moments,
-            track,
-            np.stack([scans.measured[row][cells] for row in rows]),
-            np.stack([scans.variance[row][cells] for row in rows]),
-        )
-        inside = said.distance <= gate_threshold(rules.gate_probability, kind.size)
-        found.append(
-            GatedPairs(track[inside], entry[inside], taken_pairs(said, inside.nonzero()[0]))
-        )
+        # What a track without a range expects of one says nothing: there the direction decides.
+        for of_whom in (True, False) if blind and code & 1 else (None,):
+            kind, rows = kind_of(0 if of_whom is False else code)
+            moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
+            direction = moments[0].expected[:2]
+            track, entry = _near(
+                rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks
+            )
+            if of_whom is not None:
+                chosen = part.ranged[track] == of_whom
+                track, entry = track[chosen], entry[chosen]
+            if len(track) == 0:
+                continue
+            cells = detection[entry]
+            said = rules.bank.measure(
+                moments,
+                track,
+                np.stack([scans.measured[row][cells] for row in rows]),
+                np.stack([scans.variance[row][cells] for row in rows]),
+            )
+            inside = (said.distance <= gate_threshold(rules.gate_probability, kind.size)).nonzero()[
+                0
+            ]
+            cells = cells[inside]
+            found.append(
+                GatedPairs(
+                    kind, track[inside], entry[inside], taken_pairs(said, inside),
+                    (scans.measured[2][cells], scans.variance[2][cells])
+                    if of_whom is False else None,
+                )
+            )  # fmt: skip
     # Moments of sigma points are means over the points: not where the state itself is seen.
     return found, direction if rules.bank.sigma is None else None
 
@@ -161,13 +177,19 @@ def taken_pairs(said: PairMeasurement, which: IntArray) -> PairMeasurement:
     )
 
 
-def log_gain(
-    rules: TrackerRules, part: TrackStore, one: GatedPairs, codes: IntArray, sensors: IntArray
-) -> FloatArray:
-    """Return ln(Pd N(z) / λ) of every pair."""
+def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
+    """Return the logarithm of the density of false alarms at every pair's detection."""
     lowest = sensors[one.detection] & -sensors[one.detection]
     sensor = np.log2(lowest.astype(float)).astype(np.int64)
-    density = rules.log_density[codes[one.detection], sensor]
+    code = one.kind.has_range + 2 * one.kind.has_range_rate
+    return np.asarray(rules.log_density[code, sensor])
+
+
+def log_gain(
+    rules: TrackerRules, part: TrackStore, one: GatedPairs, sensors: IntArray
+) -> FloatArray:
+    """Return ln(Pd N(z) / λ) of every pair."""
+    density = log_density(rules, one, sensors)
     mixed = log_mixture(part.weights[:, one.track], one.said.log_likelihoods)
     return np.asarray(np.log(rules.detection_probability) + mixed - density)
 

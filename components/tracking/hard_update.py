@@ -6,19 +6,23 @@ from components.association.assignment import global_nearest, nearest
 from components.association.clusters import alone
 from components.association.gates import gate_threshold
 from components.estimation.batched import log_determinant
+from components.estimation.frame import Place
 from components.tracking.filter_bank import innovation_squared
-from components.tracking.gated_pairs import GatedPairs, log_gain, named, put
+from components.tracking.gated_pairs import GatedPairs, log_density, log_gain, named, put
 from components.tracking.rules import TrackerRules
 from components.tracking.track_store import TrackStore
+from components.tracking.without_range import told_without_range
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+
+_LOG_2_PI = float(np.log(2.0 * np.pi))
 
 
 def updated_by_one(
     rules: TrackerRules,
     part: TrackStore,
     kinds: list[GatedPairs],
-    codes: IntArray,
     sensors: IntArray,
+    place: Place,
 ) -> tuple[TrackStore, BoolArray, FloatArray]:
     """Return tracks, each updated by at most one detection; who was, and their ln(Pd N(z) / λ)."""
     hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
@@ -33,6 +37,11 @@ def updated_by_one(
         taken = nearest(track, entry, distance)
     else:
         volume = np.concatenate([_log_volume(one) for one in kinds])
+        if len(kinds) > 1:  # what is measured differs: compare with false alarms of the kind
+            volume = volume + np.concatenate(
+                [2.0 * log_density(rules, one, sensors) + one.kind.size * _LOG_2_PI
+                 for one in kinds]
+            )  # fmt: skip
         sizes = np.concatenate([np.full(len(one.track), len(one.said.residuals[0]))
                                 for one in kinds])  # fmt: skip
         limits = np.zeros(5)
@@ -53,11 +62,12 @@ def updated_by_one(
         states, covariances, weights = rules.bank.update(
             part.states(), part.covariances(), part.weights, which, one.said, mine
         )
+        told_without_range(part, which, one, mine, place, states, covariances)
         mask = sensors[one.detection[mine]]
-        gain[which] = log_gain(rules, part, one, codes, sensors)[mine]
+        gain[which] = log_gain(rules, part, one, sensors)[mine]
         hit[which] = True
         size = len(one.said.residuals[0])
-        ranged = size > 2
+        ranged = one.kind.has_range or one.ranges is not None
         new = {
             **named(states, covariances),
             "weights": weights,

@@ -61,8 +61,8 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
     assumed_range_m: float | None = Field(
         default=None, gt=0,
-        description="Range that is assumed, to 45 %, of what is seen without one, m; by default "
-        "half of the farthest reach of the sensors.",
+        description="Range that is assumed of what is seen without one, m; its inverse is taken to "
+        "be known to 50 %. By default a quarter of the farthest reach of the sensors.",
     )  # fmt: skip
     use_range_rate: bool = Field(
         default=True,

@@ -9,10 +9,12 @@ import numpy as np
 
 from components.association.jpda import marginals
 from components.estimation import modes
+from components.estimation.frame import Place
 from components.tracking.filter_bank import mixture_by_track
 from components.tracking.gated_pairs import GatedPairs, log_gain, named
 from components.tracking.rules import TrackerRules
 from components.tracking.track_store import TrackStore
+from components.tracking.without_range import told_without_range
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # Weights are kept below this power of e: products of some of them still are numbers.
@@ -23,8 +25,8 @@ def updated_by_all(
     rules: TrackerRules,
     part: TrackStore,
     kinds: list[GatedPairs],
-    codes: IntArray,
     sensors: IntArray,
+    place: Place,
 ) -> tuple[TrackStore, BoolArray, FloatArray]:
     """Return tracks updated by all detections in their gates; who counts as hit, and their gains.
 
@@ -35,7 +37,7 @@ def updated_by_all(
         return part, np.zeros(count, dtype=bool), np.zeros(count)
     track = np.concatenate([one.track for one in kinds])
     entry = np.concatenate([one.detection for one in kinds])
-    logs = np.concatenate([log_gain(rules, part, one, codes, sensors) for one in kinds])
+    logs = np.concatenate([log_gain(rules, part, one, sensors) for one in kinds])
     missing = np.log1p(-rules.detection_probability * rules.gate_probability)
     weight = np.exp(np.minimum(logs - missing, _LARGEST_LOG))
     share = marginals(track, entry, weight, rules.exact_up_to)
@@ -52,6 +54,7 @@ def updated_by_all(
         x, p, weights = rules.bank.update(
             part.states(), part.covariances(), part.weights, one.track, one.said, which
         )
+        told_without_range(part, one.track, one, which, place, x, p)
         parts.append((x, p, weights))
     modes_of = np.concatenate([weights for _, _, weights in parts], axis=1)
     every = np.concatenate([np.arange(count), track])
@@ -76,7 +79,7 @@ def updated_by_all(
     mask = np.where(hit, likeliest, 0)
     ranged = np.zeros(count, dtype=bool)
     for one in kinds:
-        if len(one.said.residuals[0]) > 2:
+        if one.kind.has_range or one.ranges is not None:
             ranged[one.track] = True
     changed = part.with_columns(
         weights=weights,

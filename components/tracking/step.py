@@ -113,7 +113,7 @@ def looked_at(
     looked = _expected_looks(rules, part, of, scans, looks, place, direction)
     sensors = scans.contributors[detection]
     update = updated_by_all if rules.association == "jpda" else updated_by_one
-    changed, hit, gain = update(rules, part, kinds, codes_here, sensors)
+    changed, hit, gain = update(rules, part, kinds, sensors, place)
     missed = looked.any(axis=0) & ~hit
     by = np.where(hit, changed.updated_by, 0) >> np.arange(len(rules.fields))[:, np.newaxis] & 1
     vain = np.where(by == 1, 0, part.vain + (looked & (by == 0)))

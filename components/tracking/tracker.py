@@ -96,7 +96,7 @@ class Tracker(Component):
 
     def goes_side_by_side(self) -> bool:
         """Say no where looks are worked on again: one replica's are remembered."""
-        return super().goes_side_by_side() and self.p.late != "rerun"
+        return super().goes_side_by_side() and self.p.late == "drop"
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -140,7 +140,7 @@ class Tracker(Component):
             (f.range_max_m for f in fields if f is not None and f.range_max_m < math.inf),
             default=_FARTHEST_M,
         )
-        assumed = self.p.assumed_range_m or 0.5 * farthest
+        assumed = self.p.assumed_range_m or 0.25 * farthest
         existence = self.p.start_existence
         return TrackerRules(
             bank=self.bank(),
@@ -153,7 +153,7 @@ class Tracker(Component):
             start_speed_m_s=self.p.start_speed_m_s,
             start_acceleration_m_s2=getattr(self.p, "start_acceleration_m_s2", 3.0),
             start_turn_rad_s=math.radians(getattr(self.p, "start_turn_deg_s", 3.0)),
-            start_range_m=(assumed, 0.45 * assumed),
+            start_range_m=(assumed, 0.5 * assumed),
             delete_above_m=self.p.delete_above_m,
             delete_after_ticks=int(self.p.delete_after_s * self.context.ticks_per_s),
             log_density=log_densities(fields, self.p.false_alarms_per_scan),

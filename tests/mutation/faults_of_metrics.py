@@ -56,14 +56,14 @@ FAULTS = [
         _GROUP, "components/metrics/severity.py", ("wiring/test_severity_metric.py",),
         ("altimeters-swapped", "(self.p.mode_c_own, self.p.mode_c_target)",
          "(self.p.mode_c_own, self.p.mode_c_own)"),
-        ("rate-over-half-the-time", "(apart(after) - apart(before)) / lasts_s",
-         "2.0 * (apart(after) - apart(before)) / lasts_s"),
     ),
     *in_file(
-        _GROUP, "components/metrics/relative_states.py", (_SEPARATION,),
+        _GROUP, "components/metrics/relative_states.py",
+        (_SEPARATION, "wiring/test_severity_metric.py"),
+        ("rate-over-half-the-time", "(apart(after) - apart(before)) / lasts_s",
+         "2.0 * (apart(after) - apart(before)) / lasts_s"),
         ("begin-of-the-segment", "float(begin[first] + span.begin_s[first])",
          "float(span.begin_s[first])"),
-        ("segments-end-with-the-piece", "0.0, end - begin)", "0.0, np.inf)"),
     ),
     *in_file(
         _GROUP, "components/metrics/steered.py", ("wiring/test_mitigated_metric.py",),

@@ -1,0 +1,225 @@
+"""Corrections of tracks without a range, in modified polar coordinates.
+
+Directions say nothing of the range; a filter whose state is Cartesian believes that they do, as its
+covariance, long as it is along the line of sight, keeps the direction of before while the state
+turns. In angles, the inverse of the range, and velocity by range, all is nearly linear: the
+direction, and how it changes with the target's motion and with the sensor's own.
+
+A filter in these coordinates whose motion is Cartesian is one in Cartesian coordinates whose
+corrections go by way of these: the state is moved in them, and the covariance goes into them where
+the state was and comes back where it is.
+
+Source: Aidala, Hammel, *Utilization of modified polar coordinates for bearings-only tracking*, IEEE
+Trans. AC 28 (1983); here in three dimensions, with the target's own velocity in place of the
+relative one.
+"""
+
+import numpy as np
+
+from components.estimation.batched import (
+    product,
+    product_transposed,
+    squared_length,
+    symmetric,
+    times,
+)
+from dsa_des.arrays.types import FloatArray
+
+# Tracks without a range are kept between these.
+_NEAREST_M, _FARTHEST_M = 1.0, 1e7
+# A line of sight steeper than this (sine of its distance from the vertical) is turned about north.
+_UPRIGHT = 0.1
+
+
+def moved_in_polar(
+    before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return a correction that was found in Cartesian coordinates as one in modified polar ones.
+
+    Parameters
+    ----------
+    before, after : (d, n)
+        State before and after the correction; position and velocity first.
+    covariance : (d, d, n)
+        After it.
+    sensor_m : (3, n)
+        Position of the sensor in the frame.
+
+    Returns
+    -------
+    state, covariance : arrays of the same shapes
+    """
+    axes, distance, by_range, to_polar = _polar(before, sensor_m)
+    change = times(to_polar, after[:6] - before[:6])
+    return _moved(axes, distance, by_range, to_polar, change, after, covariance, sensor_m)
+
+
+def ranged_in_polar(
+    state: FloatArray,
+    covariance: FloatArray,
+    range_m: FloatArray,
+    variance_m2: FloatArray,
+    sensor_m: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return tracks after the first range that is measured of them, by its inverse.
+
+    Parameters
+    ----------
+    state : (d, n)
+    covariance : (d, d, n)
+    range_m, variance_m2 : (n,)
+    sensor_m : (3, n)
+
+    Returns
+    -------
+    state, covariance : arrays of the same shapes
+    """
+    measured = np.maximum(range_m, np.maximum(np.sqrt(variance_m2), _NEAREST_M))
+    axes, distance, by_range, to_polar = _polar(state, sensor_m)
+    whole = np.zeros_like(covariance)  # derivative of the polar state by the Cartesian one
+    whole[:6, :6] = to_polar
+    for i in range(6, len(state)):
+        whole[i, i] = 1.0
+    spread = symmetric(product_transposed(product(whole, covariance), whole))
+    error = variance_m2 / (measured * measured) / (measured * measured)
+    gain = spread[:, 2] / (spread[2, 2] + error)
+    left = -np.concatenate(
+        [np.zeros((len(state), 2, len(distance))), gain[:, np.newaxis]], axis=1
+    )  # (I - K H), by its first three columns
+    for i in range(3):
+        left[i, i] += 1.0
+    shrunk = product(left, spread[:3])
+    shrunk[3:] += spread[3:]
+    joseph = product(left, shrunk.swapaxes(0, 1)[:3])
+    joseph[3:] += shrunk.swapaxes(0, 1)[3:]
+    joseph += gain[:, np.newaxis] * gain[np.newaxis] * error
+    change = gain * (1.0 / measured - 1.0 / distance)
+    moved = state.copy()
+    moved[6:] += change[6:]
+    identity = np.zeros_like(to_polar)
+    for i in range(6):
+        identity[i, i] = 1.0
+    return _moved(axes, distance, by_range, identity, change[:6], moved, joseph, sensor_m)
+
+
+def _polar(
+    state: FloatArray, sensor_m: FloatArray
+) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
+    """Return axes about the line of sight, range, velocity by range, and the derivative."""
+    away, velocity = state[:3] - sensor_m, state[3:6]
+    distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
+    axes = _axes(away / distance)
+    by_range = np.stack([_dot(axis, velocity) for axis in axes]) / distance
+    return axes, distance, by_range, _to_polar(axes, distance, velocity)
+
+
+def _moved(
+    axes: list[FloatArray],
+    distance: FloatArray,
+    by_range: FloatArray,
+    to_polar: FloatArray,
+    change: FloatArray,
+    state: FloatArray,
+    covariance: FloatArray,
+    sensor_m: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what a change of polar coordinates makes of state and covariance."""
+    inverse = np.clip(1.0 / distance + change[2], 1.0 / _FARTHEST_M, 1.0 / _NEAREST_M)
+    by_range = by_range + change[3:]
+    turned = _turned(axes, change[0], change[1])
+    moved = state.copy()
+    moved[:3] = sensor_m + turned[0] / inverse
+    moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
+    step = product(_from_polar(turned, change[1], inverse, by_range), to_polar)
+    whole = covariance.copy()
+    whole[:6, :6] = product_transposed(product(step, covariance[:6, :6]), step)
+    if len(state) > 6:
+        whole[:6, 6:] = product(step, covariance[:6, 6:])
+        whole[6:, :6] = whole[:6, 6:].swapaxes(0, 1)
+    return moved, symmetric(whole)
+
+
+def _axes(line: FloatArray) -> list[FloatArray]:
+    """Return the line of sight and two directions across it, each (3, n)."""
+    upright = np.hypot(line[0], line[1]) < _UPRIGHT
+    one = np.where(upright, np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]]))
+    across = _cross(one, line)
+    across = across / np.sqrt(squared_length(across))
+    return [line, across, _cross(line, across)]
+
+
+def _to_polar(axes: list[FloatArray], distance: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Return the derivative of polar coordinates by position and velocity, where both angles are 0.
+
+    They are two angles, the inverse of the range, and the velocity along the line of sight and
+    across it, divided by the range.
+    """
+    line, across, third = axes
+    found = np.zeros((6, 6, len(distance)))
+    inverse = 1.0 / distance
+    found[0, :3], found[1, :3] = across * inverse, third * inverse
+    found[2, :3] = -line * (inverse * inverse)
+    along, side, up = (_dot(axis, velocity) for axis in axes)
+    found[3, :3] = along * found[2, :3] + inverse * (side * found[0, :3] + up * found[1, :3])
+    found[4, :3] = side * found[2, :3] - inverse * along * found[0, :3]
+    found[5, :3] = up * found[2, :3] - inverse * along * found[1, :3]
+    for i, axis in enumerate(axes):
+        found[3 + i, 3:] = axis * inverse
+    return found
+
+
+def _turned(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[FloatArray]:
+    """Return the axes turned by two angles: about the third, and then towards it."""
+    line, across, third = axes
+    level = np.cos(one) * line + np.sin(one) * across
+    return [
+        np.cos(other) * level + np.sin(other) * third,
+        np.cos(one) * across - np.sin(one) * line,
+        np.cos(other) * third - np.sin(other) * level,
+    ]
+
+
+def _from_polar(
+    axes: list[FloatArray], other: FloatArray, inverse: FloatArray, by_range: FloatArray
+) -> FloatArray:
+    """Return the derivative of position and velocity by polar coordinates.
+
+    Parameters
+    ----------
+    axes : list of (3, n)
+        Turned by both angles.
+    other : (n,)
+        The second angle.
+    inverse : (n,)
+        Of the range.
+    by_range : (3, n)
+        Velocity along the axes, divided by the range.
+    """
+    line, across, third = axes
+    along, side, up = by_range
+    distance, cos, sin = 1.0 / inverse, np.cos(other), np.sin(other)
+    found = np.zeros((6, 6, len(inverse)))
+    found[:3, 0], found[:3, 1] = distance * cos * across, distance * third
+    found[:3, 2] = -distance * distance * line
+    found[3:, 0] = distance * (
+        (along * cos - up * sin) * across + side * (sin * third - cos * line)
+    )
+    found[3:, 1] = distance * (along * third - up * line)
+    found[3:, 2] = -distance * distance * (along * line + side * across + up * third)
+    for i, axis in enumerate(axes):
+        found[3:, 3 + i] = distance * axis
+    return found
+
+
+def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.stack(
+        [
+            one[1] * other[2] - one[2] * other[1],
+            one[2] * other[0] - one[0] * other[2],
+            one[0] * other[1] - one[1] * other[0],
+        ]
+    )
