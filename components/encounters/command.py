@@ -156,8 +156,8 @@ def generate(**options: Any) -> None:
 def convert(**options: Any) -> None:
     """Turn encounters of public formats into a set, or a set into waypoints.
 
-    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or paired tracks (.txt), one
-    encounter each.
+    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat), one
+    encounter each; files of one aircraft are taken two by two, the ownship's first.
     """
     from components.encounters.convert_command import convert_sets
 
@@ -165,7 +165,7 @@ def convert(**options: Any) -> None:
 
 
 @encounters.command()
-@click.argument("file", metavar="SET.parquet")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @click.option(
     "--most",
     type=click.IntRange(1, 1_000_000),
@@ -177,7 +177,10 @@ def convert(**options: Any) -> None:
 @click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
 @plain_errors
 def show(**options: Any) -> None:
-    """Say what is in a set: weights, and the geometry at the closest approaches."""
+    """Say what is in a set: weights, and the geometry at the closest approaches.
+
+    FILE is a set, or whatever `convert` reads.
+    """
     from components.encounters.show_command import show_set
 
     show_set(**options)

@@ -1,18 +1,12 @@
 """``dsa-des encounters convert``: sets from public formats, and back."""
 
-from pathlib import Path
-
 import numpy as np
 
+from components.encounters.any_format import SET, WAYPOINTS, read_encounters
 from components.encounters.encounter_set import EncounterSet
 from components.encounters.generate_command import check_place
-from components.encounters.public_formats import (
-    read_paired_text,
-    read_waypoints,
-    set_of_tracks,
-    waypoints_of,
-)
-from components.encounters.set_file import EncounterSetError, read_set, set_writer, without
+from components.encounters.public_formats import waypoints_of
+from components.encounters.set_file import EncounterSetError, set_writer
 from components.encounters.table_file import kept_rows, numbers, read_table
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import OutputError, UsageError
@@ -20,8 +14,6 @@ from dsa_des.files.input_files import InputFileError, resolve_home
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
-
-TEXT, WAYPOINTS, SET = ".txt", (".bin", ".dat"), ".parquet"
 
 
 def convert_sets(
@@ -47,9 +39,7 @@ def convert_sets(
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
     check_file(path)
     try:
-        found = _read([resolve_home(text) for text in files], at or (0.0, 0.0), skip_damaged)
-        if at is not None:
-            found = EncounterSet(**{**vars(found), "reference_deg": at})
+        found = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
         if weights is not None:
             found = EncounterSet(**{**vars(found), "weights": _weights(weights, found)})
         if path.suffix.lower() == SET:
@@ -66,41 +56,6 @@ def convert_sets(
     say(f"{path}: {len(found)} encounters")
     if found.skipped:
         say(f"{found.skipped} damaged encounters were skipped")
-
-
-def _read(paths: list[Path], at: tuple[float, float], skip_damaged: bool) -> EncounterSet:
-    kinds = {path.suffix.lower() for path in paths}
-    if kinds == {SET} and len(paths) == 1:
-        return read_set(paths[0], skip_damaged)
-    if len(paths) == 1 and kinds <= set(WAYPOINTS):
-        return _waypoints(paths[0], at, skip_damaged)
-    if kinds != {TEXT}:
-        raise UsageError(
-            f"{', '.join(map(str, paths[:5]))}: must be one set ({SET}), one file of waypoints "
-            f"({' or '.join(WAYPOINTS)}), or paired tracks ({TEXT}), one encounter each"
-        )
-    tracks, kept, wrong = [], [], []
-    for number, path in enumerate(paths):
-        try:
-            tracks.append(read_paired_text(path))
-            kept.append(number)
-        except EncounterSetError as error:
-            wrong.append(str(error))
-    if wrong and (not skip_damaged or not tracks):
-        raise EncounterSetError("\n".join(wrong[:20]))
-    return set_of_tracks(str(paths[0].parent), kept, [1.0] * len(kept), tracks, at, len(wrong))
-
-
-def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> EncounterSet:
-    encounters, damaged = read_waypoints(path)
-    if damaged and (not skip_damaged or len(damaged) == len(encounters)):
-        lines = [f"{path}: encounter {k}: {said}" for k, said in sorted(damaged.items())]
-        raise EncounterSetError("\n".join(lines[:20]))
-    if not encounters:
-        raise EncounterSetError(f"{path}: holds no encounter")
-    every = range(len(encounters))
-    found = set_of_tracks(str(path), every, np.ones(len(encounters)).tolist(), encounters, at)
-    return without(found, sorted(damaged)) if damaged else found
 
 
 def _weights(text: str, found: EncounterSet) -> FloatArray:

@@ -21,6 +21,8 @@ from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
 from components.encounters.set_file import read_set
 from components.traffic.files import FileParameters, RecordedTraffic
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.traffic_file import TrafficFile
 from components.traffic.trajectory import SampledTrajectory
 from dsa_des.block.component import ScenePath
@@ -42,6 +44,11 @@ class OneEncounter(FileParameters):
     )
     lon_deg: float | None = Field(
         default=None, ge=-360, le=360, description="Its longitude; given with `lat_deg`."
+    )
+    ownship: Ownship | None = Field(
+        default=None,
+        description="A start and a flight in the scene, which the ownship flies instead of the "
+        "encounter's own, as in `traffic.scripted`; the intruders stay.",
     )
 
 
@@ -75,6 +82,14 @@ class _EncounterTraffic(RecordedTraffic):
     Parameters = OneEncounter
     found: EncounterSet
     place: int
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        if (own := self.p.ownship) is not None:
+            self.own = ScriptedTrajectory(
+                "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg,
+                **flight_arguments(own, self.wind),
+            )  # fmt: skip
 
     def read(self) -> TrafficFile:
         """Return the flights of the encounter."""

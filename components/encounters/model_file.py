@@ -25,6 +25,8 @@ PARTS = (
     "boundaries", "resample_rates",
 )  # fmt: skip
 _NEXT, _NOW = "(t+1)", "(t)"
+#: An instant behind a variable's name, however it is spaced.
+_INSTANT = re.compile(r"\s*\(\s*t\s*(\+\s*1\s*)?\)$")
 _MOST_BINS = 10_000
 #: So many nodes must agree about the number of cases before one that does not is called wrong.
 _MAJORITY = 4
@@ -135,6 +137,7 @@ class _ModelReader:
         names = [re.sub(r"\s+", " ", cell.strip().strip('"')).strip() for cell in cells]
         if names and not names[-1]:
             names.pop()  # a comma at the end
+        names = [_INSTANT.sub(lambda at: f"(t{'+1' if at[1] else ''})", name) for name in names]
         if not all(names) or not names:
             raise self.fail(f"{part}: a name is empty", number)
         name, count = Counter(names).most_common(1)[0]
@@ -161,9 +164,7 @@ class _ModelReader:
             sources.append(-1 if later else of)
             if later:
                 targets[place] = of
-        for of, label in enumerate(labels):
-            if of not in sources:
-                raise self.fail(f"labels_transition: variable {label!r} at t is missing", number)
+        # One that does not change, and of which nothing depends, may be left out.
         for place, of in targets.items():
             if f"{labels[of]}{_NOW}" not in now:
                 raise self.fail(

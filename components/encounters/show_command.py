@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from components.encounters.any_format import read_encounters
 from components.encounters.encounter_set import EncounterSet
 from components.encounters.pair_sets import geometry_class
-from components.encounters.set_file import EncounterSetError, read_set
+from components.encounters.set_file import EncounterSetError
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, resolve_home
@@ -83,7 +84,7 @@ def _closest(found: EncounterSet, place: int) -> tuple[float, ...]:
     return best[1]
 
 
-def show_set(file: str, most: int, figure: str | None, skip_damaged: bool) -> None:
+def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
     """Print what is in a set, and draw it where that is asked for.
 
     Raises
@@ -94,7 +95,7 @@ def show_set(file: str, most: int, figure: str | None, skip_damaged: bool) -> No
         If the figure cannot be written.
     """
     try:
-        found = read_set(resolve_home(file), skip_damaged)
+        found = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
     path = None if figure is None else named(figure, "--figure")

@@ -195,6 +195,7 @@ class LinkBudgetRadar(Radar):
             *said_of_cues(self),
             *self._said_of_false_alarms(),
             *clutter_as_signal(self.p, terrain_of(self)),
+            *gas_left_out(self),
         ]
 
     def _said_of_false_alarms(self) -> list[str]:

@@ -95,7 +95,7 @@ class Cues(Component):
         row, entry, half_rad = self._wanted(tracks)
         many = np.bincount(row, minlength=len(tracks)).tolist()
         due = []
-        for place, tick in enumerate(tracks.tick.tolist()):
+        for place, tick in enumerate(wake.ticks.tolist()):
             if tick - self._last_tick < self._every_ticks or (self._silent and not many[place]):
                 continue
             due.append(place)
@@ -104,7 +104,7 @@ class Cues(Component):
             return None
         rows = np.array(due, dtype=np.int64)
         told = np.isin(row, rows)
-        return self._message(tracks, rows, row[told], entry[told], half_rad[told])
+        return self._message(wake.ticks, tracks, rows, row[told], entry[told], half_rad[told])
 
     def _wanted(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
         """Return the row and entry of each track that cues, and its cone's half angle."""
@@ -137,6 +137,7 @@ class Cues(Component):
 
     def _message(
         self,
+        ticks: IntArray,
         tracks: StateTracks,
         rows: IntArray,
         row: IntArray,
@@ -145,7 +146,7 @@ class Cues(Component):
     ) -> CueCones:
         names = ("track", "azimuth_rad", "elevation_rad", "has_range", "state_s", *_STATE, *_ORIGIN)
         return CueCones(
-            tick=tracks.tick[rows],
+            tick=ticks[rows],
             offsets=offsets_of(np.searchsorted(rows, row), len(rows)),
             half_angle_rad=half_rad,
             until_s=tracks.state_s[entry] + self.p.lasts_s,

@@ -104,7 +104,7 @@ class Tracker(Component):
 
     def goes_side_by_side(self) -> bool:
         """Say no where looks are worked on again: one replica's are remembered."""
-        return super().goes_side_by_side() and self.p.late != "rerun"
+        return super().goes_side_by_side() and self.p.late == "drop"
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}

@@ -77,7 +77,10 @@ def draw_series(
         axes.set_xlabel(axis_label(along) if along else "")
         axes.set_ylabel(readable(name))
         axes.set_title(figure_text(title, _TITLE), loc="left")
-        beside_or_inside(axes)
+        if len(series) > 4:
+            beside_or_inside(axes)
+        else:  # from 0 on there is room below
+            axes.legend(loc="lower left")
         tight(figure)
 
 

@@ -9,6 +9,7 @@ import faults_of_encounters
 import faults_of_frames
 import faults_of_measurements
 import faults_of_metrics
+import faults_of_scored_tracks
 import faults_of_studies
 import faults_of_units
 import faults_of_wiring
@@ -17,7 +18,7 @@ from fault import Fault
 _GROUPS = (
     faults_of_wiring, faults_of_frames, faults_of_units, faults_of_clocks, faults_of_effects,
     faults_of_metrics, faults_of_studies, faults_of_columns, faults_of_measurements,
-    faults_of_encounters, faults_of_alerting, faults_of_consoles,
+    faults_of_encounters, faults_of_alerting, faults_of_consoles, faults_of_scored_tracks,
 )  # fmt: skip
 
 FAULTS: list[Fault] = [fault for group in _GROUPS for fault in group.FAULTS]

@@ -197,6 +197,50 @@ def sensor(dice: Dice, steered: bool) -> dict[str, Any]:
     return table
 
 
+_STATED = {
+    "errors": "stated", "azimuth_error_deg": 0.3, "elevation_error_deg": 0.4, "range_error_m": 12,
+}  # fmt: skip
+
+
+def cued_radar(dice: Dice) -> dict[str, Any]:
+    """Return a radar that looks harder where it is cued, and a tracker can weigh."""
+    table: dict[str, Any] = {
+        "type": dice.pick("radar.threshold", "radar.swerling"), "scan_rate_hz": dice.pick(1, 3),
+        "range_km": 15, "wavelength_m": 0.00857, "bandwidth_hz": 500.0, **_OASYS, **_STATED,
+        "cued_dwell_factor": dice.pick(1, 4),
+    }  # fmt: skip
+    if table["type"] == "radar.threshold":
+        dice.maybe(table, "cued_threshold_db", 0.5, 3.0)
+        return table
+    dice.maybe(table, "cued_pulses", 0.3, 4)
+    dice.maybe(table, "cued_false_alarm_probability", 0.3, 0.2)
+    if dice.chance(0.3, "beam visits cues first"):
+        table |= {"beam_sweep": True, "cued_beam_first": True}
+    return table
+
+
+def spotter(dice: Dice) -> dict[str, Any]:
+    """Return a sensor that sees all within its range, and a tracker can weigh."""
+    return {"type": "radar.range_boundary", "scan_rate_hz": dice.pick(0.5, 2), "range_km": 15,
+            **_STATED}  # fmt: skip
+
+
+def estimator(dice: Dice) -> dict[str, Any]:
+    """Return a tracker that estimates states."""
+    table: dict[str, Any] = {"type": dice.pick("tracking.ekf", "tracking.ukf", "tracking.imm")}
+    dice.maybe(table, "association", 0.4, "nearest", "jpda")
+    dice.maybe(table, "late", 0.4, "one_step", "rerun")
+    return table
+
+
+def cues(dice: Dice) -> dict[str, Any]:
+    """Return what tells a tracker's cones."""
+    table: dict[str, Any] = {"type": "tracking.cues"}
+    dice.maybe(table, "every_s", 0.5, 0, 1)
+    dice.maybe(table, "tentative", 0.3, False)
+    return table
+
+
 def fusion(dice: Dice) -> dict[str, Any]:
     """Return a fusion."""
     if dice.chance(0.5, "fusion.pick_best"):

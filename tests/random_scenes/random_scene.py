@@ -111,6 +111,9 @@ class _Maker:
         for _ in range(chains):
             self._chain(duration, loop)
         self._steer_the_other()
+        cued = dice.chance(0.12, "cue loop")
+        if cued:
+            self._cue_loop()
         # In a scene with many wires some would be slow or lossy all but surely, and scenes whose
         # wires are good are run in other ways: in windows, in lock step.
         self.trouble = dice.pick("none", "none", "late", "lossy", "lossy")
@@ -120,7 +123,7 @@ class _Maker:
         if self.trouble != "none":
             self._latencies()
         for wire in self.wires:
-            self._faults(wire, loop)
+            self._faults(wire, loop or cued)
         self._tables_of_all_aircraft()
         if any(table["type"] == "geometry.geodesic" for table in self.blocks.values()):
             for table in self.blocks.values():
@@ -252,6 +255,31 @@ class _Maker:
             others = [name for name in avoidances if list(self.blocks).index(name) < before]
             if others and self.dice.chance(0.7, "steered by another ownship"):
                 self._wire(self.dice.choice(others), traffic)
+
+    def _cue_loop(self) -> None:
+        """Add sensors whose own tracks tell them where to look harder, by one tracker or two."""
+        dice = self.dice
+        places = [n for n in self.blocks if _kind(n) in ("transform", "gate")]
+        sensors, trackers = [], []
+        for table in (random_blocks.cued_radar(dice), random_blocks.spotter(dice)):
+            sensors.append(self._add("sensor", table))
+            self._wire(dice.choice(places), sensors[-1])
+        apart = dice.chance(0.4, "fusion.covariance_intersection")
+        for watched in [[sensor] for sensor in sensors] if apart else [sensors]:
+            fusion = self._add("fusion", {"type": "fusion.pass_through"})
+            for sensor in watched:
+                self._wire(sensor, fusion)
+            trackers.append(self._add("estimator", random_blocks.estimator(dice)))
+            self._wire(fusion, trackers[-1])
+        if apart:
+            whole = self._add("estimator", {"type": "fusion.covariance_intersection"})
+            for tracker in trackers:
+                self._wire(tracker, whole)
+            trackers = [whole]
+        cues = self._add("cues", random_blocks.cues(dice))
+        self._wire(trackers[-1], cues)
+        delay = dice.pick(0.05, 0.3, 1, "1/3")
+        self.wires.append({"from": cues, "to": sensors[0], "delay_s": delay, "holds": {}})
 
     def _back(self, avoidance: str, traffic: str) -> dict[str, Any]:
         """Return the wire that closes a loop."""

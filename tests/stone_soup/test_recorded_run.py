@@ -25,9 +25,12 @@ RADAR = {"type": "radar.range_boundary", "scan_rate_hz": 2, "range_km": 20.0, **
 CAMERA = {"type": "optical.range_boundary", "scan_rate_hz": 3, "range_km": 2.5, **FINE}
 
 
+BLIND = {**CAMERA, "scan_rate_hz": 1, "range_km": 0.01}
+
+
 def scene(**sections):
     return chain(
-        {"radar": RADAR, "camera": CAMERA}, duration_s=2,
+        {"radar": RADAR, "camera": CAMERA, "blind": BLIND}, duration_s=2,
         fusion={"type": "fusion.pass_through"}, **sections,
     )  # fmt: skip
 
@@ -83,9 +86,10 @@ def test_looks_come_in_order_with_those_in_vain(recorded):
     looks = [(when, [d.metadata["sensor"] for d in found]) for when, found in recorded.detector]
     assert [when for when, _ in looks] == sorted(when for when, _ in looks)
     # Radar at 0, 0.5, ... and camera at 0, 1/3, ...: ten looks, the radar's first at 0 and 1 s.
-    assert len(looks) == 4 + 6
-    assert looks[0][1] == ["radar"] * 2 and looks[1][1] == ["camera"]
-    assert looks[1][0] == START and looks[2][0] == START + timedelta(microseconds=333_333)
+    # The blind camera's, at 0 and 1 s, are all in vain.
+    assert len(looks) == 4 + 6 + 2
+    assert [names for _, names in looks[:3]] == [["radar"] * 2, [], ["camera"]]
+    assert looks[2][0] == START and looks[3][0] == START + timedelta(microseconds=333_333)
 
 
 def test_truth_and_platform_are_where_they_are(recorded):

@@ -10,8 +10,7 @@ from dsa_des.scene.scene import load_scene
 
 NEARER = [
     "blocks.traffic.intruders.0.north_m=2500", "blocks.traffic.intruders.1.north_m=2000",
-    "blocks.traffic.intruders.1.east_m=1500", "blocks.radar.false_alarms=true",
-    "blocks.radar.cell_false_alarm_probability=1e-6", "blocks.eo.false_alarms_per_frame=0.1",
+    "blocks.traffic.intruders.1.east_m=1500", "blocks.radar.scan_rate_hz=4",
     "blocks.eo.latency_s=0.13",
 ]  # fmt: skip
 

@@ -25,13 +25,14 @@ def told(time_s, tracks, confirmed_s=0.0):
     )  # fmt: skip
 
 
-def tallied(steps, targets=2):
+def tallied(steps, targets=2, velocity=(0.0, 0.0, 0.0), step_s=1.0):
     """Steps of (tracks, targets that are there), a second apart."""
-    tally = TrackTally(LIMIT, 2.0, 1.0)
+    tally = TrackTally(LIMIT, 2.0, step_s)
     for k, (tracks, places) in enumerate(steps):
         true = np.zeros((targets, 6, len(tracks)))
         for target, place in places.items():
             true[target, :3] = np.array(place, dtype=float)[:, np.newaxis]
+            true[target, 3:] = np.array(velocity)[:, np.newaxis]
         tally.add(told(k + 1.0, tracks), true, np.array(sorted(places), dtype=np.int64))
     return tally
 
@@ -48,7 +49,8 @@ def test_scores_of_a_small_run_by_hand():
         ({1: (0.0, 0.0, 5.0), 3: (1000.0, 12.0, 0.0)}, {0: here, 1: there}),
         ({3: (1000.0, 0.0, 0.0), 4: (0.0, 0.0, 0.0)}, {0: here, 1: there}),
     ]
-    got = tallied(steps).results(["a", "b"], {"a": 0.5}, {"a": 0.0, "b": 0.0}, 5.0)
+    tally = tallied(steps, velocity=(1.0, 2.0, 3.0), step_s=0.5)
+    got = tally.results(["a", "b"], {"a": 0.5}, {"a": 0.0, "b": 0.0}, 5.0)
     # Target 0 has a track at four of its five instants, target 1 at two.
     assert got["track_completeness"] == 6 / 10
     # Track 2 is one too many at one instant; track 9 has no target.
@@ -56,16 +58,19 @@ def test_scores_of_a_small_run_by_hand():
     assert got["track_spuriousness"] == 1 / 8
     errors = [3.0, 4.0, 5.0, 12.0, 0.0, 0.0]
     assert got["track_positional_accuracy_m"] == pytest.approx((sum(errors) + 50.0) / 7)
-    assert got["track_velocity_accuracy_m_s"] == 0.0
+    assert got["track_velocity_accuracy_m_s"] == pytest.approx(math.sqrt(14.0))
+    assert got["track_velocity_error_m_s"] == pytest.approx(math.sqrt(14.0))
+    by_axis = [got[f"track_{axis}_error_m_s"] for axis in ("north", "east", "down")]
+    assert by_axis == pytest.approx([1.0, 2.0, 3.0])
     assert got["track_position_error_m"] == pytest.approx(math.sqrt(np.mean(np.square(errors))))
     assert got["track_north_error_m"] == pytest.approx(math.sqrt(9 / 6))
     assert got["track_east_error_m"] == pytest.approx(math.sqrt((16 + 144) / 6))
     assert got["track_down_error_m"] == pytest.approx(math.sqrt(25 / 6))
-    assert got["track_nees_mean"] == pytest.approx(np.mean(np.square(errors)))
+    assert got["track_nees_mean"] == pytest.approx(np.mean(np.square(errors)) + 14.0)
     # Track 1 holds target 0 for three of five instants, track 3 target 1 for two of five.
     assert got["track_longest_share"] == 5 / 10
     assert (got["track_broken"], got["track_swapped"]) == (1.0, 0.0)
-    assert got["track_number_changes_per_s"] == 1 / 6
+    assert got["track_number_changes_per_s"] == 1 / (6 * 0.5)
     assert got["track_false_per_hour"] == pytest.approx(3600 / 5)
     # Confirmed between the first and the second comparison, and the third and fourth.
     assert got["track_confirmation_s"] == pytest.approx(1.0 - 0.5)
@@ -95,11 +100,11 @@ def test_a_track_between_two_targets_is_one_track():
 
 def test_innovations_are_within_their_own_bounds():
     """Of 2 and 3 quantities: 95 % of chi-square lie in 0.0506 to 7.378 and 0.2158 to 9.348."""
-    nis = np.array([0.05, 0.051, 7.37, 7.38, 0.215, 0.216, 9.34, 9.35])
-    freedom = np.array([2, 2, 2, 2, 3, 3, 3, 3])
+    nis = np.array([0.05, 0.051, 7.37, 7.38, 0.215, 0.216, 9.34, 9.35, 0.06, 0.3])
+    freedom = np.array([2, 2, 2, 2, 3, 3, 3, 3, 2, 3])
     got = innovation_results(nis, freedom)
-    assert got["track_nis_inside"] == 0.5
-    assert got["track_nis_per_freedom"] == pytest.approx(nis.sum() / 20)
+    assert got["track_nis_inside"] == 6 / 10
+    assert got["track_nis_per_freedom"] == pytest.approx(nis.sum() / 25)
     none = innovation_results(np.empty(0), np.empty(0, dtype=np.int64))
     assert all(math.isnan(value) for value in none.values())
 

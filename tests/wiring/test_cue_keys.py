@@ -50,6 +50,26 @@ def test_who_lies_in_a_cone_is_cued_from_when_it_has_come():
     assert {row["cued"] for row in rows(run(cued(wire=False)), block="sensor")} == {False}
 
 
+def test_a_false_alarm_in_a_cone_is_cued_as_a_target_would_be():
+    """By where it is reported: within 20 deg of the one who is tracked, as far as that is known."""
+    noise = {"false_alarms": True, "false_alarm_probability": 2e-3, "range_km": 8.0,
+             "azimuth_resolution_deg": 4.0, "elevation_resolution_deg": 4.0,
+             "range_resolution_m": 400.0, "quantised": False, "errors": "stated",
+             "azimuth_error_deg": 0.1, "scan_rate_hz": 2}  # fmt: skip
+    wide = {"least_half_angle_deg": 20.0, "most_half_angle_deg": 90.0, "sigmas": 0.001}
+    found = rows(run(cued(cues=wide, duration_s=3, **noise)), block="sensor")
+    ahead = {r["time_s"]: crooked.direction(r["true_azimuth_rad"], r["true_elevation_rad"])
+             for r in found if r["target"] == "rolling"}  # fmt: skip
+    seen = set()
+    for row in found:
+        line = crooked.direction(row["azimuth_rad"], row["elevation_rad"])
+        off_deg = math.degrees(math.acos(min(1.0, float(line @ ahead[row["time_s"]]))))
+        if row["target"] is None and abs(off_deg - 20.0) > 2.0:
+            assert row["cued"] is (off_deg < 20.0 and row["time_s"] >= DELAY_S)
+            seen.add(row["cued"])
+    assert seen == {True, False}
+
+
 @covers("sigmas", "lasts_s", "acceleration_intensity_m2_s3", "least_half_angle_deg", of=(KIND,))
 def test_a_cone_is_that_of_a_computation_by_hand():
     """Half angle: standard deviations across the line of sight at the end of the cone's time."""
@@ -95,6 +115,15 @@ def test_which_tracks_cue_and_how_often():
     narrow = {"least_half_angle_deg": 0.01, "most_half_angle_deg": limit * 0.999}
     assert told(cues=narrow)[0]["time_s"] > 0.0
     assert [r["time_s"] for r in told(cues={"every_s": 1.5})] == [0.0, 1.5, 3.0]
+
+
+def test_cues_are_of_when_the_tracks_come():
+    scene = cued(cues={"lasts_s": 1.0})
+    scene["wires"].remove("tracker -> cues")
+    scene["wires"].append({"from": "tracker", "to": "cues", "delay_s": 0.7})
+    found = rows(run(scene), "cues")
+    assert found[0]["time_s"] == pytest.approx(0.7)
+    assert {round(row["time_s"] - row["state_s"], 9) for row in found} == {0.7}
 
 
 def looked(target="rolling", **keys):
@@ -224,3 +253,34 @@ def test_a_loop_is_the_same_whatever_its_windows():
     for other in tables[1:]:
         for name in ("detections", "state_tracks", "cues"):
             assert other[name].combine_chunks().equals(tables[0][name].combine_chunks()), name
+
+
+@pytest.mark.parametrize("late", ["drop", "one_step"])
+def test_replicas_of_a_loop_are_the_same_together_as_alone(late):
+    """Looks of the spotter come late, so that the tracker has to remember those of the other."""
+    import pyarrow.compute as pc
+
+    from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.replicas.lockstep import lock_step
+    from dsa_des.replicas.replicas import Replica, scene_of
+    from dsa_des.running.simulation import Simulation
+
+    grid = {"azimuth_resolution_deg": 0.5, "elevation_resolution_deg": 0.5,
+            "range_resolution_m": 20.0}  # fmt: skip
+    scene = cued("radar.swerling", cued_dwell_factor=3.0, power_w=1e3, **grid,
+                 spotter={"latency_s": 0.7}, tracker={"late": late})  # fmt: skip
+    scene["wires"].append("sensor -> fusion")
+    loaded = dsa_des.load_scene(scene)
+    scenes = [scene_of(loaded, Replica(loaded.seed + i, {})) for i in range(2)]
+
+    def tables(kind, what):
+        sink = MemorySink()
+        kind(what, recorder=Recorder([sink])).run()
+        return {name: table.combine_chunks() for name, table in sink.tables().items()}
+
+    together = tables(lock_step, scenes)
+    for number, one in enumerate(scenes):
+        alone = tables(Simulation, one)
+        for name in ("detections", "state_tracks", "cues"):
+            mine = together[name].filter(pc.equal(together[name]["replica"], number))
+            assert mine.drop_columns(["replica"]).combine_chunks().equals(alone[name]), name

@@ -156,3 +156,59 @@ def test_positions_are_held_between_updates(kind, tmp_path):
     for time, row in held.items():
         assert row["true_range_m"] == moving[2.0 * (time // 2)]["true_range_m"]
     assert moving[1.0]["true_range_m"] != moving[0.0]["true_range_m"]
+
+
+FLIGHT = ("alt_m", "heading_deg", "speed_mps", "airspeed_mps", "climb_mps", "yaw_deg", "pitch_deg",
+          "roll_deg", "lat_deg", "lon_deg")  # fmt: skip
+LEG = ("kind", "duration_s", "speed_mps", "climb_mps")
+LEGS = (
+    *(f"straight.{key}" for key in (*LEG, "heading_deg")),
+    *(f"turn.{key}" for key in (*LEG, "rate_deg_s", "radius_m", "angle_deg")),
+    *(f"climb.{key}" for key in (*LEG, "to_alt_m")), "stationary.kind", "stationary.duration_s",
+    "waypoints.kind", "waypoints.speed_mps",
+    *(f"waypoints.points.{key}" for key in ("lat_deg", "lon_deg", "alt_m", "east_m", "north_m",
+                                            "up_m", "speed_mps")),
+)  # fmt: skip
+START = {"lat_deg": -41.3, "lon_deg": 179.9997, "alt_m": 2400.0, "heading_deg": 217.0}
+OWN_FLIGHTS = (
+    {**START, "airspeed_mps": 70.0, "climb_mps": 3.0, "yaw_deg": 222.0, "pitch_deg": 8.0,
+     "roll_deg": -27.0},
+    {**START, "speed_mps": 60.0, "legs": [
+        {"kind": "straight", "duration_s": 2, "heading_deg": 200, "speed_mps": 65, "climb_mps": 2},
+        {"kind": "turn", "rate_deg_s": -4, "angle_deg": 10, "speed_mps": 61, "climb_mps": -1},
+        {"kind": "turn", "radius_m": 900, "duration_s": 2},
+        {"kind": "climb", "climb_mps": 5, "to_alt_m": 2406, "speed_mps": 66},
+        {"kind": "climb", "climb_mps": -2, "duration_s": 1},
+        {"kind": "stationary", "duration_s": 2}]},
+    {**START, "speed_mps": 60.0, "legs": [{"kind": "waypoints", "speed_mps": 80.0, "points": [
+        {"lat_deg": -41.302, "lon_deg": -179.999, "alt_m": 2410.0},
+        {"east_m": 100.0, "north_m": -700.0, "up_m": 60.0, "speed_mps": 90.0}]}]},
+)  # fmt: skip
+
+
+@covers(*(f"ownship.{key}" for key in FLIGHT), *(f"ownship.legs.{key}" for key in LEGS), of=BOTH)
+@pytest.mark.parametrize("own", OWN_FLIGHTS)
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_scripted_ownship_flies_as_in_scripted_traffic(kind, own, tmp_path):
+    """Where it is and where its nose points are those of the same flight without encounters."""
+    set_of = events(tmp_path / "set.parquet") if kind == BOTH[0] else model(tmp_path)
+    traffic = {"type": kind, "file": set_of, "encounter": 4, **AT, "ownship": own}
+    found = []
+    for block in (traffic, {"type": "traffic.scripted", "ownship": own}):
+        scene = chain({"radar": RADAR}, duration_s=10, record={"truth": True},
+                      weather={"wind_mps": 9.0, "wind_from_deg": 100.0})  # fmt: skip
+        scene["blocks"]["traffic"] = block
+        found.append([row for row in rows(run(scene), "truth") if row["target"] is None])
+    mine, plain = found
+    assert len(mine) == len(plain) > 9
+    for one, other in zip(mine, plain, strict=True):
+        assert one == other
+
+
+def test_intruders_stay_where_the_encounter_has_them(tmp_path):
+    file = events(tmp_path / "set.parquet")
+    own = {"lat_deg": 0.0, "lon_deg": 0.0, "alt_m": 2000.0}
+    row = seen({"type": "traffic.encounters", "file": file, "encounter": 9, "ownship": own})[3.0]
+    assert row["target"] == "other"
+    apart = math.hypot(2000 - 3 * 70, 100)  # it heads south, towards the origin, where we stand
+    assert row["true_range_m"] == pytest.approx(apart, abs=1.0)

@@ -8,6 +8,7 @@ from wired import HEARS_ALL, chain
 from components.atmosphere.gas import gas_specific_attenuation
 from dsa_des.library.scenes import load_scene
 from dsa_des.running.simulation import Simulation
+from dsa_des.running.warnings import warnings_of
 
 
 def said(weather, **keys):
@@ -25,6 +26,12 @@ def test_what_clear_air_would_take_is_said(keys, range_km):
     per_km = float(gas_specific_attenuation(frequency_hz, vapour_density_g_m3=12.0))
     assert float(at) == range_km
     assert float(db) == pytest.approx(2 * range_km * per_km, rel=0.06)
+
+
+def test_check_and_run_say_it_too():
+    scene = load_scene(chain({"radar": HEARS_ALL}))
+    (line,) = (line for line in warnings_of(Simulation(scene)) if "gas attenuation" in line)
+    assert line.startswith("blocks.radar: gas attenuation: at 35 GHz clear air")
 
 
 def test_where_it_is_simulated_or_does_not_matter_nothing_is_said():
