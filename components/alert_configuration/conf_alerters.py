@@ -177,7 +177,7 @@ class AlerterKeys:
             return None
 
     def _note_unknown(self) -> None:
-        for key in self._lines.keys() - self._used:
+        for key in sorted(self._lines.keys() - self._used):
             number, name, _ = self._lines[key]
             free = self._expected - self._used
             hint = did_you_mean(key, free) or did_you_mean(key, self._expected)

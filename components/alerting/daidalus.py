@@ -210,7 +210,10 @@ class DaidalusAlerting(Component):
             else self._memory.levels(wake.replica_of(ticks), times, known, due, early)
         )
         row, column = np.nonzero(known)
-        place = np.flatnonzero(known.ravel())
+        if flights.number is not None:
+            # By their numbers: which column a track has depends on when others came.
+            column = column[np.lexsort((flights.number[column], row))]
+        place = row * known.shape[1] + column
         lookahead_s = self._configuration["lookahead_time"]
         found = separation(relative, lookahead_s, np.full(known.size, np.nan))
         times_s = np.where(np.isfinite(times_s), times_s, np.nan)[place]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -79,7 +80,8 @@ class Problems:
 
     def __init__(self, path: str) -> None:
         self.path = path
-        self._found: list[str] = []
+        #: Line (infinite for none) and text.
+        self._found: list[tuple[float, str]] = []
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
@@ -87,15 +89,16 @@ class Problems:
         place = [f"line {line}"] if line is not None else []
         place += [f"column {column}"] if column is not None else []
         if len(self._found) < MOST_PROBLEMS:
-            self._found.append(f"{', '.join(place)}: {problem}" if place else problem)
+            text = f"{', '.join(place)}: {problem}" if place else problem
+            self._found.append((math.inf if line is None else line, text))
         else:
             self._more += 1
 
     def raise_if_any(self) -> None:
-        """Raise one `TrafficFileError` with all problems so far."""
+        """Raise one `TrafficFileError` with all problems so far, in order of their lines."""
         if not self._found:
             return
-        found = list(self._found)
+        found = [text for _, text in sorted(self._found, key=lambda one: one[0])]
         if self._more:
             found[-1] += f" (and {self._more} more problems)"
         raise TrafficFileError(self.path, found)

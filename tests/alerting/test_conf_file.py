@@ -106,6 +106,7 @@ def test_everything_wrong_is_said_at_once_with_its_line(tmp_path):
     assert "2 problems" in str(error.value)
     assert f"line {line_of('hysteresis')}:" in str(error.value)
     assert f"line {line_of('One_d_WCV_DTHR')}:" in str(error.value)
+    assert str(error.value).index("hysteresis_time") < str(error.value).index("One_d_WCV_DTHR")
 
 
 def test_a_file_that_is_not_there(tmp_path):

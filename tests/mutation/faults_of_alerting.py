@@ -11,6 +11,16 @@ _AVOIDANCE = "wiring/test_avoidance_by_bands.py"
 FAULTS = [
     *in_file(
         _GROUP,
+        "components/alerting/daidalus.py",
+        (_ESTIMATES,),
+        (
+            "tracks-by-their-place",
+            "np.lexsort((flights.number[column], row))",
+            "np.lexsort((column, row))",
+        ),
+    ),
+    *in_file(
+        _GROUP,
         "components/alerting/estimated_flights.py",
         (_ESTIMATES,),
         ("tentative-tracks-count", "(CONFIRMED, COASTED)", "(CONFIRMED, COASTED, 0)"),

@@ -8,6 +8,7 @@ import pytest
 from test_alerting_keys import CONF, TARGET, entry_s, truth
 from wired import HEARS_ALL, chain, rows, run
 
+from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.estimated_flights import EstimatedFlights
 from components.alerting.track_slots import TrackSlots
 from components.messages.columns import COVARIANCE
@@ -69,6 +70,24 @@ def test_a_margin_makes_alerts_earlier(tmp_path):
     # Three sigma of a range after some looks, at the rate at which the two close in.
     closing = np.linalg.norm(truth(3.0)[3:5])
     assert 0.2 * SIGMA_M / closing < gained[-1] < 9.0 * SIGMA_M / closing
+
+
+def test_windows_change_no_byte(tmp_path, monkeypatch):
+    """Of targets that come and go: where one is remembered, another was some time before."""
+    one = scene(
+        tmp_path, PLAIN.replace("hysteresis_time = 5", "hysteresis_time = 1"), duration_s=10
+    )
+    others = [
+        {**TARGET, "name": f"other {k}", "east_m": TARGET["east_m"] + 300.0 * k,
+         "start_time_s": begin, "end_time_s": end}
+        for k, (begin, end) in enumerate([(0.0, 2.0), (0.9, 10.0), (5.4, 9.0), (5.7, 10.0)], 1)
+    ]  # fmt: skip
+    one["blocks"]["traffic"]["intruders"] += others
+    at_once = rows(run(one), "alerts")
+    monkeypatch.setattr(DaidalusAlerting, "windowed", False)
+    assert rows(run(one), "alerts") == at_once
+    assert len({row["track"] for row in at_once}) >= 5
+    assert len({row["target"] for row in at_once}) >= 4
 
 
 def test_tracks_and_sights_at_once_are_refused(tmp_path):
