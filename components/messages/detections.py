@@ -14,7 +14,7 @@ from components.messages.columns import DESCRIBED
 from components.messages.constant_columns import not_measured
 from components.messages.every_look import look_columns
 from components.messages.reach import Reach
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Columns, Message, Text, per_entry, per_row, static
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.
@@ -37,6 +37,8 @@ EXTRAS = {
     "ned_azimuth_rad": "float64",
     "ned_elevation_rad": "float64",
 }
+#: An extra too, recorded behind all other columns.
+CUED = {"cued": "bool"}
 #: The ownship's pose as it believes it to be: columns of ``detections``, and fields of
 #: `Detections`.
 POSE = {
@@ -169,8 +171,6 @@ class Detections(Message):
         sweeps. `measured_ticks` gives the instants in any case.
     looks : dict of (rows, targets), or None
         Every look at every target (`components.messages.every_look`), where they are recorded.
-    cue
-        Not given: recorded is ``cued`` of the extras.
     roster : Roster
     """
 
@@ -212,8 +212,8 @@ class Detections(Message):
     own_velocity: dict[str, FloatArray] | None = per_entry(
         columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
     )
-    cue: None = per_entry(
-        columns={"cued": "bool"}, value=lambda m: m.cue_columns(), default=None, kw_only=True
+    cued_of_entries: dict[str, AnyArray] | None = per_entry(
+        columns=CUED, value=lambda m: m.cued_column(), default=None, kw_only=True
     )
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
@@ -230,15 +230,15 @@ class Detections(Message):
         """Return how many targets were skipped, by column."""
         return {f"skipped_{reason}": count for reason, count in self.skipped.items()}
 
-    def cue_columns(self) -> dict[str, BoolArray]:
-        """Return ``cued`` of the extras, a column of its own behind those of earlier versions."""
-        return {name: self.extras[name] for name in ("cued",) if name in self.extras}
-
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
         # A sensor without a rule declares whatever it reports: it knows of no false alarm.
-        told = {name: values for name, values in self.extras.items() if name != "cued"}
-        return {"declared": np.ones(len(self.target), dtype=bool), **told}
+        extras = {name: values for name, values in self.extras.items() if name not in CUED}
+        return {"declared": np.ones(len(self.target), dtype=bool), **extras}
+
+    def cued_column(self) -> dict[str, AnyArray]:
+        """Return the extra that says whether each lay in a cue cone, where the sensor says so."""
+        return {name: self.extras[name] for name in CUED if name in self.extras}
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""
