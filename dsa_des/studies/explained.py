@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.errors import BlockFailure, SceneError
@@ -22,7 +22,6 @@ from dsa_des.replicas.replicas import scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.labels import short
-from dsa_des.studies.record import StrictRecord
 from dsa_des.studies.safe_files import read_regular
 from dsa_des.studies.study_checks import one_per_value
 
@@ -37,7 +36,11 @@ _MOST_CELLS = 12
 _MOST_BYTES = 16 * 2**20
 
 
-class ModelRecord(StrictRecord):
+class _StrictPart(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+class ModelRecord(_StrictPart):
     """A block: its type, what that is, and the rungs of accuracy that it stands on."""
 
     block: str
@@ -47,7 +50,7 @@ class ModelRecord(StrictRecord):
     rungs: list[str]
 
 
-class EffectRecord(StrictRecord):
+class EffectRecord(_StrictPart):
     """An effect that is simulated or left out, and because of what."""
 
     block: str
@@ -58,7 +61,7 @@ class EffectRecord(StrictRecord):
     bound: dict[str, float] = {}
 
 
-class SceneRecord(StrictRecord):
+class SceneRecord(_StrictPart):
     """The scene of a cell; of cells after the first, only what is not so in the first."""
 
     where: str
@@ -68,7 +71,7 @@ class SceneRecord(StrictRecord):
     spared: list[tuple[str, str]]
 
 
-class Explained(StrictRecord):
+class Explained(_StrictPart):
     """What a study's runs are made of."""
 
     versions: dict[str, str]
