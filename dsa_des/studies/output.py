@@ -73,8 +73,9 @@ class Tables:
             axis, value = record.compare
             self.baseline = axis, float(value) if isinstance(value, int) else value
             self.compared = compare_axis(
-                self.rows, *self.baseline, self.results, record.confidence, record.interval
-            )
+                self.rows, *self.baseline, self.results, record.confidence, record.interval,
+                record.compare_weight,
+            )  # fmt: skip
 
     def _earlier(self) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers that the folder's summary holds."""
@@ -221,6 +222,17 @@ class Tables:
             "pairs": [item.difference.paired.count for item in items],
             "only_baseline": [item.difference.only_first for item in items],
             "only_value": [item.difference.only_second for item in items],
+        }
+        ratios = [item.ratio for item in items]
+        columns |= {
+            "ratio": [None if r is None else r.ratio for r in ratios],
+            "ratio_low": [None if r is None else r.interval[0] for r in ratios],
+            "ratio_high": [None if r is None else r.interval[1] for r in ratios],
+            "unresolved": [None if r is None else r.unresolved for r in ratios],
+            "induced": [None if r is None else r.induced for r in ratios],
+            "effective_sample_size": [
+                None if r is None else r.effective_sample_size for r in ratios
+            ],
         }
         return columns
 
