@@ -141,6 +141,10 @@ class Roster:
         """Which models there are, ascending, 5 written as 0."""
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
+    def craft(self, target: IntArray, replica: IntArray) -> IntArray:
+        """Return which of the aircraft some targets of replicas are."""
+        return target
+
     def column(self, path: str) -> FloatArray:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
         columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})
@@ -167,7 +171,7 @@ class Roster:
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:
             tables: list[Any] = []
-            place = np.full(len(self), -1, dtype=np.int64)
+            place = np.full(len(self.aircraft), -1, dtype=np.int64)
             for target, craft in enumerate(self.aircraft):
                 file = attrgetter(path)(craft)
                 if file is None:
@@ -179,3 +183,55 @@ class Roster:
             cache[path] = tuple(tables), place
         found: tuple[tuple[Any, ...], IntArray] = cache[path]
         return found
+
+
+class ReplicaRoster(Roster):
+    """The targets of replicas in lock step, which bear the same names but are other aircraft.
+
+    Columns, and tables' places, are over the aircraft of the first replica, those of the second,
+    and so on; `craft` says which one a target is.
+    """
+
+    def craft(self, target: IntArray, replica: IntArray) -> IntArray:
+        """Return which of the aircraft some targets of replicas are."""
+        return replica * len(self.names) + target
+
+
+def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Roster | None:
+    """Return the roster of all replicas, or None where they cannot have one.
+
+    Parameters
+    ----------
+    first : Roster
+        Of the first replica.
+    aircraft : sequence of (name, Aircraft)
+        Of all targets of the first replica, of the second, and so on.
+
+    Notes
+    -----
+    Radar cross-sections may differ: how far a radar looks, and which physics it has, does not rest
+    on how large they are. Whatever else differs may decide how far a sensor looks.
+    """
+    width = len(first)
+    if width == 0:
+        return None if aircraft else first
+    if len(aircraft) % width:
+        return None
+    same = True
+    for number, (name, craft) in enumerate(aircraft):
+        place = number % width
+        if name != first.names[place]:
+            return None
+        other = first.aircraft[place]
+        if _alike(craft, other):
+            continue
+        same = False
+        if any(
+            getattr(craft, field) != getattr(other, field)
+            for field in Aircraft.model_fields
+            if field != "rcs_dbsm"
+        ):
+            return None
+    if same:
+        return first
+    return ReplicaRoster(first.names, tuple(craft for _, craft in aircraft))

@@ -51,7 +51,7 @@ class LastingMemory:
         for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
             which = place[np.cumsum(begins)[rows] - 1][:, np.newaxis] * self._targets + targets
             part = self._memory.take(which.reshape(-1))
-            shape = len(rows) * self._targets, -1
+            shape = len(rows) * self._targets, due.shape[2]
             stepped = part.step(
                 np.repeat(now_s[rows], self._targets), present[rows].reshape(-1),
                 due[rows].reshape(shape), early[rows].reshape(shape),

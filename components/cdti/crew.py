@@ -8,7 +8,7 @@ from components.cdti.admission import OPERATOR, Admission
 from components.cdti.live_pace import LivePacer
 from components.cdti.page_messages import Chosen, Climbed, Judged, PageMessage, Ready, Turned
 from components.cdti.scope import Scope
-from components.messages.decisions import CLIMB, KINDS, TURN, Decision
+from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
 from components.operator.desk import Desk, Laid
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
@@ -172,7 +172,7 @@ class SessionCrew:
         """Lay a decision on the desk; the page is told when the simulation has it."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
-        decision = Decision(
+        decision = OperatorDecision(
             kind,
             name,
             turn_rad=math.radians(value) if kind == TURN else 0.0,

@@ -18,6 +18,7 @@ from components.cdti.own_flight import OwnFlight
 from components.messages.alerts import AlertLevels, contact_name
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
+from components.messages.guidance_bands import BAND_REGIONS, GuidanceBands
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
@@ -30,6 +31,8 @@ from dsa_des.text.safe_text import printable
 
 #: A contact that was not seen for so long is no longer shown, s.
 FORGOTTEN_S = 10.0
+#: Bands of guidance stand for so long, s: until the alerting has looked again.
+BANDS_LAST_S = 1.5
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 
@@ -63,6 +66,7 @@ class Scope:
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
+        self._bands: tuple[float, GuidanceBands] | None = None
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
@@ -95,6 +99,9 @@ class Scope:
             self._sights.take(block, message, self._per_s)
         elif isinstance(message, AlertLevels):
             self._take_alerts(message)
+        elif isinstance(message, GuidanceBands):
+            last = message.take(slice(len(message) - 1, len(message)))
+            self._bands = int(last.tick[0]) / self._per_s, last
         elif self._believed is not None and isinstance(message, self._believed):
             self._take_contacts(message)
 
@@ -155,7 +162,8 @@ class Scope:
         """
         own = self._own.now
         if own is None:
-            return {"own": None, "contacts": [], "alerts": [], "area": [], "camera": None}
+            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": [],
+                    "camera": None}  # fmt: skip
         alerts, contacts = self._alerts, self._contacts
         shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
@@ -181,8 +189,19 @@ class Scope:
             "contacts": shown,
             "alerts": said,
             "area": area,
+            "bands": self._directions(time_s),
             "camera": self._sights.picture(chosen, self._toward(chosen), time_s, own),
         }
+
+    def _directions(self, time_s: float) -> list[list[Any]]:
+        """Return the bands of direction as [from, to, region], deg clockwise from north."""
+        if self._bands is None or time_s - self._bands[0] > BANDS_LAST_S:
+            return []
+        bands = self._bands[1]
+        there = np.flatnonzero(np.isfinite(bands.low_rad))
+        ends = np.round(np.degrees([bands.low_rad[there], bands.high_rad[there]]), 1)
+        regions = [BAND_REGIONS[region] for region in bands.region[there].tolist()]
+        return [[*pair, region] for pair, region in zip(ends.T.tolist(), regions, strict=True)]
 
     def _toward(self, contact: int) -> tuple[float, float] | None:
         """Return the bearing and elevation of a contact as it was seen last, rad."""

@@ -14,7 +14,7 @@ from components.cdti.live_pace import LivePacer
 from components.cdti.scope import Scope
 from components.operator.desk import Desk
 from components.operator.human import Human
-from components.operator.recorded import Recorded
+from components.operator.recorded import RecordedOperator
 from dsa_des.commands.loading import say_what_was_done
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
@@ -139,7 +139,7 @@ def _replay(scene: Scene, console: str | None, target: Path) -> Scene | None:
     kept = {
         key: value
         for key, value in block.parameters.model_dump(mode="json").items()
-        if key in Recorded.Parameters.model_fields
+        if key in RecordedOperator.Parameters.model_fields
     }
     options = block.options.model_dump(mode="json", exclude_unset=True)
     recorded = {"type": "operator.recorded", **kept, **options, "decisions": str(table)}

@@ -66,7 +66,9 @@ class PickBest(Fusion):
         roster = next(iter(arrivals.values())).message.roster
         width = max(1, len(roster))
         keys = [_keys(new, wake.ticks, width) for new in arrivals.values()]
-        union = _union(keys, width) if len(wake) == 1 else sorted_union(keys)
+        # A sensor reports in an order that tells nothing of the targets.
+        in_order = [np.sort(key) for key in keys] if len(wake) > 1 else []
+        union = _union(keys, width) if len(wake) == 1 else sorted_union(in_order)
         row, target = np.divmod(union, width)
         if self.gate_ticks:
             arrivals = self.with_recent(arrivals, wake)

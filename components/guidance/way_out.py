@@ -47,7 +47,25 @@ def changes_out(
         To the left or down, negative, and to the right or up, positive, rad, m/s or m; infinite
         where nothing there leads out. None where the own value needs no change or is not known yet.
     """
-    found: list[Changes | None] = [None] * len(rows)
+    region, cyclic = configuration["corrective_region"], kind_name == "hdir"
+    return [
+        None if guided is None else _changes(guided, region, cyclic)
+        for guided in bands_around(kind_name, configuration, alerter, alerts, rows)
+    ]
+
+
+def bands_around(
+    kind_name: str,
+    configuration: Configuration,
+    alerter: Alerter,
+    alerts: AlertLevels,
+    rows: Sequence[int],
+) -> list[Guidance | None]:
+    """Return the bands at some instants, each by itself; None where nothing is known yet.
+
+    Parameters are those of `changes_out`.
+    """
+    found: list[Guidance | None] = [None] * len(rows)
     own = np.array([alerts.own_motion[name][rows] for name in _OWN]).reshape(len(_OWN), -1)
     known = np.flatnonzero(np.isfinite(own).all(axis=0))
     first = alerts.offsets[np.asarray(rows, dtype=np.int64)]
@@ -61,7 +79,7 @@ def changes_out(
         ]
         every = guidance_of_many(kind_name, configuration, state, intruders)
         for place, guided in zip(alike.tolist(), every, strict=True):
-            found[place] = _changes(guided, configuration["corrective_region"], kind_name == "hdir")
+            found[place] = guided
     return found
 
 

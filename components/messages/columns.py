@@ -242,6 +242,14 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "vertical_speed_mps": ("m/s", "", "commanded change of vertical speed, positive upward"),
         "vertical_acceleration_mps2": ("m/s²", "", "acceleration of that change"),
     },
+    "bands": {
+        "band": ("", "", "direction or altitude: what it is a stretch of"),
+        "region": ("", "", "FAR, MID or NEAR: whose volumes are met; RECOVERY: what leads out"),
+        "low_rad": ("rad", "", "direction over the ground from north at which it begins"),
+        "high_rad": ("rad", "", "direction, clockwise, at which it ends"),
+        "low_m": ("m", "", "altitude at which it begins"),
+        "high_m": ("m", "", "altitude at which it ends"),
+    },
     "decisions": {
         "decision": (
             "",

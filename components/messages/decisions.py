@@ -13,7 +13,7 @@ KINDS = ("shown", "looked", "verified", "rejected", "turn", "climb")
 SHOWN, LOOKED, VERIFIED, REJECTED, TURN, CLIMB = range(6)
 
 
-class Decision(NamedTuple):
+class OperatorDecision(NamedTuple):
     """One decision of an operator.
 
     Parameters

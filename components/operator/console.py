@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.alerts import AlertLevels, contact_name
-from components.messages.decisions import CLIMB, TURN, Decision, Decisions
+from components.messages.decisions import CLIMB, TURN, Decisions, OperatorDecision
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from dsa_des.block.component import ClockedParameters, Component, PositiveRational
 from dsa_des.block.message import Message
@@ -57,7 +57,7 @@ class Console(Component):
         self._alerts: dict[str, _Alert] = {}
         self._targets: tuple[str, ...] = ()
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, Decision]]:
+    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
         """Return the decisions that come at the scans of a wake, with their ticks, in order."""
         raise NotImplementedError
 
@@ -95,7 +95,9 @@ class Console(Component):
             now[name] = _Alert(int(level[place]), tick if began is None else began.tick)
         return now
 
-    def _messages(self, made: list[tuple[int, Decision, _Alert | None]]) -> dict[str, Message]:
+    def _messages(
+        self, made: list[tuple[int, OperatorDecision, _Alert | None]]
+    ) -> dict[str, Message]:
         per_s = self.context.ticks_per_s
         known = dict.fromkeys([*self._targets, *(d.target for _, d, _ in made if d.target)])
         self._targets = tuple(known)
@@ -120,14 +122,14 @@ class Console(Component):
         manoeuvres = Manoeuvres.of([tick for tick, _ in told], [one for _, one in told])
         return {"decisions": decisions, "manoeuvres": manoeuvres}
 
-    def _told(self, decision: Decision) -> Manoeuvre:
+    def _told(self, decision: OperatorDecision) -> Manoeuvre:
         if decision.kind == TURN:
             rate_rad_s = math.radians(self.p.turn_rate_deg_s)
             return Manoeuvre(turn_rad=decision.turn_rad, rate_rad_s=rate_rad_s)
         return Manoeuvre(climb_m=decision.climb_m, climb_rate_mps=self.p.vertical_rate_mps)
 
 
-def _is_flown(decision: Decision) -> bool:
+def _is_flown(decision: OperatorDecision) -> bool:
     if decision.kind == TURN:
         return abs(decision.turn_rad) >= _LEAST_TURN_RAD
     return decision.kind == CLIMB and abs(decision.climb_m) >= _LEAST_CLIMB_M

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from components.messages.decisions import CLIMB, KINDS, TURN, Decision
+from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
 from components.operator.console import MOST_CLIMB_M, MOST_TURN_RAD
 from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text
@@ -32,7 +32,7 @@ def _no_name(value: Any) -> Any:
     return "" if value is None else value
 
 
-class _Row(BaseModel):
+class _DecisionRow(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     time_s: float = Field(ge=0, allow_inf_nan=False)
@@ -46,14 +46,14 @@ class _Row(BaseModel):
     ] = 0.0
     wall_time_s: Annotated[float, BeforeValidator(_unknown)] = math.nan
 
-    def decided(self) -> Decision:
+    def decided(self) -> OperatorDecision:
         kind = KINDS.index(self.decision)
         turn_rad = self.turn_rad if kind == TURN else 0.0
         climb_m = self.climb_m if kind == CLIMB else 0.0
-        return Decision(kind, self.target, turn_rad, climb_m, self.wall_time_s)
+        return OperatorDecision(kind, self.target, turn_rad, climb_m, self.wall_time_s)
 
 
-def read_decisions(path: Path) -> list[tuple[float, Decision]]:
+def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
     """Return the decisions of a table with their times, s, in order.
 
     Parameters
@@ -74,11 +74,11 @@ def read_decisions(path: Path) -> list[tuple[float, Decision]]:
         rows = _of_parquet(path) if path.suffix == ".parquet" else _of_csv(path)
     except InputFileError as error:
         raise ValueError(f"{path}: {error}") from None
-    found: list[tuple[float, Decision]] = []
+    found: list[tuple[float, OperatorDecision]] = []
     problems: list[str] = []
     for where, row in rows:
         try:
-            read = _Row.model_validate(row)
+            read = _DecisionRow.model_validate(row)
         except ValidationError as error:
             problems += [_said(where, problem) for problem in error.errors(include_url=False)]
             continue

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from components.messages.decisions import Decision
+from components.messages.decisions import OperatorDecision
 
 #: A person does not decide so often between two scans; who floods the desk is refused.
 MOST_WAITING = 32
@@ -16,12 +16,12 @@ class Laid:
 
     Parameters
     ----------
-    decision : Decision
+    decision : OperatorDecision
     taken : callable
         Called with the simulated time, s, from the thread of the simulation.
     """
 
-    decision: Decision
+    decision: OperatorDecision
     taken: Callable[[float], None]
 
 
@@ -41,7 +41,7 @@ class Desk:
             self._waiting.append(laid)
             return True
 
-    def take(self, time_s: float, tick: int) -> list[tuple[int, Decision]]:
+    def take(self, time_s: float, tick: int) -> list[tuple[int, OperatorDecision]]:
         """Take all that waits, at an instant of the simulation, and tell those who laid it."""
         with self._lock:
             found, self._waiting = self._waiting, []

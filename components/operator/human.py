@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from components.messages.decisions import Decision
+from components.messages.decisions import OperatorDecision
 from components.operator.console import Console, ConsoleParameters
 from components.operator.desk import Desk
 from dsa_des.block.wake import Wake
@@ -31,7 +31,7 @@ class Human(Console):
     #: Set by the program that has a person at hand.
     desk: Desk | None = None
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, Decision]]:
+    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
         """Take what lies on the desk."""
         if self.desk is None:
             return []

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from components.messages.decisions import Decision
+from components.messages.decisions import OperatorDecision
 from components.operator.console import Console, ConsoleParameters
 from components.operator.decision_table import read_decisions
 from dsa_des.block.component import ScenePath
@@ -20,7 +20,7 @@ class RecordedParameters(ConsoleParameters):
     )
 
 
-class Recorded(Console):
+class RecordedOperator(Console):
     """Repeats a table of decisions, each at the first scan not before its time.
 
     With the scan rate and the wires of the console that the table was recorded at, everything
@@ -40,7 +40,7 @@ class Recorded(Console):
         self._decided = tuple(decision for _, decision in found)
         self._next = 0
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, Decision]]:
+    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
         """Return what is due since the last scan."""
         scans = wake.ticks[wake.scans >= 0]
         if len(scans) == 0 or self._next == len(self._decided):

@@ -55,7 +55,7 @@ def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: s
     which = np.array([next(i for i, d in enumerate(distinct) if d is m) for m in measured])
     area = np.empty(len(cells))
     for index, item in enumerate(distinct):
-        chosen = np.flatnonzero(which[cells.target] == index)
+        chosen = np.flatnonzero(which[cells.craft] == index)
         area[chosen] = visible_area(
             cells.relative_heading_rad[chosen],
             cells.target_pitch_rad[chosen],

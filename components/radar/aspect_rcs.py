@@ -31,7 +31,7 @@ def mean_rcs_m2(cells: Cells) -> FloatArray:
         cells.target_pitch_rad,
         cells.target_roll_rad,
     )
-    which = place[cells.target]
+    which = place[cells.craft]
     for index, table in enumerate(tables):
         chosen = np.flatnonzero(which == index)
         rcs[chosen] = table.rcs_m2(azimuth[chosen], elevation[chosen])

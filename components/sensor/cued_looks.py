@@ -1,5 +1,6 @@
 """Cues as an effect: which targets lie in a cone that was told, where a sensor looks harder."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,10 +8,11 @@ import numpy as np
 from components.estimation.cue_cone import axis_in_body
 from components.estimation.frame import place_in_frame
 from components.messages.cues import CueCones
+from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
 from components.sensor.believed_pose import believed_pose
 from components.sensor.sensor import Sensor
-from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.ports import Input
 from dsa_des.block.wake import Wake
@@ -44,6 +46,10 @@ class CuedLooks(Effect):
 class ConesAhead:
     """Finds targets in the cones that a sensor holds at its scans."""
 
+    def __init__(self) -> None:
+        #: Of the cones at the scans of one wake: their scan, axis, and cosine of the half angle.
+        self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None
+
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
         """Return which targets lie in a cone at each scan, (scans, targets); None for none at all.
 
@@ -59,6 +65,7 @@ class ConesAhead:
         ValueError
             If the targets came without the ownship's pose.
         """
+        self._cones = None
         held = wake.held(PORT)
         if held is None:
             return None
@@ -95,10 +102,35 @@ class ConesAhead:
         along = axis[0][:, np.newaxis] * level * np.cos(azimuth)
         along += axis[1][:, np.newaxis] * level * np.sin(azimuth)
         along -= axis[2][:, np.newaxis] * np.sin(elevation)
-        inside = along >= np.cos(cones.half_angle_rad[entry])[:, np.newaxis]
+        least = np.cos(cones.half_angle_rad[entry])
+        self._cones = scan, axis, least
+        inside = along >= least[:, np.newaxis]
         found = np.zeros((len(rows), azimuth.shape[1]), dtype=bool)
         np.logical_or.at(found, scan, inside)
         return found
+
+    def with_noise(self, detections: Detections) -> Detections:
+        """Return a report of the same scans whose false alarms say, too, if they lie in a cone.
+
+        By where they are reported, as they are nowhere else.
+        """
+        false = np.flatnonzero(detections.target < 0)
+        if self._cones is None or not len(false):
+            return detections
+        scan, axis, least = self._cones
+        row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))[false]
+        first = np.searchsorted(scan, row, side="left")
+        count = np.searchsorted(scan, row, side="right") - first
+        alarm = np.repeat(np.arange(len(false)), count)
+        cone = np.arange(len(alarm)) + np.repeat(first - np.cumsum(count) + count, count)
+        azimuth = detections.azimuth_rad[false][alarm]
+        elevation = detections.elevation_rad[false][alarm]
+        level = np.cos(elevation)
+        along = axis[0][cone] * level * np.cos(azimuth) + axis[1][cone] * level * np.sin(azimuth)
+        along -= axis[2][cone] * np.sin(elevation)
+        cued = detections.extras["cued"].copy()
+        cued[false[alarm[along >= least[cone]]]] = True
+        return replace(detections, extras={**detections.extras, "cued": cued})
 
 
 CUED_LOOKS = CuedLooks()

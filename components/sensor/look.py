@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from components.aircraft.aircraft import Roster
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
@@ -166,8 +167,15 @@ class Cells:
         return getattr(self._targets, name).take(self._flat // self._width)
 
     def of_target(self, column: FloatArray) -> AnyArray:
-        """Return a per-target column (shape (targets,)) for each cell."""
-        return column[self.target]
+        """Return a column of the roster (shape (aircraft,)) for each cell."""
+        return column[self.craft]
+
+    @cached_property
+    def craft(self) -> IntArray:
+        """Which of the roster's aircraft each cell's target is."""
+        if type(self.roster) is Roster:
+            return self.target
+        return self.roster.craft(self.target, self.replica)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""

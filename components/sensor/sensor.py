@@ -227,6 +227,8 @@ class Sensor(Measuring):
         )
         for report in self._reporting:
             detections = report(detections, targets, rows)
+        if self._cueing:
+            detections = self._cueing[0].with_noise(detections)
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:

@@ -1,5 +1,7 @@
 """A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
 
+from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -13,9 +15,10 @@ from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.scans import Scans, scans_of, when_made
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.message import offsets_of
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.source_file import absolute
 from dsa_des.block.strangers import Left, strangers_code
@@ -79,6 +82,7 @@ class StoneSoupTracker(Component):
     inputs = {"fused": Input(FusedDetections, "trigger", "What was measured.")}
     outputs = {"tracks": Output(StateTracks, "The tracker's tracks.")}
     Parameters = StoneSoupParameters
+    windowed = True
 
     def setup(self) -> None:
         """Build the tracker.
@@ -140,19 +144,28 @@ class StoneSoupTracker(Component):
         pose = scans.pose
         places = place_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
                                 (pose[3], pose[4], pose[5]))  # fmt: skip
-        told: dict[int, Followed] = {}
-        last = -1
-        for look in range(len(scans)):
-            tick = int(scans.tick[look])
+        told: list[tuple[int, int, Followed]] = []
+        rows: list[int] = []
+        for row, looks in _by_row(self._in_time(scans), scans.row):
+            here: dict[int, Followed] = {}
+            for look in looks:
+                here |= {one.number: one for one in self._looked(fused, scans, look, places, wake)}
+            rows.append(row)
+            told += [(row, looks[-1], replace(one)) for one in here.values()]
+        if not rows:
+            return None
+        return self._message(wake, fused.sensors, rows, told, places)
+
+    def _in_time(self, scans: Scans) -> list[int]:
+        """Return the looks that come after no later one; the others are counted."""
+        found = []
+        for look, tick in enumerate(scans.tick.tolist()):
             if tick < self._newest:
                 self._late += 1
                 continue
-            self._newest, last = tick, look
-            for one in self._looked(fused, scans, look, places, wake):
-                told[one.number] = one
-        if last < 0:
-            return None
-        return self._message(wake, fused.sensors, list(told.values()), places, last)
+            self._newest = tick
+            found.append(look)
+        return found
 
     def _looked(
         self, fused: FusedDetections, scans: Scans, look: int, places: Place, wake: Wake
@@ -160,7 +173,7 @@ class StoneSoupTracker(Component):
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
-        begin = int(wake.replica[0]) * wake.span_ticks
+        begin = int(wake.replica[scans.row[look]]) * wake.span_ticks
         time_s = (int(scans.tick[look]) - begin) / wake.ticks_per_s
         when = instant(time_s)
         which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
@@ -179,15 +192,23 @@ class StoneSoupTracker(Component):
             return self._follower.told(tracks, time_s, when, self._masks)
 
     def _message(
-        self, wake: Wake, sensors: tuple[str, ...], told: "list[Followed]", places: Place, look: int
+        self,
+        wake: Wake,
+        sensors: tuple[str, ...],
+        rows: list[int],
+        entries: "list[tuple[int, int, Followed]]",
+        places: Place,
     ) -> StateTracks:
-        """Return the tracks as a message."""
+        """Return tracks as a message: of each its row, the last look and how it is told."""
+        told = [one for _, _, one in entries]
         count = len(told)
+        look = np.array([last for _, last, _ in entries], dtype=np.int64)
+        of_row = np.searchsorted(rows, np.array([row for row, _, _ in entries], dtype=np.int64))
         state = np.array([one.state for one in told], dtype=float).reshape(count, 6).T
         spread = np.array([one.covariance for one in told], dtype=float).reshape(count, 6, 6)
         spread = np.moveaxis(spread, 0, -1)
         at = Place(
-            np.repeat(places.position_m[:, [look]], count, axis=1),
+            places.position_m[:, look],
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
         seen, by_state = linearised(Kind(False), state, at)
@@ -204,8 +225,8 @@ class StoneSoupTracker(Component):
         assert self._origin is not None
         lat, lon, alt = (np.full(count, value) for value in self._origin)
         return StateTracks(
-            tick=wake.ticks[-1:],
-            offsets=np.array([0, count]),
+            tick=wake.ticks[rows],
+            offsets=offsets_of(of_row, len(rows)),
             track=column("number", np.int64),
             track_status=column("status", np.int64),
             existence=np.full(count, np.nan),
@@ -234,3 +255,8 @@ class StoneSoupTracker(Component):
     def report(self) -> dict[str, Any]:
         """Return how many looks came too late."""
         return {"late_looks": {self.name: self._late}}
+
+
+def _by_row(looks: list[int], row: IntArray) -> list[tuple[int, list[int]]]:
+    """Return looks by the row of the wake that brings them, in their order."""
+    return [(key, list(mine)) for key, mine in groupby(looks, key=lambda look: int(row[look]))]

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from components.aircraft.aircraft import Roster
 from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
 from components.messages.reach import farthest_look
@@ -37,6 +38,8 @@ class Flown:
         Largest speeds.
     own_present_s, target_present_s : (replicas, 2) and (replicas * targets, 2)
         First and last time at which each may be there.
+    roster : Roster
+        What the targets are.
     """
 
     def __init__(
@@ -47,8 +50,9 @@ class Flown:
         target_speed_mps: FloatArray,
         own_present_s: FloatArray,
         target_present_s: FloatArray,
+        roster: Roster,
     ) -> None:
-        self.own, self.targets = own, targets
+        self.own, self.targets, self.roster = own, targets, roster
         self.own_speed_mps, self.target_speed_mps = own_speed_mps, target_speed_mps
         self.own_present_s, self.target_present_s = own_present_s, target_present_s
 
@@ -65,7 +69,7 @@ class FlownTogether:
     """
 
     def __init__(self, face: Any, flown: Flown, replicas: int) -> None:
-        self._flown, self._roster = flown, face.roster
+        self._flown, self._roster = flown, flown.roster
         self._width = len(face.roster)
         self._columns = np.arange(self._width)
         self._own = OwnFlights(flown.own, replicas)
@@ -278,7 +282,7 @@ class _Epochs:
             ownship = np.repeat(of[new], self._width)
             target = (of[new][:, np.newaxis] * self._width + np.arange(self._width)).reshape(-1)
             start_s = np.repeat(number[new] * self._epoch_s[of[new]], self._width)
-            range_m = self._flights.range_m(ownship, target, start_s).reshape(-1, self._width)
+            range_m = self._flights.range_m(ownship, target, start_s).reshape(len(new), -1)
             found[new] = range_m <= self._within_m[of[new]]
         self._last[of], self._near[of] = number, found
         return found[np.cumsum(begins) - 1]

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.traffic.fleet import SampledFleet, ScriptedFleet
 from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
 from components.traffic.flown_together import Flown
@@ -29,12 +30,15 @@ def flown_by(face: Any, replicas: ReplicaRuns) -> Flown | None:
 
 def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> Flown | None:
     own, targets = [], []
+    aircraft: list[tuple[str, Aircraft]] = []
     for number in range(len(replicas)):
         source = replicas.make(number)
-        if source.roster != face.roster:
-            return None
         own.append(source.own)
         targets += list(source.targets)
+        aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
+    roster = joint_roster(face.roster, aircraft)
+    if roster is None:
+        return None
     fleets: list[Any] = []
     for flights in (own, targets):
         kinds = {type(flight) for flight in flights}
@@ -44,19 +48,20 @@ def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> Flown | None:
             fleets.append(SampledFleet(flights))
         else:
             return None
-    return flown(fleets[0], fleets[1], own, targets)
+    return flown(fleets[0], fleets[1], own, targets, roster)
 
 
-def flown(own_fleet: Any, target_fleet: Any, own: Any, targets: Any) -> Flown:
+def flown(own_fleet: Any, target_fleet: Any, own: Any, targets: Any, roster: Roster) -> Flown:
     """Return flights with how fast they are and when they are there.
 
     Parameters
     ----------
     own_fleet, target_fleet : Fleet
     own, targets : sequence of flights
+    roster : Roster
     """
     return Flown(
         own_fleet, target_fleet,
         np.asarray(max_speeds_mps(own)), np.asarray(max_speeds_mps(targets)),
-        intervals_present_s(own), intervals_present_s(targets),
+        intervals_present_s(own), intervals_present_s(targets), roster,
     )  # fmt: skip

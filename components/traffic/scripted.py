@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.geometry.enu import enu_to_geodetic
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
@@ -198,15 +198,14 @@ class ScriptedTraffic(TrafficSource):
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
             return None
-        for first in range(0, len(crafts), max(1, width)):
-            mine = crafts[first : first + width]
-            if Roster.of([(craft.name, craft) for craft in mine]) != self.roster:
-                return None
+        roster = joint_roster(self.roster, [(craft.name, craft) for craft in crafts])
+        if roster is None:
+            return None
         places = [(flight.lat_deg, flight.lon_deg, flight.alt_m) for flight in own]
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         ownships = flights_of(_starts(own, places, None))
         targets = flights_of(_starts(crafts, _known(crafts, references), None)) if crafts else []
-        return flown(ScriptedFleet(ownships), ScriptedFleet(targets), ownships, targets)
+        return flown(ScriptedFleet(ownships), ScriptedFleet(targets), ownships, targets, roster)
 
     def sample_times_s(self, target: Trajectory) -> FloatArray:
         """Return a regular grid over the run."""

@@ -161,7 +161,12 @@ class TrafficSource(SteeredOwnship):
         if checked or asked or self._crabbing or self._flights_asked_for:
             return None
         flown = flown_by(self, replicas)
-        return None if flown is None else FlownTogether(self, flown, len(replicas))
+        # What [accuracy] leaves out may rest on what the targets are.
+        accuracy = self.context.sections.get("accuracy")
+        allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
+        if flown is None or (allows and flown.roster is not self.roster):
+            return None
+        return FlownTogether(self, flown, len(replicas))
 
     @property
     def width(self) -> int:

@@ -32,7 +32,7 @@ class RunPicture:
     targets : list of str
     tables : dict
         Columns of numbers by table: ``own``, ``truth``, ``scans``, ``detections``, ``fused``,
-        ``tracks``, ``alerts``, ``manoeuvres``.
+        ``tracks``, ``alerts``, ``manoeuvres``, ``bands``.
     """
 
     title: str

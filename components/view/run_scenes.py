@@ -11,6 +11,7 @@ import numpy as np
 
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
+from components.messages.guidance_bands import BAND_REGIONS
 from components.sensor.marks import EO, IR, RADAR
 from components.view.picture import RunPicture, TangentPlane
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -38,7 +39,7 @@ def run_picture(folder: Path) -> RunPicture:
     tables = {name: _table(folder / f"{name}.parquet") for name in ("detections", "scans")}
     if tables["scans"] is None or tables["detections"] is None:
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
-    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres"):
+    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres", "bands"):
         tables[name] = _table(folder / f"{name}.parquet")
     found: dict[str, Table] = {name: table for name, table in tables.items() if table is not None}
     detections = found["detections"]
@@ -93,6 +94,14 @@ def run_picture(folder: Path) -> RunPicture:
         table = found["manoeuvres"]
         columns = ("time_s", "turn_rad", "climb_m")
         picture.tables["manoeuvres"] = {name: table[name] for name in columns if name in table}
+    if "bands" in found:
+        table = found["bands"]
+        ends = ("low_rad", "high_rad", "low_m", "high_m")
+        picture.tables["bands"] = {
+            "time_s": table["time_s"],
+            "region": _codes(table["region"], BAND_REGIONS),
+            **{name: table[name] for name in ends},
+        }
     return picture
 
 

@@ -56,12 +56,16 @@ class SplitBlock:
         self._side_by_side = side_by_side
         self._instances: dict[int, Component] = {}
         self._made: set[int] = set()
+        #: By replica and port, what has come for an instance that has not run since.
+        self._waiting: dict[int, dict[str, list[Arrivals]]] = {}
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Let every replica's instance handle its rows."""
         replica = wake.replica
         cuts = np.flatnonzero(replica[1:] != replica[:-1]) + 1
         sent: dict[str, list[Message]] = {}
+        if self._side_by_side:
+            self._keep_waiting(wake, replica)
         for first, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(wake)], strict=True):
             number = int(replica[first])
             if number not in self._instances:
@@ -69,11 +73,25 @@ class SplitBlock:
                     self._let_go(number)
                 self._instances[number] = self.make(number)
                 self._made.add(number)
-            result = self._instances[number].run(_part(wake, slice(first, end), number))
+            part = _part(wake, slice(first, end), number)
+            for port, waiting in self._waiting.pop(number, {}).items():
+                part._arrived = {**part._arrived, port: _after(waiting, part.arrivals(port))}
+            result = self._instances[number].run(part)
             for port, message in by_output(result, self._outputs).items():
                 shift = number * wake.span_ticks
                 sent.setdefault(port, []).append(message.shifted(shift, first_scan(number)))
         return {port: _joined(parts) for port, parts in sent.items()} or None
+
+    def _keep_waiting(self, wake: Wake, replica: IntArray) -> None:
+        """Keep what comes for instances that do not run in this wake, as a wire would."""
+        for port, arrivals in wake._arrived.items():
+            for new in arrivals:
+                of = wake.replica_of(new.tick)
+                for number in np.unique(of[~np.isin(of, replica)]).tolist():
+                    begin = number * wake.span_ticks
+                    part = _arrivals(new, begin, first_scan(number), wake.span_ticks)
+                    held = self._waiting.setdefault(number, {}).setdefault(port, [])
+                    held[:] = _after(held, [part] if part else [])
 
     def close(self, replicas: int) -> None:
         """Let the last instances go, and have those that never ran say their word as well.
@@ -129,6 +147,18 @@ def _arrivals(new: Arrivals, begin: int, scan: int, span: int) -> Arrivals | Non
         return None
     message = new.message.take(slice(first, end)).shifted(-begin, -scan)
     return Arrivals(new.source, new.tick[first:end] - begin, message)
+
+
+def _after(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
+    """Return what came over each wire, first `one` and then the `other`, by source."""
+    found = {new.source: new for new in one}
+    for new in other:
+        old = found.get(new.source)
+        if old is not None:
+            message = type(new.message).concatenate([old.message, new.message])
+            new = Arrivals(new.source, np.concatenate([old.tick, new.tick]), message)
+        found[new.source] = new
+    return [found[name] for name in sorted(found)]
 
 
 def _within(asked: IntArray, rows: slice) -> IntArray:

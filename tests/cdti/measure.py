@@ -28,6 +28,13 @@ STATED_S = 0.1
 MANY = """
 extends = "{session}"
 title = "Many targets"
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "radar -> fusion", "eo -> fusion",
+  "fusion -> tracker -> alerting", "traffic -> alerting -> operator",
+  {{ from = "operator", to = "traffic", delay_s = 0.1, holds = "nothing" }},
+]
+[blocks]
+remove = ["guidance"]
 [record]
 truth = false
 [blocks.traffic]

@@ -1,12 +1,14 @@
 """Random scenes give the same bytes however they are run.
 
-Thousands of them: ``python tests/random_scenes/run_many.py --count 3000``.
+Thousands: ``python tests/random_scenes/run_many.py --count 3000``; hundreds of closed loops:
+``python tests/random_scenes/run_loops.py --count 300``.
 """
 
 import dataclasses
 
 import numpy as np
 import pytest
+import run_loops
 import studies
 from comparisons import difference, judge, recorded
 from dice import Dice
@@ -28,6 +30,12 @@ def test_a_random_scene_gives_the_same_however_it_is_run(seed, tmp_path):
 def test_many_random_scenes_give_the_same_however_they_are_run(seed, tmp_path):
     verdict = judge(legal_case(seed, tmp_path), tmp_path, LIMIT_S)
     assert verdict.kind == "same", verdict.detail
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_random_closed_loop_gives_the_same_side_by_side(seed, tmp_path):
+    found, _ = run_loops.judged(seed, tmp_path)
+    assert not found
 
 
 def test_a_scene_is_a_function_of_its_seed(tmp_path):

@@ -10,7 +10,7 @@ from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
 
 import dsa_des
-from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, Decision
+from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, OperatorDecision
 from components.operator.decision_table import read_decisions
 from components.operator.desk import MOST_WAITING, Desk, Laid
 from dsa_des.record.recording import MemorySink, Recorder
@@ -20,10 +20,10 @@ HUMAN, RECORDED = "operator.human", "operator.recorded"
 BOTH = (HUMAN, RECORDED)
 #: When a person acts, s, and what they do.
 ACTS = [
-    (41.02, Decision(SHOWN, "head_on", wall_time_s=1.7e9)),
-    (43.5, Decision(VERIFIED, "head_on", wall_time_s=1.7e9 + 2.25)),
-    (43.5, Decision(TURN, "head_on", turn_rad=-0.6, wall_time_s=1.7e9 + 2.5)),
-    (60.0, Decision(CLIMB, "", climb_m=90.0)),
+    (41.02, OperatorDecision(SHOWN, "head_on", wall_time_s=1.7e9)),
+    (43.5, OperatorDecision(VERIFIED, "head_on", wall_time_s=1.7e9 + 2.25)),
+    (43.5, OperatorDecision(TURN, "head_on", turn_rad=-0.6, wall_time_s=1.7e9 + 2.5)),
+    (60.0, OperatorDecision(CLIMB, "", climb_m=90.0)),
 ]
 TABLE = "time_s,decision,target,turn_rad,climb_m\n43.51,turn,head_on,-0.6,\n60,climb,,,90\n"
 
@@ -116,7 +116,7 @@ def test_it_is_flown_at_the_console_s_rates(tmp_path, kind):
 def test_a_decision_comes_at_the_first_scan_not_before_it(tmp_path, kind, keys, time_s):
     wanted = scene(tmp_path, kind, **keys)
     wanted["duration_s"] = 45
-    acts = [(43.51, Decision(TURN, "head_on", turn_rad=-0.6))]
+    acts = [(43.51, OperatorDecision(TURN, "head_on", turn_rad=-0.6))]
     if kind == RECORDED:
         (told,) = rows(run(wanted), "manoeuvres")
     else:
@@ -171,11 +171,11 @@ def test_what_is_no_table_of_decisions_is_refused(tmp_path, text, says):
 
 def test_a_desk_takes_no_more_than_a_person_lays_down():
     desk, taken = Desk(), []
-    laid = [desk.lay(Laid(Decision(SHOWN), taken.append)) for _ in range(MOST_WAITING + 2)]
+    laid = [desk.lay(Laid(OperatorDecision(SHOWN), taken.append)) for _ in range(MOST_WAITING + 2)]
     assert laid == [True] * MOST_WAITING + [False] * 2
     assert len(desk.take(1.5, 15)) == MOST_WAITING and taken == [1.5] * MOST_WAITING
-    assert desk.lay(Laid(Decision(SHOWN), taken.append))
-    assert len(desk.close()) == 1 and not desk.lay(Laid(Decision(SHOWN), taken.append))
+    assert desk.lay(Laid(OperatorDecision(SHOWN), taken.append))
+    assert len(desk.close()) == 1 and not desk.lay(Laid(OperatorDecision(SHOWN), taken.append))
 
 
 def test_without_a_person_nothing_is_decided_and_it_says_so(tmp_path):

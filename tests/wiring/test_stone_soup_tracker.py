@@ -3,17 +3,23 @@
 import re
 import subprocess
 import sys
+from copy import copy
 from datetime import datetime
 from pathlib import Path
 
 import crooked
 import numpy as np
+import pyarrow.compute as pc
 import pytest
 from covering import covers
 from wired import chain, rows, run
 
 import dsa_des
+from components.tracking.stone_soup import StoneSoupTracker
 from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "stone-soup.md"
@@ -202,3 +208,33 @@ def test_the_extra_is_imported_only_where_it_is_used():
     program = "import sys, components.tracking.stone_soup, components.export as e; e.stone_soup; "
     program += "assert not [m for m in sys.modules if m.startswith('stonesoup')]"
     subprocess.run([sys.executable, "-P", "-c", program], check=True, cwd=PAGE.parents[1])
+
+
+def tracks_of(kind, scenes, **options):
+    sink = MemorySink()
+    kind(scenes, recorder=Recorder([sink]), **options).run()
+    return sink.tables()["state_tracks"].combine_chunks()
+
+
+def test_windows_and_company_change_no_byte_and_names_are_not_seen(tmp_path, monkeypatch):
+    loaded = dsa_des.load_scene(scene(documented(tmp_path), 2))
+    alone = tracks_of(Simulation, loaded)
+    assert tracks_of(Simulation, loaded, window=3).equals(alone)
+    scenes = [scene_of(loaded, Replica(loaded.seed + i, {})) for i in range(2)]
+    together = tracks_of(lock_step, scenes)
+    for number, one in enumerate(scenes):
+        mine = together.filter(pc.equal(together["replica"], number)).drop_columns(["replica"])
+        assert mine.combine_chunks().equals(tracks_of(Simulation, one)), number
+    original = StoneSoupTracker.run
+
+    def blind(self, wake):
+        fused, of = wake._held["fused"]
+        other = copy(fused.take(slice(0, len(fused))))
+        other.target, other.roster = -7 - other.target, None
+        for name in ("true_azimuth_rad", "true_elevation_rad", "true_range_m"):
+            setattr(other, name, None)
+        wake._held = {"fused": (other, of)}
+        return original(self, wake)
+
+    monkeypatch.setattr(StoneSoupTracker, "run", blind)
+    assert tracks_of(Simulation, loaded).equals(alone)

@@ -15,7 +15,7 @@ const App = (() => {
   const trips = [];
   let trip = null;
 
-  function may() { return state.role === "operator" && scene.console && !state.over; }
+  function may() { return state.role === "operator" && scene.console && state.began && !state.over; }
   function decide(decision, value) {
     if (!may()) return;
     const target = state.chosen;

@@ -38,6 +38,7 @@ const Scope = (() => {
     if (frame.area.length) hatch(c, x0, y0, outer, frame.area, at, range);
     for (const sensor of scene.sensors) reach(c, x0, y0, scale, sensor);
     c.restore();
+    for (const one of frame.bands) band(c, x0, y0, outer, heading, one);
     if (bug !== null) {
       const [x, y] = at(bug, range * 1.03);
       c.beginPath();
@@ -59,6 +60,7 @@ const Scope = (() => {
     }
     Symbols.own(c, x0, y0, 12);
     drawn.area = frame.area.length;
+    drawn.bands = frame.bands;
   }
 
   function rings(c, x0, y0, outer, range, heading) {
@@ -120,6 +122,20 @@ const Scope = (() => {
     const angle = side * rad;
     Symbols.text(c, words, x0 + (r - 34) * Math.sin(angle), y0 - (r - 14) * Math.cos(angle),
       Symbols.colours[sensor.kind], "center");
+  }
+
+  // Directions in which separation would be lost, inside the outer ring: the thicker the more urgent.
+  const BANDS = { FAR: ["symbol-caution", 3, []], MID: ["symbol-caution", 6, []],
+    NEAR: ["symbol-warning", 9, []], RECOVERY: ["sight", 6, [6, 4]] };
+  function band(c, x0, y0, outer, heading, [low, high, region]) {
+    const [colour, width, dash] = BANDS[region] || BANDS.FAR;
+    c.beginPath();
+    c.arc(x0, y0, outer - 2 - width / 2, (low - heading - 90) * rad, (high - heading - 90) * rad);
+    c.strokeStyle = Symbols.colours[colour];
+    c.lineWidth = width;
+    c.setLineDash(dash);
+    c.stroke();
+    c.setLineDash([]);
   }
 
   function edge(c, at, one, range, half) {

@@ -42,6 +42,18 @@ const Altitude = (() => {
       Symbols.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
         Symbols.colours.faint, "right");
     }
+    if (options.bands) {  // altitudes that lose separation, beside the scale
+      for (const one of Data.bandsAt(t)) {
+        if (!Number.isFinite(one.low_m)) continue;
+        const top = Math.max(y(one.high_m), 0), low = Math.min(y(one.low_m), height - bottom);
+        const { colour, dash } = Symbols.region(one.region);
+        c.strokeStyle = colour;
+        c.lineWidth = 2 + 2 * Math.min(one.region, 3);
+        c.setLineDash(dash);
+        c.beginPath(); c.moveTo(left + 6, top); c.lineTo(left + 6, low); c.stroke();
+      }
+      c.setLineDash([]);
+    }
     const batch = new Symbols.Batch();
     for (const m of marks) {
       const colour = m.truth ? Symbols.colours.truth : m.sensor.colour;

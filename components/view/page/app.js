@@ -6,7 +6,7 @@ const App = (() => {
   const state = { t: 0, playing: false, speed: 1, steps: -1, dirty: true, shownAt: 0 };
   const options = {
     sensors: new Set(Data.sensors.map((_, number) => number)),
-    truth: Boolean(Data.tables.truth), tracks: true, fields: true,
+    truth: Boolean(Data.tables.truth), tracks: true, fields: true, bands: Boolean(Data.tables.bands),
     follow: true, headingUp: false, fade: 4,
   };
   let drawn = {};
@@ -119,6 +119,7 @@ const App = (() => {
     (on) => options.sensors[on ? "add" : "delete"](number), sensor.colour));
   if (Data.tables.tracks) layer("tracks", true, (on) => { options.tracks = on; });
   if (Data.tables.truth) layer("truth", true, (on) => { options.truth = on; });
+  if (Data.tables.bands) layer("bands", true, (on) => { options.bands = on; });
   layer("fields of view", true, (on) => { options.fields = on; });
 
   for (const speed of [0.1, 0.25, 0.5, 1, 2, 5, 10, 30, 100]) {

@@ -94,6 +94,19 @@ const Data = (() => {
     return [start, end];
   }
 
+  // Bands of guidance stand for as long as the alerting takes to look again.
+  const BANDS_LAST = 1.5;
+  function bandsAt(t) {
+    const b = tables.bands;
+    const [from, to] = latest("bands", t);
+    const found = [];
+    for (let i = from; i < to && t - b.time_s[i] < BANDS_LAST; i++) {
+      found.push({ region: b.region[i], low_rad: b.low_rad[i], high_rad: b.high_rad[i],
+        low_m: b.low_m[i], high_m: b.high_m[i] });
+    }
+    return found;
+  }
+
   // Times of detections by sensor and target, with the range at the first.
   const looks = raw.sensors.map(() => new Map());
   if (tables.detections) {
@@ -112,7 +125,7 @@ const Data = (() => {
   const scanTimes = scans.map((rows) => Float64Array.from(rows, (i) => tables.scans.time_s[i]));
 
   return {
-    ...raw, tables, after, ownship, truths, recent, latest, looks, scanTimes,
+    ...raw, tables, after, ownship, truths, recent, latest, bandsAt, looks, scanTimes,
     scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
   };
 })();

@@ -80,6 +80,24 @@ const Plan = (() => {
     drawn.beams.push({ sensor: sensor.name, azimuth_deg });
   }
 
+  // Directions in which separation would be lost, around the ownship: thicker the nearer.
+  function bands(c, t, own, drawn) {
+    const [x, y] = place(own.east, own.north);
+    drawn.bands = Data.bandsAt(t);
+    for (const one of drawn.bands) {
+      if (!Number.isFinite(one.low_rad)) continue;
+      const { colour, dash } = Symbols.region(one.region);
+      c.beginPath();
+      c.arc(x, y, 60 + 4 * one.region, one.low_rad - view.turn - Math.PI / 2,
+        one.high_rad - view.turn - Math.PI / 2);
+      c.strokeStyle = colour;
+      c.lineWidth = 2 + 2 * Math.min(one.region, 3);
+      c.setLineDash(dash);
+      c.stroke();
+    }
+    c.setLineDash([]);
+  }
+
   function truth(c, t, options, drawn) {
     const few = Data.targets.length <= MOST_NAMES;
     c.strokeStyle = Symbols.colours.truth;
@@ -236,6 +254,7 @@ const Plan = (() => {
       fields(c, own, options.sensors);
       for (const number of options.sensors) beam(c, t, own, number, drawn);
     }
+    if (options.bands) bands(c, t, own, drawn);
     if (options.truth) truth(c, t, options, drawn);
     detections(c, t, options, drawn);
     if (options.tracks) tracks(c, t, drawn);

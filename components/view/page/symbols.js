@@ -2,7 +2,7 @@
 // Colours of the theme, markers of the sensors, and text on a canvas.
 const Symbols = (() => {
   const names = ["ground", "ink", "faint", "line", "truth", "track", "own",
-    "level1", "level2", "level3"];
+    "level1", "level2", "level3", "recovery"];
   let colours = {};
   function readTheme() {
     const style = getComputedStyle(document.documentElement);
@@ -15,6 +15,14 @@ const Symbols = (() => {
   }
 
   // Markers are added to the path at a place; many of one kind are drawn at once.
+  // Regions of guidance, by their number: colour and words.
+  const REGIONS = ["none", "far", "mid", "near", "recovery", "unknown"];
+  function region(number) {
+    const name = REGIONS[number];
+    if (name === "recovery") return { name, colour: colours.recovery, dash: [6, 4] };
+    return { name, colour: level(number), dash: [] };
+  }
+
   const paths = {
     o: (c, x, y, r) => { c.moveTo(x + r, y); c.arc(x, y, r, 0, 2 * Math.PI); },
     s: (c, x, y, r) => c.rect(x - 0.85 * r, y - 0.85 * r, 1.7 * r, 1.7 * r),
@@ -124,6 +132,6 @@ const Symbols = (() => {
     return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
   }
 
-  return { get colours() { return colours; }, readTheme, level, mark, outline, Batch, aircraft,
+  return { get colours() { return colours; }, readTheme, level, region, mark, outline, Batch, aircraft,
     text, ready, niceStep };
 })();

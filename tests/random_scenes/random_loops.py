@@ -1,0 +1,94 @@
+"""Random closed loops: tracker, alerting and who acts on it, with delays, jitter and loss."""
+
+from typing import Any
+
+from dice import Dice
+
+from dsa_des.replicas.replicas import Replica
+
+
+def loop_of(dice: Dice, root: str) -> dict[str, Any]:
+    """Return the tables of a scene in which the ownship is steered out of the way.
+
+    Parameters
+    ----------
+    dice : Dice
+    root : str
+        Folder of the repository.
+    """
+    conf = f"{root}/configs/alerting/do365b.conf"
+    blocks: dict[str, Any] = {
+        "radar": {"scan_rate_hz": dice.pick(1, 2, "7/3"), "offset_s": dice.pick(0, 0.2),
+                  "jitter_s": dice.pick(0, 0, 0.03)},
+        "eo": {"scan_rate_hz": dice.pick(1, 3), "rate_error_ppm": dice.pick(0, 0, 900)},
+        "alerting": {"type": "alerting.daidalus", "scan_rate_hz": dice.pick(1, 2), "conf": conf,
+                     "fit_s": dice.pick(3, 8), "offset_s": dice.pick(0, 0.3)},
+        "traffic": {
+            "type": "traffic.scripted",
+            "ownship": {"lat_deg": -38, "lon_deg": 4.4, "alt_m": 1000, "heading_deg": 217,
+                        "speed_mps": 50},
+            "intruders": [_intruder(dice, f"i{k}") for k in range(dice.pick(1, 1, 2))],
+        },
+    }  # fmt: skip
+    acts = dice.pick("avoidance", "pilot", "turn_away")
+    kind = {"avoidance": "avoidance.daidalus", "pilot": "operator.stochastic",
+            "turn_away": "avoidance.turn_away"}[acts]  # fmt: skip
+    blocks["actor"] = {"type": kind}
+    if acts != "turn_away":
+        blocks["actor"] |= {"conf": conf, "level": dice.pick(1, 2)}
+    if acts == "pilot":
+        blocks["actor"] |= {"held_s": 1, "coordination_s": 0, "initial_delay_s": dice.pick(0, 2)}
+    else:
+        blocks["actor"]["pause_s"] = dice.pick(2, 5)
+    if acts != "turn_away" and dice.chance(0.3, "tracks with states"):
+        blocks |= {
+            "fusion": {"type": "fusion.pass_through"},
+            "tracker": {"type": dice.pick("tracking.ekf", "tracking.imm")},
+        }
+    actor = "tracker" if acts == "turn_away" else "alerting"
+    wires: list[Any] = [
+        "traffic -> transform -> gate", "gate -> radar", "gate -> eo",
+        _wire(dice, "radar", "fusion"), _wire(dice, "eo", "fusion"),
+        "fusion -> tracker", "traffic -> alerting", _wire(dice, "tracker", "alerting"),
+        f"{actor} -> actor",
+        {**_wire(dice, "actor", "traffic"), "delay_s": dice.pick(0.25, 1, 4)},
+    ]  # fmt: skip
+    dice.features |= {f"loop of {acts}"}
+    return {
+        "extends": f"{root}/configs/detect_and_sense.toml", "duration_s": dice.pick(15, 22),
+        "seed": dice.randrange(1000), "wires": wires,
+        "blocks": {**blocks, "remove": ["ir"]},
+    }  # fmt: skip
+
+
+def _intruder(dice: Dice, name: str) -> dict[str, Any]:
+    return {
+        "name": name, "east_m": dice.pick(-900, -1500), "north_m": dice.pick(-1400, -2000),
+        "up_m": dice.pick(0, 40), "heading_deg": dice.pick(37, 80), "speed_mps": 60,
+    }  # fmt: skip
+
+
+def _wire(dice: Dice, source: str, target: str) -> dict[str, Any]:
+    wire: dict[str, Any] = {"from": source, "to": target, "holds": "nothing"}
+    if dice.chance(0.4):
+        wire["delay_s"] = dice.pick(0.1, 0.7)
+    if dice.chance(0.3):
+        wire["jitter_s"] = dice.pick(0.05, 0.5)
+    if dice.chance(0.3):
+        wire["drop_probability"] = 0.2
+    return wire
+
+
+def loop_replicas(dice: Dice) -> list[Replica]:
+    """Return replicas with other flights, other aircraft and other phases."""
+    found = []
+    keys = {
+        "blocks.traffic.intruders[0].heading_deg": (30, 60, 90), "blocks.radar.offset_s": (0, 0.1),
+        "blocks.traffic.ownship.speed_mps": (45, 55), "blocks.eo.offset_s": (0, 0.25),
+        "blocks.traffic.intruders[0].rcs_dbsm": (-8, 3, 12),
+    }  # fmt: skip
+    drawn = [key for key in sorted(keys) if dice.chance(0.6)]
+    for _ in range(dice.pick(2, 3, 4)):
+        changes = {key: dice.choice(keys[key]) for key in drawn}
+        found.append(Replica(dice.randrange(1000), changes))
+    return found
