@@ -13,7 +13,7 @@ from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
 from dsa_des.studies.cheapest import Answer, answers, one_sided
 from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
-from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
+from dsa_des.studies.figures import SummaryPlaces, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.labels import short, value_label
@@ -264,7 +264,7 @@ class Tables:
         if figure.kind == "series":
             return self._draw_series(target, figure)
         categories = {axis.column for axis in self.record.axes if axis.category}
-        places = Places(self.rows.axes, self.lines, categories)
+        places = SummaryPlaces(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
         if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False
