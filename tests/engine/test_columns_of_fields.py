@@ -17,7 +17,7 @@ COLUMNS = {
     "skipped_range skipped_hidden skipped_culled",
     "detections": "scan target azimuth_rad elevation_rad range_m confidence true_azimuth_rad "
     "true_elevation_rad true_range_m snr_db detection_probability pixels declared illuminated_s "
-    "cued ned_azimuth_rad ned_elevation_rad own_lat_deg own_lon_deg own_alt_m "
+    "ned_azimuth_rad ned_elevation_rad own_lat_deg own_lon_deg own_alt_m "
     "own_heading_rad own_pitch_rad own_roll_rad "
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2 "
