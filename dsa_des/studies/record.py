@@ -28,7 +28,7 @@ _Label = str | int | float
 
 
 class StrictRecord(BaseModel):
-    """Part of a file in a study's folder: of the right types, and of finite numbers."""
+    """What a file of ours holds: nothing is converted, and a number is finite."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
