@@ -36,11 +36,11 @@ _MOST_CELLS = 12
 _MOST_BYTES = 16 * 2**20
 
 
-class _Strict(BaseModel):
+class _StrictPart(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
 
-class ModelRecord(_Strict):
+class ModelRecord(_StrictPart):
     """A block: its type, what that is, and the rungs of accuracy that it stands on."""
 
     block: str
@@ -50,7 +50,7 @@ class ModelRecord(_Strict):
     rungs: list[str]
 
 
-class EffectRecord(_Strict):
+class EffectRecord(_StrictPart):
     """An effect that is simulated or left out, and because of what."""
 
     block: str
@@ -61,7 +61,7 @@ class EffectRecord(_Strict):
     bound: dict[str, float] = {}
 
 
-class SceneRecord(_Strict):
+class SceneRecord(_StrictPart):
     """The scene of a cell; of cells after the first, only what is not so in the first."""
 
     where: str
@@ -71,7 +71,7 @@ class SceneRecord(_Strict):
     spared: list[tuple[str, str]]
 
 
-class Explained(_Strict):
+class Explained(_StrictPart):
     """What a study's runs are made of."""
 
     versions: dict[str, str]
