@@ -9,7 +9,10 @@ if TYPE_CHECKING:
 
 
 def stone_soup(
-    run: "Run | str | os.PathLike[str]", *, origin: tuple[float, float, float] | None = None
+    run: "Run | str | os.PathLike[str]",
+    *,
+    origin: tuple[float, float, float] | None = None,
+    range_rates: bool = False,
 ) -> "StoneSoupRun":
     """Return a recorded run as Stone Soup's objects: detections, the ownship's poses and truth.
 
@@ -19,6 +22,8 @@ def stone_soup(
     origin : tuple, optional
         Latitude and longitude (deg) and height above the ellipsoid (m) of the frame, in which x is
         east, y north and z up; by default that of the run's tracks, or where the ownship was first.
+    range_rates : bool
+        Whether measured range rates count; leave it where those of a radar fold (a low pulse rate).
 
     Returns
     -------
@@ -38,4 +43,4 @@ def stone_soup(
     from components.export.recorded import tables_of
     from components.export.stone_soup_run import recorded_run
 
-    return recorded_run(tables_of(run), origin)
+    return recorded_run(tables_of(run), origin, range_rates)

@@ -29,8 +29,12 @@ from components.stone_soup.objects import (
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
 
-_MEASURED = ("azimuth_rad", "elevation_rad", "range_m")
-_VARIANCES = ("azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2")
+_MEASURED = ("azimuth_rad", "elevation_rad", "range_m", "range_rate_m_s")
+_VARIANCES = (
+    "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
+    "range_rate_variance_m2_s2",
+)  # fmt: skip
+_MOVES = ("own_velocity_north_m_s", "own_velocity_east_m_s", "own_velocity_down_m_s")
 _POSE = ("lat_deg", "lon_deg", "alt_m", "heading_rad", "pitch_rad", "roll_rad")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _VELOCITY = ("velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s")
@@ -90,7 +94,9 @@ class StoneSoupRun:
     origin: Origin
 
 
-def recorded_run(run: RecordedTables, origin: Origin | None = None) -> StoneSoupRun:
+def recorded_run(
+    run: RecordedTables, origin: Origin | None = None, range_rates: bool = False
+) -> StoneSoupRun:
     """Return a run's detections, poses and truth.
 
     Parameters
@@ -99,6 +105,8 @@ def recorded_run(run: RecordedTables, origin: Origin | None = None) -> StoneSoup
     origin : tuple, optional
         Latitude and longitude (deg) and height (m) of the frame; by default that of the run's
         tracks, or where the ownship was first.
+    range_rates : bool
+        Whether range rates are part of measurements, where the ownship's velocity is recorded.
 
     Raises
     ------
@@ -110,8 +118,9 @@ def recorded_run(run: RecordedTables, origin: Origin | None = None) -> StoneSoup
     pose = _poses(run, columns, flights)
     origin = origin or _origin(run, pose)
     lat, lon, alt = (np.full(pose.shape[1], value) for value in origin)
+    moves = np.stack([columns[name] for name in _MOVES]) if range_rates else None
     place = place_in_frame(
-        (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5])
+        (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5]), moves
     )
     paths = {name: _path(name, flight, origin) for name, flight in flights.items()}
     own = paths.pop(OWNSHIP, None)
@@ -135,13 +144,17 @@ def _detections(run: RecordedTables) -> dict[str, Any]:
     columns: dict[str, Any] = {
         name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=float) for name in names
     }
+    for name in _MOVES:  # runs before sensors measured range rates have none
+        known = name in table.column_names
+        found = table[name].to_numpy(zero_copy_only=False) if known else np.full(len(table), np.nan)
+        columns[name] = np.asarray(found, dtype=float)
     for name in ("tick", "scan"):
         columns[name] = np.asarray(table[name].to_numpy(zero_copy_only=False))
     columns["block"] = np.array(table["block"].to_pylist(), dtype=object)
     # A sweeping beam measures when it meets the target, after its scan has begun.
     lit = columns["illuminated_s"]
     columns["time_s"] = np.where(np.isfinite(lit), lit, columns["time_s"])
-    for name, value in zip(_VARIANCES, _MEASURED, strict=True):
+    for name, value in zip(_VARIANCES[:3], _MEASURED[:3], strict=True):
         bad = np.isfinite(columns[value]) & ~(columns[name] > 0.0)
         if bad.any():
             sensor = columns["block"][np.argmax(bad)]

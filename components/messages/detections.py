@@ -34,10 +34,11 @@ EXTRAS = {
     "pixels": "float64",
     "declared": "bool",
     "illuminated_s": "float64",
-    "cued": "bool",
     "ned_azimuth_rad": "float64",
     "ned_elevation_rad": "float64",
 }
+#: An extra too, recorded behind all other columns.
+CUED = {"cued": "bool"}
 #: The ownship's pose as it believes it to be: columns of ``detections``, and fields of
 #: `Detections`.
 POSE = {
@@ -211,6 +212,9 @@ class Detections(Message):
     own_velocity: dict[str, FloatArray] | None = per_entry(
         columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
     )
+    cued_of_entries: dict[str, AnyArray] | None = per_entry(
+        columns=CUED, value=lambda m: m.cued_column(), default=None, kw_only=True
+    )
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
@@ -229,7 +233,12 @@ class Detections(Message):
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
         # A sensor without a rule declares whatever it reports: it knows of no false alarm.
-        return {"declared": np.ones(len(self.target), dtype=bool), **self.extras}
+        extras = {name: values for name, values in self.extras.items() if name not in CUED}
+        return {"declared": np.ones(len(self.target), dtype=bool), **extras}
+
+    def cued_column(self) -> dict[str, AnyArray]:
+        """Return the extra that says whether each lay in a cue cone, where the sensor says so."""
+        return {name: self.extras[name] for name in CUED if name in self.extras}
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""

@@ -17,7 +17,7 @@ _MOST_PAIRS = 2_000_000
 
 
 @dataclass(frozen=True)
-class Places:
+class SeenPlaces:
     """Detections as a rule of declaration by place sees them, ascending in scan.
 
     Parameters
@@ -43,24 +43,24 @@ class Places:
     def __len__(self) -> int:
         return len(self.scan)
 
-    def take(self, which: IntArray | BoolArray) -> "Places":
+    def take(self, which: IntArray | BoolArray) -> "SeenPlaces":
         """Return some of them."""
-        return Places(*(values[which] for values in vars(self).values()))
+        return SeenPlaces(*(values[which] for values in vars(self).values()))
 
-    def then(self, later: "Places") -> "Places":
+    def then(self, later: "SeenPlaces") -> "SeenPlaces":
         """Return these and later ones."""
         both = zip(vars(self).values(), vars(later).values(), strict=True)
-        return Places(*(np.concatenate(pair) for pair in both))
+        return SeenPlaces(*(np.concatenate(pair) for pair in both))
 
 
 def scans_with_company(
-    places: Places, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
+    places: SeenPlaces, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
 ) -> IntArray:
     """Return in how many of the last n scans, its own included, there was a detection at its place.
 
     Parameters
     ----------
-    places : Places
+    places : SeenPlaces
         All detections of those scans.
     asked : (k,) of int
         Entries that are asked about.
@@ -98,7 +98,7 @@ def scans_with_company(
 
 
 def _near(
-    places: Places, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
+    places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
 ) -> BoolArray:
     """Say which pairs of entries have one place."""
     apart_s = np.abs(places.time_s[one] - places.time_s[other])
@@ -159,7 +159,7 @@ class DeclaredPlaces:
         self._speed_m_s = p.declare_speed_m_s
         self._rate_rad_s = np.radians(p.declare_rate_deg_s)
         self._ticks_per_s = block.context.ticks_per_s
-        self._memory: Places | None = None
+        self._memory: SeenPlaces | None = None
         self._first: dict[str, tuple[int, float]] = {}
         self._names: tuple[str, ...] = ()
 
@@ -177,7 +177,7 @@ class DeclaredPlaces:
         self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
         return replace(detections, extras={**detections.extras, "declared": declared})
 
-    def _places(self, detections: Detections) -> Places:
+    def _places(self, detections: Detections) -> SeenPlaces:
         counts = np.diff(detections.offsets)
         direction = unit_vector(detections.azimuth_rad, detections.elevation_rad)
         own = detections.pose_columns()
@@ -185,7 +185,7 @@ class DeclaredPlaces:
             turned = (own[f"own_{name}_rad"] for name in ("heading", "pitch", "roll"))
             direction = body_to_ned(*direction, *turned)
         level = np.cos(detections.elevation_rad)
-        return Places(
+        return SeenPlaces(
             scan=np.repeat(detections.scan, counts),
             time_s=detections.measured_ticks() / self._ticks_per_s,
             direction=np.stack(direction, axis=-1),

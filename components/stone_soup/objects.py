@@ -2,8 +2,8 @@
 
 The frame has x east, y north and z up at an origin, and axes that stay parallel to themselves. A
 state is ``[x, vx, y, vy, z, vz]``. A measurement is ``[elevation, bearing]``, then the range where
-there is one, in the axes nose, left wing, roof: the elevation is ours, the bearing is
-counter-clockwise and so our azimuth with the other sign.
+there is one, then its rate, in the axes nose, left wing, roof: the elevation is ours, the bearing
+is counter-clockwise and so our azimuth with the other sign.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ import numpy as np
 from stonesoup.models.measurement.nonlinear import (
     CartesianToElevationBearing,
     CartesianToElevationBearingRange,
+    CartesianToElevationBearingRangeRate,
 )
 from stonesoup.types.angle import Bearing, Elevation
 from stonesoup.types.array import StateVector
@@ -62,6 +63,10 @@ class Poses:
         north, east, down = place.position_m
         self._offset = np.stack([east, north, -down])
         self._angles = rotation_offsets(place.to_body)
+        moves = np.full_like(place.position_m, np.nan)
+        if place.velocity_m_s is not None:
+            moves = place.velocity_m_s
+        self._velocity = np.stack([moves[1], moves[0], -moves[2]])
 
     def position(self, i: int) -> StateVector:
         """Return the position of sensor i along east, north, up, m."""
@@ -77,19 +82,27 @@ class Poses:
         Parameters
         ----------
         i : int
-        variances : (2,) or (3,)
-            Of elevation, azimuth and, where it is measured, range.
+        variances : (2,), (3,) or (4,)
+            Of elevation, azimuth and, where they are measured, range and its rate.
         """
-        kind = (
-            CartesianToElevationBearingRange if len(variances) == 3 else CartesianToElevationBearing
-        )
-        return kind(
-            ndim_state=self._size,
-            mapping=self._mapping,
-            noise_covar=np.diag(variances),
-            translation_offset=self.position(i),
-            rotation_offset=self.orientation(i),
-        )
+        common = {
+            "ndim_state": self._size,
+            "mapping": self._mapping,
+            "noise_covar": np.diag(variances),
+            "translation_offset": self.position(i),
+            "rotation_offset": self.orientation(i),
+        }
+        if len(variances) == 4:
+            return CartesianToElevationBearingRangeRate(
+                **common, velocity_mapping=VELOCITY, velocity=StateVector(self._velocity[:, i])
+            )
+        if len(variances) == 3:
+            return CartesianToElevationBearingRange(**common)
+        return CartesianToElevationBearing(**common)
+
+    def moves(self, i: int) -> bool:
+        """Return whether the velocity of sensor i is known, without which a rate says nothing."""
+        return bool(np.isfinite(self._velocity[:, i]).all())
 
 
 class NumberedDetection(Detection):
@@ -121,20 +134,24 @@ def detections(
     which : list of int
         Index of each detection's pose.
     when : datetime
-    measured, variance : (3, n)
-        Azimuth, elevation and range, as our sensors give them; NaN where there is no range.
+    measured, variance : (4, n)
+        Azimuth, elevation, range and its rate, as our sensors give them; NaN where there is none. A
+        rate without a variance, a range or the sensor's velocity is left out.
     metadata : list of dict
         What each carries besides.
     """
     found = set()
     for k, i in enumerate(which):
-        azimuth, elevation, range_m = measured[:, k].tolist()
+        azimuth, elevation, range_m, rate = measured[:, k].tolist()
         ranged = range_m == range_m
         vector: list[Any] = [Elevation(elevation), Bearing(-azimuth)]
         rows = [1, 0]
         if ranged:
             vector.append(range_m)
             rows.append(2)
+            if rate == rate and variance[3, k] > 0.0 and poses.moves(i):
+                vector.append(rate)
+                rows.append(3)
         one = NumberedDetection(
             StateVector(vector),
             timestamp=when,

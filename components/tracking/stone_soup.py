@@ -183,7 +183,7 @@ class StoneSoupTracker(Component):
             places.take(np.array([look])), self.p.position_mapping, self.p.state_size
         )  # fmt: skip
         found = detections(
-            poses, [0] * len(masks), when, scans.measured[:3, which], scans.variance[:3, which],
+            poses, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
             [{"sensor": name} for name in names],
         )  # fmt: skip
         with self._repeatable.working():

@@ -27,7 +27,7 @@ from dsa_des.block.wake import Wake
 _TOLD = Manoeuvre._fields
 
 
-class ReplicaFlights:
+class AllFlown:
     """The flights of all replicas, as arrays.
 
     Parameters
@@ -64,11 +64,11 @@ class FlownTogether:
     ----------
     face : TrafficSource
         The source as the first replica has it, set up.
-    flown : ReplicaFlights
+    flown : AllFlown
     replicas : int
     """
 
-    def __init__(self, face: Any, flown: ReplicaFlights, replicas: int) -> None:
+    def __init__(self, face: Any, flown: AllFlown, replicas: int) -> None:
         self._flown, self._roster = flown, flown.roster
         self._width = len(face.roster)
         self._columns = np.arange(self._width)
@@ -251,14 +251,12 @@ class _Epochs:
     Parameters
     ----------
     flights : FlownTogether
-    flown : ReplicaFlights
+    flown : AllFlown
     width : int
     reach_m : float
     """
 
-    def __init__(
-        self, flights: FlownTogether, flown: ReplicaFlights, width: int, reach_m: float
-    ) -> None:
+    def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
         self._flights, self._width = flights, width
         replicas = len(flown.own_speed_mps)
         speeds = flown.target_speed_mps.reshape(replicas, width)

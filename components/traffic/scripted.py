@@ -13,7 +13,7 @@ from components.geometry.enu import enu_to_geodetic
 from components.traffic import leg_types
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.flight_protocols import Trajectory
-from components.traffic.flown_together import ReplicaFlights
+from components.traffic.flown_together import AllFlown
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.replica_flights import flown
 from components.traffic.sample_times import (
@@ -189,7 +189,7 @@ class ScriptedTraffic(TrafficSource):
         self.fleet = ScriptedFleet(flights)
         self.roster = Roster.of([(craft.name, craft) for craft in parameters.intruders])
 
-    def flown_of(self, parameters: Sequence[Any]) -> ReplicaFlights | None:
+    def flown_of(self, parameters: Sequence[Any]) -> AllFlown | None:
         """Return the flights of replicas with these parameters, where all only fly straight on."""
         if self.wind is not None:
             return None

@@ -18,7 +18,8 @@ SCENE = str(folder() / "operator" / "session.toml")
 #: Begun when the camera already sees the intruder, and without what no test looks at.
 LATER = (
     "blocks.traffic.intruders[0].east_m=4200", "blocks.traffic.intruders[0].north_m=3500",
-    "record.truth=true", "blocks.radar.false_alarm_probability=1e-6",
+    "record.truth=true", "blocks.radar.false_alarm_probability=1e-6", "blocks.radar.range_km=5",
+    "blocks.guidance.level=9",
 )  # fmt: skip
 
 

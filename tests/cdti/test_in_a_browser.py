@@ -94,7 +94,7 @@ def closest_m(run):
 def test_a_session_is_decided_by_its_operator_and_replays(
     browser, tmp_path, monkeypatch, key, judged, arrow, by_deg, kept
 ):
-    sets = (*SETS, "blocks.operator.turn_rate_deg_s=6")
+    sets = (*SETS, "blocks.operator.turn_rate_deg_s=6", "blocks.guidance.level=9")
     session = Session(monkeypatch, tmp_path / "run", factor="8", duration="50", sets=sets)
     screen = Screen(browser, session.address)
     page = screen.page
@@ -152,6 +152,12 @@ def alerted(browser, tmp_path_factory):
         session.stop()
         screen.close(session.authority)
         session.ended()
+
+
+def test_bands_of_guidance_are_drawn(alerted):
+    _, screen = alerted
+    low, high, region = screen.when("App.state().bands.length")["bands"][0]
+    assert region in ("FAR", "MID", "NEAR", "RECOVERY") and 0 <= low < high <= 360
 
 
 def test_names_carry_no_markup(alerted):

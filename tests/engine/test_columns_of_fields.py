@@ -21,15 +21,16 @@ COLUMNS = {
     "own_heading_rad own_pitch_rad own_roll_rad "
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2 "
-    "own_velocity_north_m_s own_velocity_east_m_s own_velocity_down_m_s",
+    "own_velocity_north_m_s own_velocity_east_m_s own_velocity_down_m_s cued",
     "fused": "target sensors azimuth_rad elevation_rad range_m angle_source range_source "
     "true_azimuth_rad true_elevation_rad true_range_m measured_s "
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2",
     "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by measured_s",
-    "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps",
+    "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps speed_mps acceleration_mps2 "
+    "vertical_speed_mps vertical_acceleration_mps2",
 }
-KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared"]}
+KINDS = {"int64": ["scan", "evaluated", "detected"], "bool": ["declared", "cued"]}
 TEXTS = ["target", "sensors", "angle_source", "range_source", "updated_by"]
 
 

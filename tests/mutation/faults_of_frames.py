@@ -155,13 +155,13 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/optical/tabulated_area.py", "wiring/test_each_target_s_own_table.py",
-        ("first-target-s-table-for-all", "np.flatnonzero(which[cells.target] == index)",
-         "np.flatnonzero(which[0 * cells.target] == index)"),
+        ("first-target-s-table-for-all", "np.flatnonzero(which[cells.craft] == index)",
+         "np.flatnonzero(which[0 * cells.craft] == index)"),
     ),
     *in_file(
         _GROUP, "components/radar/aspect_rcs.py", "wiring/test_each_target_s_own_table.py",
-        ("first-target-s-rcs-table-for-all", "which = place[cells.target]",
-         "which = place[0 * cells.target]"),
+        ("first-target-s-rcs-table-for-all", "which = place[cells.craft]",
+         "which = place[0 * cells.craft]"),
     ),
     *in_file(
         _GROUP, "components/optical/silhouette.py",

@@ -55,8 +55,8 @@ FAULTS = [
         ("elevation-down", "Elevation(elevation)", "Elevation(-elevation)"),
         ("variances-of-the-other-angle", "rows = [1, 0]", "rows = [0, 1]"),
         ("offset-not-turned", "np.stack([east, north, -down])", "np.stack([north, east, -down])"),
-        ("sensor-unturned", "rotation_offset=self.orientation(i),",
-         "rotation_offset=0.0 * self.orientation(i),"),
+        ("sensor-unturned", "\"rotation_offset\": self.orientation(i),",
+         "\"rotation_offset\": 0.0 * self.orientation(i),"),
         ("state-down", "ned[1], ned[0], -ned[2]", "ned[1], ned[0], ned[2]"),
     ),
     *in_file(

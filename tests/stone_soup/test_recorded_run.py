@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("stonesoup", reason="needs the extra stonesoup")
 
 import crooked
-from wired import chain, run
+from wired import HEARS_ALL, chain, run
 
 from components.estimation.frame import place_in_frame
 from components.export import stone_soup
@@ -164,3 +164,30 @@ def test_poses_are_the_true_ones_where_none_is_told():
                 np.array(a.measurement_model.translation_offset, dtype=float),
                 np.array(b.measurement_model.translation_offset, dtype=float), atol=1e-6,
             )  # fmt: skip
+
+
+def test_range_rates_are_those_of_both_velocities():
+    """Asked for: the model gives the rate of crooked flights, whose ownship moves as well."""
+    from stonesoup.models.measurement.nonlinear import CartesianToElevationBearingRangeRate
+
+    doppler = {**HEARS_ALL, "azimuth_resolution_deg": 0.05, "elevation_resolution_deg": 0.05,
+               "range_resolution_m": 2.0, "measures_range_rate": True,
+               "range_rate_resolution_m_s": 0.02}  # fmt: skip
+    one = run(chain({"radar": doppler}, duration_s=1, fusion={"type": "fusion.pass_through"}))
+    plain, rated = stone_soup(one), stone_soup(one, range_rates=True)
+    assert {d.measurement_model.ndim_meas for _, found in plain.detector for d in found} == {3}
+    ((_, found),) = rated.detector
+    assert len(found) == 2
+    for detection in found:
+        assert isinstance(detection.measurement_model, CartesianToElevationBearingRangeRate)
+        apart = []
+        for target in crooked.TARGETS:
+            state = np.zeros((6, 1))
+            near = [enu(target, h, rated.origin) for h in (0.0, 0.01)]
+            state[[0, 2, 4], 0], state[[1, 3, 5], 0] = near[0], (near[1] - near[0]) / 0.01
+            seen = detection.measurement_model.function(_State(state), noise=False)
+            ranges = [np.linalg.norm(crooked.body(target, h)) for h in (0.0, 0.01)]
+            rate = (ranges[1] - ranges[0]) / 0.01
+            assert float(seen[3, 0]) == pytest.approx(rate, abs=0.05)
+            apart.append(abs(float(detection.state_vector[3, 0]) - rate))
+        assert min(apart) < 0.05

@@ -48,8 +48,8 @@ def by_stone_soup(targets: int) -> tuple[int, Callable[[], object]] | None:
         when = instant(int(scans.tick[k]) / block.context.ticks_per_s)
         count = which.stop - which.start
         looks.append(
-            (when, detections(poses, [k] * count, when, scans.measured[:3, which],
-                              scans.variance[:3, which], [{} for _ in range(count)]))
+            (when, detections(poses, [k] * count, when, scans.measured[:, which],
+                              scans.variance[:, which], [{} for _ in range(count)]))
         )  # fmt: skip
     intensity, speed = block.p.acceleration_intensity_m2_s3, block.p.start_speed_m_s
 
