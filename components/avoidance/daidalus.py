@@ -44,6 +44,13 @@ class TurnOutParameters(ConfParameters):
         default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to manoeuvres that are not chosen."""
+        used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
+        keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
+        because = f"manoeuvre is '{self.manoeuvre}'"
+        return super().without_effect() + self.idle(*sorted(keys), because=because)
+
 
 class TurnOut(Component):
     """Steers the ownship by the smallest change that leads clear, when an alert is due.

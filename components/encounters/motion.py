@@ -24,7 +24,7 @@ _SLOWEST, _FASTEST = 1.7, 1116.0
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownTracks:
     """Flights of many tracks; arrays (instants, tracks).
 
     Parameters
@@ -56,7 +56,7 @@ def fly_euler(
     climb_ft_s: FloatArray,
     turn_rad_s: FloatArray,
     start_heading_rad: FloatArray | float = 0.0,
-) -> Flown:
+) -> FlownTracks:
     """Fly by steps of 1 s that take the values of the second before on their right.
 
     Parameters
@@ -77,7 +77,7 @@ def fly_euler(
     zero = np.zeros_like(speed_ft_s)
     with np.errstate(divide="ignore", invalid="ignore"):
         pitch = np.arcsin(np.clip(np.nan_to_num(climb_ft_s / speed), -1.0, 1.0))
-    return Flown(
+    return FlownTracks(
         1.0,
         summed(zero, speed * np.cos(heading)),
         summed(zero, speed * np.sin(heading)),
@@ -106,7 +106,7 @@ def fly_point_mass(
     climb_ft_s: FloatArray,
     turn_rad_s: FloatArray,
     start_heading_rad: FloatArray | float = 0.0,
-) -> Flown:
+) -> FlownTracks:
     """Fly a point mass by Euler steps of 0.1 s, from commands that are held for a second.
 
     Parameters
@@ -161,4 +161,4 @@ def fly_point_mass(
         theta = theta + STEP_S * (q * cos_phi - r * sin_phi)
         psi = psi + STEP_S * turn
         v = np.clip(v + STEP_S * a, _SLOWEST, _FASTEST)
-    return Flown(STEP_S, north, east, up, speed, heading, climb, pitch, bank)
+    return FlownTracks(STEP_S, north, east, up, speed, heading, climb, pitch, bank)

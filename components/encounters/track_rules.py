@@ -28,7 +28,7 @@ from components.encounters.model import (
     TURN,
     EncounterModel,
 )
-from components.encounters.motion import FT_S_PER_KT, Flown, fly_euler, fly_point_mass
+from components.encounters.motion import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
 from components.encounters.sampling import SampledTracks, TrackSampler
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
@@ -67,7 +67,7 @@ class Commands:
         """Return those of some tracks."""
         return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
-    def fly(self, dynamics: str) -> Flown:
+    def fly(self, dynamics: str) -> FlownTracks:
         """Return the flights, ``"euler"`` or ``"point_mass"``."""
         return DYNAMICS[dynamics](
             self.altitude_ft,
@@ -154,7 +154,7 @@ class TrackRules:
             tracks.initial[place], (len(tracks.changing), len(tracks.numbers))
         ).copy()
 
-    def accepted(self, tracks: SampledTracks, flown: Flown) -> BoolArray:
+    def accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
         """Return which flights are accepted."""
         good = self.flies(tracks, flown.climb_ft_s, flown.speed_ft_s)
         return good & self.inside(flown.up_ft)
@@ -255,7 +255,7 @@ def conditional(network: BayesNetwork, given: list[int], place: int) -> FloatArr
 
 def accepted_tracks(
     sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
-) -> Iterator[tuple[SampledTracks, Flown]]:
+) -> Iterator[tuple[SampledTracks, FlownTracks]]:
     """Give accepted tracks with their flights, in batches in order of their numbers.
 
     Raises

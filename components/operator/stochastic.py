@@ -48,6 +48,15 @@ class StochasticParameters(ConfParameters):
         default=2.54, gt=0, description="Vertical speed of climbs and descents, m/s."
     )
 
+    def without_effect(self) -> list[str]:
+        """Say which rate belongs to manoeuvres that are never made."""
+        said = super().without_effect()
+        if self.turn_share == 0.0:
+            said += self.idle("turn_rate_deg_s", because="turn_share is 0")
+        if self.turn_share == 1.0:
+            said += self.idle("vertical_rate_mps", because="turn_share is 1")
+        return said
+
 
 class Mind(NamedTuple):
     """What an operator has in mind, in one replica.

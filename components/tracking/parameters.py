@@ -101,6 +101,21 @@ class TrackerParameters(Parameters):
             )
         return self
 
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to an association, a rule or a lateness that is not chosen."""
+        said = super().without_effect()
+        if self.association != "jpda":
+            because = f"association is '{self.association}'"
+            said += self.idle("jpda_exact_detections", because=because)
+        unused = {
+            "m_of_n": ("false_confirmation", "missed_confirmation"),
+            "likelihood_ratio": ("confirm_m", "confirm_n"),
+        }
+        said += self.idle(*unused[self.initiation], because=f"initiation is '{self.initiation}'")
+        if self.late == "drop":
+            said += self.idle("lag_s", because="late is 'drop'")
+        return said
+
     def life(self) -> LifeRules:
         """Return the rules of a track's life."""
         return LifeRules(

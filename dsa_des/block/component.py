@@ -8,135 +8,28 @@ scans, or as its own SimPy process. In the first two the engine calls `Component
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
-
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainSerializer,
-    ValidationInfo,
-    field_validator,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from dsa_des.block.effect import Effect
 from dsa_des.block.ladder import Ladder
-from dsa_des.block.limits import refuse_extremes
 from dsa_des.block.mark import Mark
 from dsa_des.block.message import Message
+from dsa_des.block.parameters import ClockedParameters as ClockedParameters
+from dsa_des.block.parameters import NonNegativeRational as NonNegativeRational
+from dsa_des.block.parameters import Parameters as Parameters
+from dsa_des.block.parameters import PositiveRational as PositiveRational
+from dsa_des.block.parameters import Rational as Rational
+from dsa_des.block.parameters import ScenePath as ScenePath
+from dsa_des.block.parameters import SourcedText as SourcedText
+from dsa_des.block.parameters import as_written as as_written
 from dsa_des.block.ports import Input, Output
 from dsa_des.errors import did_you_mean
-from dsa_des.files.input_files import resolve_home
-from dsa_des.time.clock import ClockSpec, parse_rational
+from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Stream, Streams
 
 if TYPE_CHECKING:
     from dsa_des.block.replica_runs import ReplicaRuns, Runner
     from dsa_des.block.wake import Wake
-
-
-def as_written(value: Fraction) -> int | float | str:
-    """Return an exact number the way a scene would hold it."""
-    if value.denominator == 1:
-        return int(value)
-    return float(value) if Fraction(repr(float(value))) == value else str(value)
-
-
-def _in_words(value: Any) -> str:
-    """Return a parameter's value as a sentence holds it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        return f"{value:g}"
-    return str(as_written(value)) if isinstance(value, Fraction) else repr(value)
-
-
-#: An exact rate or time: a number or text such as "30000/1001".
-Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(as_written)]
-PositiveRational = Annotated[Rational, Field(gt=0)]
-NonNegativeRational = Annotated[Rational, Field(ge=0)]
-
-
-class SourcedText(str):
-    """Text that remembers the folder of the file it was written in."""
-
-    __slots__ = ("folder",)
-    folder: Path
-
-    @classmethod
-    def of(cls, text: str, folder: Path) -> "SourcedText":
-        """Return `text` as written in a file of `folder`."""
-        result = cls(text)
-        result.folder = folder
-        return result
-
-
-def _resolve_path(value: object) -> Path:
-    if not isinstance(value, str | Path) or not str(value):
-        raise ValueError("must be a path, as text")
-    path = resolve_home(str(value))
-    if isinstance(value, SourcedText) and not path.is_absolute():
-        path = value.folder / path
-    return path
-
-
-#: A path; a relative one is taken from the folder of the file that holds the key.
-ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(str)]
-
-
-class Parameters(BaseModel):
-    """Parameters of a block: every field has its unit in its name, bounds and a description."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
-
-    @field_validator("*", mode="after")
-    @classmethod
-    def _computable(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuse numbers that no physics can compute with (`dsa_des.block.limits`)."""
-        refuse_extremes(info.field_name or "", value)
-        return value
-
-    def without_effect(self) -> list[str]:
-        """Say which keys were given a value that changes nothing, and because of what."""
-        return []
-
-    def idle(self, *keys: str, because: str) -> list[str]:
-        """Return one sentence for each of some keys that is not at its default.
-
-        Parameters
-        ----------
-        *keys : str
-            That have no effect.
-        because : str
-            Which value of another key makes them so.
-        """
-        fields = type(self).model_fields
-        return [
-            f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"
-            for key in keys
-            if getattr(self, key) != fields[key].default
-        ]
-
-
-class ClockedParameters(Parameters):
-    """Parameters of a block with a scan clock of its own."""
-
-    scan_rate_hz: PositiveRational = Field(description="Scans per second; number or '30000/1001'.")
-    offset_s: NonNegativeRational = Field(
-        default=Fraction(0), description="Time of the first scan, s."
-    )
-    rate_error_ppm: Rational = Field(
-        default=Fraction(0), le=1_000_000, description="Error of the scan rate, parts per million."
-    )
-    jitter_s: float = Field(
-        default=0.0, ge=0, description="Standard deviation of scan instants about their grid, s."
-    )
-
-    def clock_spec(self) -> ClockSpec:
-        """Return the clock these parameters describe."""
-        return ClockSpec(self.scan_rate_hz, self.offset_s, self.rate_error_ppm, self.jitter_s)
 
 
 @dataclass(frozen=True)

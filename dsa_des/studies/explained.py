@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.errors import BlockFailure, SceneError
@@ -22,6 +22,7 @@ from dsa_des.replicas.replicas import scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.labels import short
+from dsa_des.studies.record import StrictRecord
 from dsa_des.studies.safe_files import read_regular
 from dsa_des.studies.study_checks import one_per_value
 
@@ -36,11 +37,7 @@ _MOST_CELLS = 12
 _MOST_BYTES = 16 * 2**20
 
 
-class _StrictPart(BaseModel):
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
-
-
-class ModelRecord(_StrictPart):
+class ModelRecord(StrictRecord):
     """A block: its type, what that is, and the rungs of accuracy that it stands on."""
 
     block: str
@@ -50,7 +47,7 @@ class ModelRecord(_StrictPart):
     rungs: list[str]
 
 
-class EffectRecord(_StrictPart):
+class EffectRecord(StrictRecord):
     """An effect that is simulated or left out, and because of what."""
 
     block: str
@@ -61,7 +58,7 @@ class EffectRecord(_StrictPart):
     bound: dict[str, float] = {}
 
 
-class SceneRecord(_StrictPart):
+class SceneRecord(StrictRecord):
     """The scene of a cell; of cells after the first, only what is not so in the first."""
 
     where: str
@@ -71,7 +68,7 @@ class SceneRecord(_StrictPart):
     spared: list[tuple[str, str]]
 
 
-class Explained(_StrictPart):
+class Explained(StrictRecord):
     """What a study's runs are made of."""
 
     versions: dict[str, str]

@@ -27,11 +27,13 @@ _Marker = Literal["o", "s", "D", "d", "^", "v", "<", ">", "P", "X", "p", "h", "8
 _Label = str | int | float
 
 
-class _Strict(BaseModel):
+class StrictRecord(BaseModel):
+    """What a file of ours holds: nothing is converted, and a number is finite."""
+
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
 
-class AxisRecord(_Strict):
+class AxisRecord(StrictRecord):
     """An axis: its column, its values, and what each changes in the scene, as texts."""
 
     column: str
@@ -44,7 +46,7 @@ class AxisRecord(_Strict):
     swaps: list[list[tuple[str, str]]]
 
 
-class DrawRecord(_Strict):
+class DrawRecord(StrictRecord):
     """A drawn value: its key in the scene, its column, and whether it is a number."""
 
     key: str
@@ -52,7 +54,7 @@ class DrawRecord(_Strict):
     numeric: bool
 
 
-class RatioRecord(_Strict):
+class RatioRecord(StrictRecord):
     """Columns of a ratio; see `RatioOf`."""
 
     below: str
@@ -62,7 +64,7 @@ class RatioRecord(_Strict):
     only: tuple[str, str] | None = None
 
 
-class ResultRecord(_Strict):
+class ResultRecord(StrictRecord):
     """A result of a metric; see `Result`."""
 
     name: str
@@ -75,14 +77,14 @@ class ResultRecord(_Strict):
     ratio: RatioRecord | None = None
 
 
-class StopRecord(_Strict):
+class StopRecord(StrictRecord):
     """When a cell had enough replicas."""
 
     metric: str
     half_width: float
 
 
-class FigureRecord(_Strict):
+class FigureRecord(StrictRecord):
     """A figure; see `read_figures`."""
 
     kind: Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series", "run"]
@@ -98,7 +100,7 @@ class FigureRecord(_Strict):
     replica: _Whole = 0
 
 
-class RequirementRecord(_Strict):
+class RequirementRecord(StrictRecord):
     """A limit on a result; see `Requirement`."""
 
     metric: str
@@ -108,7 +110,7 @@ class RequirementRecord(_Strict):
     cheap_last: bool = False
 
 
-class StudyHead(_Strict):
+class StudyHead(StrictRecord):
     """Which study a folder holds."""
 
     #: The study's file.

@@ -44,7 +44,7 @@ def test_two_files_of_one_aircraft_are_an_encounter(tmp_path: Path) -> None:
             e, n, _ = pymap3d.geodetic2enu(lat, lon, 0, -41.3, 179.9997, 0)
             assert (time_s[k], up[k]) == pytest.approx((t, alt * FT))
             assert (north[k], east[k]) == pytest.approx((n, e), abs=1e-6)
-    # Flown again, they are where the file says.
+    # FlownTracks again, they are where the file says.
     own, other = found.flights(0)
     lat = other.at(np.array([2.0])).lat_deg[0]
     assert lat == pytest.approx(-41.30, abs=2e-7)

@@ -550,8 +550,6 @@ FAULTS = [
     *in_file(
         _GROUP, "components/track_fusion/covariance_intersection.py",
         (_FUSED, "track_fusion/test_same_bytes_of_fused_tracks.py"),
-        ("frame-of-the-last-tracker", "if row[entry] < first[place]:",
-         "if row[entry] <= first[place]:"),
         ("silent-tracks-stay", "when - local.updated_s > self.p.drop_after_s",
          "when - local.updated_s > 1e9"),
         ("not-carried-on", "found = fused_states(mine, when, ",
@@ -577,6 +575,12 @@ FAULTS = [
         ("bearings-at-another-instant", "then[:3] += back_s * state[3:]",
          "then[:3] += 0.0 * state[3:]"),
         ("once-together-always", "share > rules.stay_factor**2", "share > np.inf"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/tracker.py", _CUES,
+        ("one-step-s-memory-of-all-replicas",
+         'goes_side_by_side() and self.p.late == "drop"',
+         'goes_side_by_side() and self.p.late != "rerun"'),
     ),
     *in_file(
         "clocks", "dsa_des/running/rewind.py", "tracking/test_cued_declaration.py",

@@ -137,6 +137,16 @@ def test_a_camera_s_direction_narrows_a_radar_s_track():
     assert told["has_range"] is False and told["north_m"] is None
 
 
+def test_a_direction_is_compared_at_its_own_instant():
+    """A camera that looks seldom: the line of sight turns by degrees until the next look."""
+    sensors = {"radar": {**FINE, "scan_rate_hz": 4}, "camera": {**CAMERA, "scan_rate_hz": 0.5}}
+    near = {**NEAR, "confirm_m": 1, "confirm_n": 1}
+    found = of(distributed(sensors, duration_s=6, tracker=near, stay_factor=1.0), "fused")
+    both = [row for row in found if row["contributors"] == "radar+camera"]
+    assert both[-1]["time_s"] == 5.75
+    assert {row["track"] for row in found if row["time_s"] > 2.0} == {both[-1]["track"]}
+
+
 @covers("gate_probability", "stay_factor", of=(KIND,))
 def test_tracks_beyond_the_gate_are_two_and_stay_one_within_the_wider():
     sensors = {"fast": FINE, "slow": OTHER}

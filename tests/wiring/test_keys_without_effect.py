@@ -1,6 +1,7 @@
 """A key that changes nothing is warned of by its name, and all that keys disagree about is said."""
 
 import pytest
+from test_avoidance_by_bands import scene as by_bands
 from wired import HEARS_ALL, chain, run, sensor
 
 import dsa_des
@@ -69,6 +70,45 @@ def test_a_key_that_changes_nothing_is_warned_of(table, sections, key, because):
     (line,) = told(table, **sections)
     assert key in line and because in line
     assert sections or line.startswith("blocks.s: ")
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "key"),
+    [
+        ("tracking.ekf", {"jpda_exact_detections": 4}, "jpda_exact_detections is 4"),
+        ("tracking.ekf", {"false_confirmation": 1e-3}, "false_confirmation is 0.001"),
+        ("tracking.imm", {"initiation": "likelihood_ratio", "confirm_m": 2}, "confirm_m is 2"),
+        ("tracking.ukf", {"lag_s": 2.5}, "lag_s is 2.5"),
+    ],
+)
+def test_keys_of_trackers_that_change_nothing_are_warned_of(kind, keys, key):
+    scene = chain({"s": sensor("radar.range_boundary", errors="stated", azimuth_error_deg=1.0,
+                               elevation_error_deg=1.0, range_error_m=9.0)},
+                  fusion={"type": "fusion.pass_through"},
+                  tracker={"type": kind, **keys})  # fmt: skip
+    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    (line,) = (line for line in found if "it has no effect" in line)
+    assert line.startswith(f"blocks.tracker: {key}")
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "key"),
+    [
+        ("avoidance.daidalus", {"beyond_m": 50.0}, "beyond_m is 50"),
+        ("avoidance.daidalus", {"manoeuvre": "climb", "beyond_deg": 5.0}, "beyond_deg is 5"),
+        ("operator.stochastic", {"turn_share": 0.0, "turn_rate_deg_s": 2.0},
+         "turn_rate_deg_s is 2"),
+        ("operator.stochastic", {"turn_share": 1.0, "vertical_rate_mps": 5.0},
+         "vertical_rate_mps is 5"),
+    ],
+)  # fmt: skip
+def test_keys_of_manoeuvres_that_are_not_made_are_warned_of(kind, keys, key, tmp_path):
+    scene = by_bands(tmp_path)
+    conf = scene["blocks"]["avoidance"]["conf"]
+    scene["blocks"]["avoidance"] = {"type": kind, "conf": conf, **keys}
+    found = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    (line,) = (line for line in found if "it has no effect" in line)
+    assert line.startswith(f"blocks.avoidance: {key}")
 
 
 def test_keys_that_have_an_effect_are_not_warned_of():
