@@ -70,8 +70,8 @@ def _whole_path(path: Path) -> str:
     return os.path.abspath(path)
 
 
-#: A path; a relative one is taken from the folder of the file that holds the key. Written out, it is
-#: whole.
+#: A path; a relative one is taken from the folder of the file that holds the key. Written out, it
+#: is whole.
 ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(_whole_path)]
 
 
