@@ -151,10 +151,11 @@ class _Maker:
                     if table["type"] == "tracking.stub" and name not in heard]  # fmt: skip
         for name in trackers:
             self.blocks[name] = random_blocks.estimating_tracker(dice)
-            self.dice.features |= {"tracker that estimates", *dice.features}
+            self.dice.features.add("tracker that estimates")
             for wire in self.wires:
                 if wire["to"] == name and dice.chance(0.6, "fusion.pass_through"):
                     self.blocks[wire["from"]] = {"type": "fusion.pass_through"}
+        self.dice.features |= dice.features
         for table in self.blocks.values() if trackers else ():
             if table["type"].startswith(("radar.", "optical.range")):
                 for key in ("azimuth_resolution_deg", "elevation_resolution_deg"):
