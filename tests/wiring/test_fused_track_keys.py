@@ -158,8 +158,8 @@ def test_a_fused_state_is_that_of_a_computation_by_hand(rule):
 
 
 def test_directions_alone_are_those_of_the_newest_in_the_axes_of_the_first():
-    sensors = {"one": {**CAMERA, "scan_rate_hz": 1}, "two": {**CAMERA, "scan_rate_hz": 0.8, "offset_s": 0.7,
-                                      "elevation_pixels": 900}}  # fmt: skip
+    other = {**CAMERA, "scan_rate_hz": 0.8, "offset_s": 0.7, "elevation_pixels": 900}
+    sensors = {"one": {**CAMERA, "scan_rate_hz": 1}, "two": other}
     found = distributed(sensors, ownship=BY_THE_POLE, tracker=NEAR, bearing_rate_deg_s=10.0,
                         delays={"two_tracks": 0.1})  # fmt: skip
     fused = [r for r in of(found, "fused") if r["contributors"] == "one+two"]
@@ -305,8 +305,10 @@ def test_who_helped_is_remembered_and_who_helped_last_is_told():
     found = distributed(sensors, targets=[away], duration_s=10, drop_after_s=2.0)
     last = of(found, "fused")[-1]
     assert (last["contributors"], last["updated_by"]) == ("fast+near", "fast")
-    scene = chain({"fast": FINE, "slow": OTHER}, targets=(crooked.ROLLING,), duration_s=4,
-                  fusion={"type": "fusion.pass_through"}, tracker={"type": "tracking.ekf"})  # fmt: skip
+    scene = chain({"fast": FINE, "slow": OTHER}, targets=(crooked.ROLLING,), duration_s=4)
+    scene["blocks"]["looks"] = {"type": "fusion.pass_through"}
+    scene["blocks"]["tracker"] = {"type": "tracking.ekf"}
+    scene["wires"] += ["fast -> looks -> tracker", "slow -> looks"]
     scene["blocks"]["fused"] = {"type": KIND}
     scene["wires"].append("tracker -> fused")
     fused = of(rows(run(scene), "state_tracks"), "fused", contributors="fast+slow")
