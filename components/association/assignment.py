@@ -75,7 +75,8 @@ def _solved(
 
     tracks, row = np.unique(track, return_inverse=True)
     detections, column = np.unique(detection, return_inverse=True)
-    never = 1e3 * float(price.max()) + float(np.abs(distance).sum())
+    # Costs may be negative, and so may prices: more than all that can be saved.
+    never = 1.0 + 2.0 * float(np.abs(distance).sum() + np.abs(price).sum())
     cost = np.full((len(tracks), len(detections) + len(tracks)), never)
     cost[row, column] = distance
     alone_price = np.zeros(len(tracks))

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Pictures are sent no closer together than this, wall seconds.
 FRAME_S = 0.015
+#: Of the time between two of them, making one takes no more than this share: the rest is for the
+#: simulation, which many contacts would otherwise slow.
+_SHARE = 0.2
 #: A page that is gone for so long is not being reloaded, s.
 GONE_S = 3.0
 _LOG = 200
@@ -54,6 +57,9 @@ class SessionCrew:
         self._now = (0.0, 0.0)
         self._shown_at = -math.inf
         self._named = 0
+        #: How long the last picture took to be made, s, and the one of which instant it was.
+        self._made_s = 0.0
+        self._made: tuple[float, dict[str, Any]] | None = None
         #: What became of each decision, by the page's number for it.
         self._answers: dict[str, dict[str, Any]] = {}
         self._log: list[dict[str, Any]] = []
@@ -83,7 +89,7 @@ class SessionCrew:
             self._named = len(self.scope.names)
             self._server.tell({"type": "names", "names": self.scope.names})
         wall_s = time.perf_counter()
-        if wall_s - self._shown_at >= FRAME_S:
+        if wall_s - self._shown_at >= max(FRAME_S, self._made_s / _SHARE):
             self._shown_at = wall_s
             self._server.show()
 
@@ -119,17 +125,25 @@ class SessionCrew:
         }
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
-        """Return the newest picture."""
-        if self.scope is None:
+        """Return the newest picture; but for the camera's it is the same for all pages."""
+        scope = self.scope
+        if scope is None:
             return None
+        began = time.thread_time()
         time_s, lag_s = self._now
-        return {
+        if self._made is None or self._made[0] != time_s:
+            self._made = time_s, scope.picture(time_s)
+        picture = self._made[1]
+        content = {
             "type": "frame",
             "t": round(time_s, 4),
             "lag": round(lag_s, 4),
             "operators": self._operators,
-            **self.scope.picture(time_s, chosen),
+            **picture,
+            "camera": scope.camera(picture, time_s, chosen),
         }
+        self._made_s = time.thread_time() - began
+        return content
 
     async def said(self, page: "Page", message: PageMessage) -> None:
         """Take in what a page said."""

@@ -35,6 +35,7 @@ FORGOTTEN_S = 10.0
 BANDS_LAST_S = 1.5
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
+_UNKNOWN = (None, None, None)
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class Scope:
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
         self._bands: tuple[float, GuidanceBands] | None = None
+        #: What was made of the latest alerts, for as long as they are the latest.
+        self._looked: tuple[_Alerts, Any, Any, Any] | None = None
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
@@ -151,34 +154,24 @@ class Scope:
         """Return a contact's name as the run has it; empty for none, None if there is none."""
         return contact_name(self._names, contact)
 
-    def picture(self, time_s: float, chosen: int) -> dict[str, Any]:
-        """Return what is shown at an instant, for JSON: m, deg, s, north and east of the ownship.
-
-        Parameters
-        ----------
-        time_s : float
-        chosen : int
-            The target whose camera picture is wanted; -1 leaves it to the display.
-        """
+    def picture(self, time_s: float) -> dict[str, Any]:
+        """Return what is shown at an instant, for JSON: m, deg, s; from the ownship."""
         own = self._own.now
         if own is None:
-            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": [],
-                    "camera": None}  # fmt: skip
+            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": []}
         alerts, contacts = self._alerts, self._contacts
         shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
         if alerts is not None:
-            flights = _flights(alerts)
-            said = self._said(alerts)
-            area = self._area(alerts)
+            if self._looked is None or self._looked[0] is not alerts:
+                self._looked = alerts, _flights(alerts), self._said(alerts), self._area(alerts)
+            _, flights, said, area = self._looked
         level = {one["target"]: one["level"] for one in said}
         for one in shown:
-            one += flights.get(one[0], [None, None, None])
+            one += flights.get(one[0], _UNKNOWN)
             one.append(level.get(one[0], 0))
-        if chosen < 0:
-            chosen = said[0]["target"] if said else (shown[0][0] if shown else -1)
         return {
             "own": {
                 "heading": round(math.degrees(own.heading_rad) % 360.0, 3),
@@ -190,8 +183,29 @@ class Scope:
             "alerts": said,
             "area": area,
             "bands": self._directions(time_s),
-            "camera": self._sights.picture(chosen, self._toward(chosen), time_s, own),
         }
+
+    def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
+        """Return the camera's picture of a contact that is shown, or None where there is none.
+
+        Parameters
+        ----------
+        picture : dict
+            From `picture`.
+        time_s : float
+        chosen : int
+            -1 takes the most urgent one.
+        """
+        own = self._own.now
+        if own is None:
+            return None
+        if chosen < 0:
+            first = [one["target"] for one in picture["alerts"][:1]]
+            first += [one[0] for one in picture["contacts"][:1]]
+            if not first:
+                return None
+            chosen = first[0]
+        return self._sights.picture(chosen, self._toward(chosen), time_s, own)
 
     def _directions(self, time_s: float) -> list[list[Any]]:
         """Return the bands of direction as [from, to, region], deg clockwise from north."""

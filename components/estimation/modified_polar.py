@@ -25,8 +25,11 @@ from components.estimation.batched import (
 )
 from dsa_des.arrays.types import FloatArray
 
-# Tracks without a range are kept between these.
+# Tracks are kept between these.
 _NEAREST_M, _FARTHEST_M = 1.0, 1e7
+# An inverse range is never below 0: the least is the mean of one that is all but 0, in units of its
+# standard deviation, sqrt(2 / pi). Less of it would have spreads far beyond the range.
+_LEAST = 0.8
 # A line of sight steeper than this (sine of its distance from the vertical) is turned about north.
 _UPRIGHT = 0.1
 
@@ -124,7 +127,10 @@ def _moved(
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return what a change of polar coordinates makes of state and covariance."""
-    inverse = np.clip(1.0 / distance + change[2], 1.0 / _FARTHEST_M, 1.0 / _NEAREST_M)
+    row = to_polar[2:3]
+    spread = product_transposed(product(row, covariance[:6, :6]), row)[0, 0]
+    least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)
+    inverse = np.minimum(np.maximum(1.0 / distance + change[2], least), 1.0 / _NEAREST_M)
     by_range = by_range + change[3:]
     turned = _turned(axes, change[0], change[1])
     moved = state.copy()

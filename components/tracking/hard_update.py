@@ -36,12 +36,11 @@ def updated_by_one(
     elif rules.association == "nearest":
         taken = nearest(track, entry, distance)
     else:
-        volume = np.concatenate([_log_volume(one) for one in kinds])
-        if len(kinds) > 1:  # what is measured differs: compare with false alarms of the kind
-            volume = volume + np.concatenate(
-                [2.0 * log_density(rules, one, sensors) + one.kind.size * _LOG_2_PI
-                 for one in kinds]
-            )  # fmt: skip
+        # Kinds measure different things: what all compare with are false alarms of their kind.
+        volume = np.concatenate(
+            [_log_volume(one) + 2.0 * log_density(rules, one, sensors) + one.kind.size * _LOG_2_PI
+             for one in kinds]
+        )  # fmt: skip
         sizes = np.concatenate([np.full(len(one.track), len(one.said.residuals[0]))
                                 for one in kinds])  # fmt: skip
         limits = np.zeros(5)

@@ -37,6 +37,8 @@ from dsa_des.block.component import Component
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Wake
 
+#: Bits of a mask of sensors.
+MOST_SENSORS = 62
 # What a sensor that tells no reach is taken to see: all around, as far as this.
 _FARTHEST_M = 20_000.0
 _WHOLE_RATE_M_S = 600.0
@@ -74,8 +76,14 @@ class Tracker(Component):
         Raises
         ------
         ValueError
-            If a sensor measures an angle or a range exactly: its weight would be infinite.
+            If a sensor measures an angle or a range exactly: its weight would be infinite. If there
+            are more sensors than a mask has bits.
         """
+        if len(self._offers()) > MOST_SENSORS:
+            raise ValueError(
+                f"a tracker takes at most {MOST_SENSORS} sensors, and {len(self._offers())} lead "
+                "to it: let several trackers share them"
+            )
         for name, offer in sorted(self._offers().items()):
             for column, key in _EXACT.items():
                 if isinstance(offer, SensorOffer) and getattr(offer, column) == 0.0:

@@ -1,5 +1,6 @@
 """Parameters of blocks and of a scene's tables: exact numbers, paths, and keys that do nothing."""
 
+import os
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any
@@ -64,8 +65,14 @@ def _resolve_path(value: object) -> Path:
     return path
 
 
-#: A path; a relative one is taken from the folder of the file that holds the key.
-ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(str)]
+def _whole_path(path: Path) -> str:
+    # A run's own scene.toml lies elsewhere: what it names must be found from there too.
+    return os.path.abspath(path)
+
+
+#: A path; a relative one is taken from the folder of the file that holds the key. Written out, it
+#: is whole.
+ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(_whole_path)]
 
 
 class Parameters(BaseModel):

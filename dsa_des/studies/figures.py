@@ -26,7 +26,7 @@ _MOST_NAMES = 60
 Target = Path | BinaryIO
 
 
-class Places:
+class SummaryPlaces:
     """Lines of a summary by axis value.
 
     Parameters
@@ -69,7 +69,7 @@ class Places:
 
 def draw_axis(
     path: Target,
-    places: Places,
+    places: SummaryPlaces,
     metric: str,
     axis: str,
     by: str | None,
@@ -186,7 +186,7 @@ def _differences(
     axes: Any,
     shown: Sequence[Compared],
     where: dict[Any, float],
-    places: Places,
+    places: SummaryPlaces,
     axis: str,
     confidence: float,
 ) -> None:
@@ -227,7 +227,7 @@ def _signed(value: float) -> str:
     return ("+" if value > 0 else "") + _digits(value)
 
 
-def draw_heat(path: Target, places: Places, metric: str, x: str, y: str, title: str) -> None:
+def draw_heat(path: Target, places: SummaryPlaces, metric: str, x: str, y: str, title: str) -> None:
     """Draw a result over two axes; values of further axes are averaged."""
     across, up = places.axes.index(x), places.axes.index(y)
     lines = places.of(metric)
@@ -267,7 +267,7 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
-def draw_polar(path: Target, places: Places, metric: str, axis: str, title: str) -> None:
+def draw_polar(path: Target, places: SummaryPlaces, metric: str, axis: str, title: str) -> None:
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     place = places.axes.index(axis)
     with drawing(6.2, 6.0, path) as figure:

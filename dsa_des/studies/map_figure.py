@@ -7,7 +7,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.drawing import drawing, figure_text, tight
-from dsa_des.studies.figures import Places, Target
+from dsa_des.studies.figures import SummaryPlaces, Target
 from dsa_des.studies.labels import axis_label, readable, value_label
 from dsa_des.studies.summary import Line
 
@@ -16,8 +16,8 @@ _PARTS = ("value", "low", "high")
 
 
 def draw_map(
-    path: Target, places: Places, metric: str, x: str, y: str, limits: Sequence[float], title: str,
-    confidence: float,
+    path: Target, places: SummaryPlaces, metric: str, x: str, y: str, limits: Sequence[float],
+    title: str, confidence: float,
 ) -> None:  # fmt: skip
     """Draw a result over two axes; solid contours are of its estimate, dashed ones of its interval.
 
@@ -27,7 +27,7 @@ def draw_map(
     Parameters
     ----------
     path : Target
-    places : Places
+    places : SummaryPlaces
     metric, x, y : str
     limits : sequence of float
         What contours are drawn of.

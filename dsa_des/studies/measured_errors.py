@@ -4,21 +4,22 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ConfigDict, ValidationError
 
 from dsa_des.costs.scene_errors import scene_errors
 from dsa_des.costs.variants import Variants
 from dsa_des.studies.folder import StudyFolder
+from dsa_des.studies.record import StrictRecord
 from dsa_des.studies.safe_files import read_regular
 
 ERRORS = "errors.json"
 _MOST_BYTES = 4 * 2**20
 
 
-class ErrorRecord(BaseModel):
-    """How far the model of a block is off in one quantity, over target-scans."""
+class ErrorRecord(StrictRecord):
+    """How far the model of a block is off in one quantity, over target-scans; NaN where unknown."""
 
-    model_config = ConfigDict(strict=True, frozen=True)
+    model_config = ConfigDict(allow_inf_nan=True)
 
     block: str
     ladder: str
@@ -32,10 +33,8 @@ class ErrorRecord(BaseModel):
     against: str
 
 
-class MeasuredErrors(BaseModel):
+class MeasuredErrors(StrictRecord):
     """Errors of the models of one run, and of what nothing could be measured."""
-
-    model_config = ConfigDict(strict=True, frozen=True)
 
     command: str
     rows: list[ErrorRecord]

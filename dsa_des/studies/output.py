@@ -13,7 +13,7 @@ from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.replicas import scene_of
 from dsa_des.studies.cheapest import Answer, answers, one_sided
 from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
-from dsa_des.studies.figures import Places, draw_axis, draw_heat, draw_polar, draw_scatter
+from dsa_des.studies.figures import SummaryPlaces, draw_axis, draw_heat, draw_polar, draw_scatter
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.labels import short, value_label
@@ -73,8 +73,9 @@ class Tables:
             axis, value = record.compare
             self.baseline = axis, float(value) if isinstance(value, int) else value
             self.compared = compare_axis(
-                self.rows, *self.baseline, self.results, record.confidence, record.interval
-            )
+                self.rows, *self.baseline, self.results, record.confidence, record.interval,
+                record.compare_weight,
+            )  # fmt: skip
 
     def _earlier(self) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers that the folder's summary holds."""
@@ -222,6 +223,17 @@ class Tables:
             "only_baseline": [item.difference.only_first for item in items],
             "only_value": [item.difference.only_second for item in items],
         }
+        ratios = [item.ratio for item in items]
+        columns |= {
+            "ratio": [None if r is None else r.ratio for r in ratios],
+            "ratio_low": [None if r is None else r.interval[0] for r in ratios],
+            "ratio_high": [None if r is None else r.interval[1] for r in ratios],
+            "unresolved": [None if r is None else r.unresolved for r in ratios],
+            "induced": [None if r is None else r.induced for r in ratios],
+            "effective_sample_size": [
+                None if r is None else r.effective_sample_size for r in ratios
+            ],
+        }
         return columns
 
     def draw(self, only: Sequence[str] = ()) -> list[Path]:
@@ -252,7 +264,7 @@ class Tables:
         if figure.kind == "series":
             return self._draw_series(target, figure)
         categories = {axis.column for axis in self.record.axes if axis.category}
-        places = Places(self.rows.axes, self.lines, categories)
+        places = SummaryPlaces(self.rows.axes, self.lines, categories)
         shown = (figure.axis, figure.x, figure.y)
         if not places.axes or any(name not in places.axes for name in shown if name is not None):
             return False

@@ -7,7 +7,7 @@ from dsa_des.studies.cheapest import Answer, one_sided
 from dsa_des.studies.labels import short
 from dsa_des.studies.output import Tables, cut_off_text
 from dsa_des.studies.statistics import Estimate
-from dsa_des.studies.summary import Line
+from dsa_des.studies.summary import Compared, Line
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
 
@@ -187,6 +187,30 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         )  # fmt: skip
     title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
     print_table(console, title, heads, rows, group=1 + len(others))
+    if tables.record.compare_weight is not None:
+        _show_event_ratios(console, tables, shown)
+
+
+def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) -> None:
+    """Print how often events happen, by how often at the baseline, weighted."""
+    assert tables.baseline is not None
+    axis, baseline = tables.baseline
+    others = [name for name in tables.rows.axes if name != axis]
+    rows = [
+        [short(item.value), *map(short, item.at), item.result.name, short(item.ratio.ratio),
+         f"{short(item.ratio.interval[0])} to {short(item.ratio.interval[1])}"
+         + (" *" if item.ratio.few else ""),
+         short(item.ratio.unresolved), short(item.ratio.induced),
+         f"{item.ratio.effective_sample_size:.1f} of {item.ratio.encounters}", item.ratio.reason]
+        for item in shown[:_MOST_SHOWN] if item.ratio is not None
+    ]  # fmt: skip
+    if rows:
+        console.print()
+        title = f"events by those at {shortened(axis)} = {short(baseline)}, weighted by "
+        heads = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
+                 "effective size", ""]  # fmt: skip
+        print_table(console, title + str(tables.record.compare_weight), heads, rows,
+                    group=1 + len(others))  # fmt: skip
 
 
 def interval_text(estimate: Estimate) -> str:

@@ -144,6 +144,7 @@ class StudyRecord(StudyHead):
     interval: Literal["t", "bootstrap"]
     figures: list[FigureRecord]
     requirements: list[RequirementRecord] = []
+    compare_weight: str | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> "StudyRecord":
@@ -172,6 +173,9 @@ class StudyRecord(StudyHead):
                 raise ValueError("a polar figure needs numbers")
             if figure.kind != "run" and figure.metric is None:
                 raise ValueError("a figure needs a metric")
+        numbers = {result.name for result in self.results if result.kind == "number"}
+        if self.compare_weight is not None and self.compare_weight not in numbers:
+            raise ValueError("compare names no number as its weight")
         if any(item.axis not in axes for item in self.requirements):
             raise ValueError("a requirement names no axis")
         return self
@@ -308,6 +312,7 @@ def record_text(study: Study, digest: str) -> str:
         "sets": [(key, set_text(value)) for key, value in study.sets],
         "swaps": study.swaps,
         "compare": study.baseline,
+        "compare_weight": study.compare_weight,
         "stop_when": None if study.stop_when is None else vars(study.stop_when),
         "confidence": study.confidence,
         "interval": study.interval,

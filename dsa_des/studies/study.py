@@ -142,6 +142,8 @@ class Study:
     interval : {"t", "bootstrap"}
     figures : tuple of dict
     requirements : tuple of Requirement
+    compare_weight : str, optional
+        The result that weighs units where events are compared.
     runs_per_chunk : int
     base : SceneFile
         The scene's tables.
@@ -169,6 +171,7 @@ class Study:
     base: SceneFile
     tables: dict[str, Any]
     requirements: tuple[Requirement, ...] = ()
+    compare_weight: str | None = None
 
     @property
     def cells(self) -> StudyCells:

@@ -126,6 +126,10 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
     if study.stop_when and study.stop_when.metric not in names:
         message = f"no metric of the study gives it{did_you_mean(study.stop_when.metric, names)}"
         add(("stop_when", "metric"), message, study.stop_when.metric)
+    weight = study.compare_weight
+    if weight is not None and (weight not in results or results[weight].kind != NUMBER):
+        message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
+        add(("compare", "weight"), message, weight)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
             message = f"no metric of the study gives it{did_you_mean(wanted.metric, names)}"

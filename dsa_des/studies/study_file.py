@@ -157,6 +157,7 @@ class _StudyReader:
             figures=read_figures(
                 self.data.get("figures", []), axes, replicas, self.column, self.add
             ),
+            compare_weight=self.compare_weight(),
             requirements=read_requirements(
                 self.data.get("requirements", []), axes, self.column, self.add
             ),
@@ -279,8 +280,10 @@ class _StudyReader:
         if table is None:
             first = next((axis for axis in axes if axis.key.startswith("swap.")), None)
             return None if first is None else (first.column, first.labels[0])
-        if not isinstance(table, dict) or set(table) != {"axis", "baseline"}:
-            self.add(("compare",), "must be a table {axis = KEY, baseline = VALUE}")
+        known = {"axis", "baseline"}
+        if not isinstance(table, dict) or not known <= set(table) <= {*known, "weight"}:
+            message = "must be a table {axis = KEY, baseline = VALUE}"
+            self.add(("compare",), f"{message}, with weight = RESULT where units have one")
             return None
         column = self.column(("compare", "axis"), table["axis"], axes)
         if column is None:
@@ -292,6 +295,14 @@ class _StudyReader:
             self.add(("compare", "baseline"), message, table["baseline"])
             return None
         return column, axis.labels[axis.labels.index(table["baseline"])]
+
+    def compare_weight(self) -> str | None:
+        table = self.data.get("compare")
+        weight = table.get("weight") if isinstance(table, dict) else None
+        if weight is not None and not isinstance(weight, str):
+            self.add(("compare", "weight"), "must be the name of a result", weight)
+            return None
+        return None if weight is None else str(weight)
 
     # -- metrics ---------------------------------------------------------------------------
 

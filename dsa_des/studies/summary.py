@@ -215,6 +215,38 @@ class Rows:
             *alone,
         )
 
+    def event_ratio(
+        self, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
+    ) -> PairedRatio:
+        """Return how often an event happens in some rows, by how often in others: run by run.
+
+        Parameters
+        ----------
+        name : str
+            The event.
+        first, second : (n,) of int
+            Rows below and above the line; runs that only one of them has do not count.
+        weight : str, optional
+            How often each unit happens.
+        confidence : float
+        """
+        runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
+        runs = runs + self.column("replica")
+        sides = []
+        for rows in (first, second):
+            known = ~np.isnan(self.column(name)[rows].astype(float))
+            if weight is not None:
+                known &= ~np.isnan(self.column(weight)[rows].astype(float))
+            sides.append(rows[known])
+        one, two = (runs[rows] for rows in sides)
+        _, here, there = np.intersect1d(one, two, return_indices=True)
+        below, above = sides[0][here], sides[1][there]
+        weights = None if weight is None else self.column(weight)[below].astype(float)
+        return paired_ratio(
+            self.column(name)[below].astype(float), self.column(name)[above].astype(float),
+            weights, cluster=self.units[below], confidence=confidence,
+        )  # fmt: skip
+
     def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
         """Return where the run cut a result off in some rows, and in how many, sorted."""
         if result.cut_off is None:
@@ -279,14 +311,18 @@ class Compared:
     baseline: Any
     result: Result
     difference: EstimatedDifference
+    #: Of an event: how often it happens, by how often at the baseline.
+    ratio: PairedRatio | None = None
 
 
 def compare_axis(
-    rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float, method: str
-) -> list[Compared]:
+    rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float,
+    method: str, weight: str | None = None,
+) -> list[Compared]:  # fmt: skip
     """Return the paired differences of every value of an axis against one of them.
 
-    Rows are paired that share the unit and the values of all other axes.
+    Rows are paired that share the unit and the values of all other axes. `weight` names the result
+    that weighs units in ratios of events.
     """
     place = rows.axes.index(axis)
     by_place = dict(rows.each_place())
@@ -304,7 +340,10 @@ def compare_axis(
             else:
                 first, second = paired(rows, result.name, by_place[base], chosen)[1:]
                 change = difference(first, second, confidence, method, kind=result.kind)
-            found.append(Compared(others, at[place], baseline, result, change))
+            ratio = None
+            if result.kind == EVENT:
+                ratio = rows.event_ratio(result.name, by_place[base], chosen, weight, confidence)
+            found.append(Compared(others, at[place], baseline, result, change, ratio))
     return found
 
 

@@ -109,3 +109,21 @@ def test_the_global_assignment_costs_least_and_the_nearest_goes_in_turn():
         assert sorted(zip(track[got], detection[got], strict=True)) == sorted(near)
         greedy_lost += distance[got].sum() + gate * (tracks - len(got)) > total + 1e-9
     assert greedy_lost > 0
+
+
+def test_the_global_assignment_lives_with_costs_below_zero():
+    """ln|S| of angles is -28: prices and costs are negative, and still the least sum is taken."""
+    rng = np.random.default_rng(12)
+    for _ in range(20):
+        track, detection = np.nonzero(rng.uniform(size=(3, 3)) < 0.7)
+        if len(track) == 0:
+            continue
+        cost = rng.uniform(0.0, 9.0, len(track)) - 28.0
+        price = 11.0 - 28.0
+        taken = global_nearest(track, detection, cost, price)
+        assert len(set(track[taken])) == len(set(detection[taken])) == len(taken)
+        total = cost[taken].sum() + price * (len(set(track)) - len(taken))
+        known = dict(zip(zip(track.tolist(), detection.tolist(), strict=True), cost, strict=True))
+        rows = sorted(set(track.tolist()))
+        renamed = {(rows.index(t), d): c for (t, d), c in known.items()}
+        assert total == pytest.approx(best(len(rows), 3, renamed, price))

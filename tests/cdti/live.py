@@ -85,10 +85,10 @@ class Session:
         options.setdefault("origin", f"http://{self.authority}")
         token = self.token if token is None else token
         url = f"ws://{self.authority}/socket?token={token}&key={key}"
-        return connect(url, open_timeout=10, **options)
+        return connect(url, open_timeout=60, **options)
 
 
-def wait_for(look, timeout=30.0):
+def wait_for(look, timeout=90.0):
     """What `look` gives once it gives something."""
     until = time.monotonic() + timeout
     while time.monotonic() < until:
@@ -98,7 +98,7 @@ def wait_for(look, timeout=30.0):
     raise AssertionError("it did not come")
 
 
-def hear(socket, *kinds, timeout=20.0):
+def hear(socket, *kinds, timeout=90.0):
     """The next message of some kinds; every picture is taken as drawn."""
     until = time.monotonic() + timeout
     while time.monotonic() < until:

@@ -59,7 +59,7 @@ class Screen:
     def state(self):
         return self.page.evaluate("App.state()")
 
-    def when(self, what, timeout=20_000):
+    def when(self, what, timeout=90_000):
         self.page.wait_for_function(f"() => ({what})", timeout=timeout)
         return self.state()
 
@@ -120,7 +120,7 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     assert (name in page.locator("#banner").inner_text()) == (judged == "verified")
     heading = "((App.state().own.heading + 180) % 360) - 180"
     screen.when(f"Math.abs({heading} - ({by_deg})) < 0.5")
-    seen = screen.when("App.state().over", timeout=60_000)
+    seen = screen.when("App.state().over", timeout=120_000)
     assert seen["ended"] == "the scene has come to its end" and seen["waiting"] == 0
     screen.close(session.authority)
     session.ended()

@@ -48,7 +48,7 @@ def east_north_up(time_s):
 
 def test_a_ranged_contact_lies_where_the_target_is(tmp_path):
     scope = watched(tmp_path)
-    shown = scope.picture(6.0, -1)
+    shown = scope.picture(6.0)
     assert shown["own"]["heading"] == pytest.approx(217, abs=0.01)
     assert shown["own"]["speed"] == pytest.approx(70, abs=0.5)
     ((number, east, north, up, bearing, age, *flight, level),) = shown["contacts"]
@@ -64,11 +64,11 @@ def test_a_ranged_contact_lies_where_the_target_is(tmp_path):
 
 def test_a_contact_without_a_range_is_a_direction(tmp_path):
     scope = watched(tmp_path, ("range_km = 15", "range_km = 0.5"))
-    ((_, east, north, up, bearing, age, *_),) = scope.picture(6.0, -1)["contacts"]
+    ((_, east, north, up, bearing, age, *_),) = scope.picture(6.0)["contacts"]
     assert east is north is up is None
     wanted = east_north_up(6.0 - age)
     assert bearing == pytest.approx(math.degrees(math.atan2(*wanted[:2])) % 360, abs=1)
-    assert scope.picture(6.0 + 11.0, -1)["contacts"] == []  # forgotten
+    assert scope.picture(6.0 + 11.0)["contacts"] == []  # forgotten
 
 
 def test_a_range_is_held_for_a_while_along_the_new_direction():

@@ -106,7 +106,7 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
         assert [one["id"] for one in again["log"]] == [ident(2), ident(4)]
         say(socket, **TURN, id=ident(4))  # said again, as if the answer had been lost
         assert hear(socket, "taken") == taken
-        assert hear(socket, "end", timeout=60)["why"] == "the scene has come to its end"
+        assert hear(socket, "end", timeout=120)["why"] == "the scene has come to its end"
         with pytest.raises((ConnectionClosed, TimeoutError)):
             socket.recv(timeout=10)
     session.ended()
@@ -168,7 +168,7 @@ def test_a_page_that_draws_nothing_gets_two_pictures_and_holds_nobody_up(tmp_pat
     kinds = []
     with session.socket() as lazy:
         while kinds[-1:] != ["end"]:
-            kinds.append(json.loads(lazy.recv(timeout=30))["type"])
+            kinds.append(json.loads(lazy.recv(timeout=90))["type"])
     session.ended()
     assert kinds.count("frame") == 2
     paced = next(text for text in session.said if "paced at" in text)

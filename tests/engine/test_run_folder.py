@@ -1,6 +1,8 @@
 """A run folder reads back as Arrow tables, and knows which files are its own."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -29,6 +31,21 @@ def test_a_run_reads_back(tmp_path):
     assert run["scans"].column("x").to_pylist() == [0, 1, 2]
     assert run.scans is run["scans"]
     assert run.scene == "seed = 1\n"
+
+
+def test_the_scene_of_a_run_finds_its_files_from_where_it_lies(tmp_path, monkeypatch):
+    """The scene was named, and names its file, from the working folder."""
+    configs = Path(__file__).parents[2] / "configs"
+    shutil.copy(configs / "encounters/crossing.daa", tmp_path / "crossing.daa")
+    (tmp_path / "replay.toml").write_text(
+        f'extends = "{(configs / "replay_daa.toml").as_posix()}"\n'
+        'duration_s = 2\nblocks.traffic.file = "crossing.daa"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    dsa_des.run(dsa_des.load_scene("replay.toml"), out="one")
+    dsa_des.run(dsa_des.load_scene("one/scene.toml"), out="two")
+    for name in ("scene.toml", "scans.parquet"):
+        assert Path("one", name).read_bytes() == Path("two", name).read_bytes()
 
 
 def test_json_with_equal_content_is_equal_bytes(tmp_path):

@@ -120,7 +120,7 @@ def test_shared_processors_are_refused_by_name():
 
 def test_aircraft_that_differ_are_refused_not_mixed():
     scene = load_scene(FIRST_LIGHT, duration_s="20")
-    changes = [{}, {"blocks.traffic.intruders[0].rcs_dbsm": 20.0}]
+    changes = [{}, {"blocks.traffic.intruders[0].contrast_ir": 0.5}]
     scenes = [scene_of(scene, Replica(1, change)) for change in changes]
     with pytest.raises(NotInLockStep, match="differs between replicas"):
         recorded(lock_step, scenes)
@@ -129,6 +129,17 @@ def test_aircraft_that_differ_are_refused_not_mixed():
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
     _, alone = recorded(Simulation, scenes[1])
     assert len(outcomes[1].tables["detections"]["tick"]) == alone["detections"].num_rows
+
+
+def test_targets_whose_radar_cross_sections_differ_run_together():
+    sets = ["blocks.radar.swerling=1", "blocks.radar.losses_db=12"]
+    scene = load_scene(FIRST_LIGHT, duration_s="60", sets=sets)
+    changes = [{"blocks.traffic.intruders[0].rcs_dbsm": rcs} for rcs in (-12.0, 3.0, 20.0)]
+    scenes = [scene_of(scene, Replica(1, change)) for change in changes]
+    assert_equal_to_separate_runs(scenes)
+    # Only the cross-section differs: with all draws the same, a larger one is seen more often.
+    seen = [sum(recorded(Simulation, one)[1]["scans"]["detected"].to_pylist()) for one in scenes]
+    assert seen == sorted(seen) and seen[0] < seen[2]
 
 
 def test_a_message_that_comes_after_the_end_comes_in_no_replica():

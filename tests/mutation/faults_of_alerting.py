@@ -7,6 +7,8 @@ _ESTIMATES = "wiring/test_alerts_of_estimates.py"
 _EFFECTS = "alerting/test_conf_effects.py"
 _MEMORY = "guidance/test_memory_of_bands.py"
 _AVOIDANCE = "wiring/test_avoidance_by_bands.py"
+_WHOM = "wiring/test_whom_operators_answer.py"
+_REST_ON = "wiring/test_what_alerts_rest_on.py"
 
 FAULTS = [
     *in_file(
@@ -90,5 +92,147 @@ FAULTS = [
             "beyond = change + math.copysign(self.p.beyond_mps, change)",
             "beyond = abs(change) + self.p.beyond_mps",
         ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/daidalus.py",
+        (_REST_ON,),
+        (
+            "deviations-of-another-track",
+            "{name: np.ravel(part)[place] for name, part in told.items()}",
+            "{name: np.ravel(part)[row] for name, part in told.items()}",
+        ),
+        (
+            "states-by-their-place",
+            "{name: part[place] for name, part in zip(_RELATIVE, relative, strict=True)}",
+            "{name: part[: len(place)] for name, part in zip(_RELATIVE, relative, strict=True)}",
+        ),
+        ("margins-by-speed", "np.hypot(*relative[:2]))", "np.hypot(*relative[3:5]))"),
+        (
+            "deviations-are-not-told",
+            "told = {} if flights.deviations is None else flights.deviations._asdict()",
+            "told = {}",
+        ),
+        (
+            "own-velocity-of-seconds-ago",
+            "own = self._own.states(ticks, begins, 0.0 if estimated else self.p.fit_s)",
+            "own = self._own.states(ticks, begins, self.p.fit_s)",
+        ),
+        (
+            "own-course-mirrored",
+            "zero.ravel(), alt_m, *velocity)",
+            "zero.ravel(), alt_m, velocity[1], velocity[0], velocity[2])",
+        ),
+        (
+            "own-altitude-lost",
+            "(np.nan_to_num(own[name]) for name in _OWN_MOTION)",
+            '(np.nan_to_num(own[name]) * (name != "alt_m") for name in _OWN_MOTION)',
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/estimated_flights.py",
+        (_REST_ON,),
+        (
+            "velocity-along-the-frame",
+            "there, here = ned_axes(lat_deg, lon_deg), ned_axes(row.origin[0], row.origin[1])",
+            "there = here = ned_axes(row.origin[0], row.origin[1])",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alert_configuration/margins.py",
+        (_REST_ON,),
+        (
+            "score-of-climbs-for-heights",
+            'configuration["v_pos_z_score"] * deviations.height_m',
+            'configuration["v_vel_z_score"] * deviations.height_m',
+        ),
+        (
+            "least-score-far-away-and-near",
+            'configuration["h_vel_z_score_min"], configuration["h_vel_z_score_max"]',
+            'configuration["h_vel_z_score_max"], configuration["h_vel_z_score_min"]',
+        ),
+        (
+            "always-far-away",
+            "np.minimum(away / distance_m, 1.0) if distance_m > 0.0 else 1.0",
+            "1.0",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/guidance/way_out.py",
+        (_REST_ON,),
+        ("bands-without-margins", "if alerts.deviations:", "if False:"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alert_configuration/conf_alerters.py",
+        (_REST_ON,),
+        (
+            "traffic-for-resolution",
+            "TcasAdvisory(bool(self._value(begin + which.lower(), kind, False, shown)))",
+            "TcasAdvisory(not self._value(begin + which.lower(), kind, False, shown))",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/guidance/way_out.py",
+        (_WHOM,),
+        (
+            "bands-of-the-first-instant",
+            "State(zero, zero, *own[:, alike])",
+            "State(zero, zero, *own[:, alike[:1].repeat(len(alike))])",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/avoidance/daidalus.py",
+        (_WHOM,),
+        ("climbs-as-it-likes", 'conf["vertical_rate"] or _VERTICAL_RATE_MPS', "_VERTICAL_RATE_MPS"),
+        ("speeds-as-it-likes", 'conf["horizontal_accel"] or _ACCELERATION_MPS2', "2.0"),
+        (
+            "sinks-as-it-speeds",
+            'conf["vertical_accel"] or _VERT',
+            'conf["horizontal_accel"] or _VERT',
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/operator/stochastic.py",
+        (_WHOM,),
+        (
+            "pauses-are-means",
+            "pause_s(highest, self._draw(mind, self._pause, 0))",
+            "mean_pause_s(highest)",
+        ),
+        (
+            "share-of-climbs",
+            "self._draw(mind, self._steering, 0) < self.p.turn_share",
+            "self._draw(mind, self._steering, 0) >= self.p.turn_share",
+        ),
+        ("any-share-turns", "self.p.turn_share >= 0.5, None", "self.p.turn_share > 0.0, None"),
+        (
+            "no-other-way",
+            "(True, False) if 0.0 < self.p.turn_share < 1.0 else (True,)",
+            "(True,)",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/operator/console.py",
+        (_WHOM,),
+        ("level-of-the-first", "_Alert(int(level[place]),", "_Alert(int(level[0]),"),
+        (
+            "alert-of-anybody",
+            "self._alerts.get(decision.target)",
+            "next(iter(self._alerts.values()), None)",
+        ),
+        (
+            "alerts-to-come",
+            'np.searchsorted(arrived.tick, until, side="right")',
+            "len(arrived.tick)",
+        ),
+        ("always-the-first-target", "code.get(d.target, -1)", "0 if d.target else -1"),
     ),
 ]

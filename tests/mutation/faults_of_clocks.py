@@ -5,6 +5,7 @@ from fault import in_file
 _GROUP = "clocks"
 _WIRES = "wiring/test_wires_and_processors.py"
 _CLOCK = ("wiring/test_scan_clocks.py", "engine/test_clock_exactness.py")
+_TOGETHER = ("lockstep/test_side_by_side.py", "lockstep/test_lock_step.py")
 _QUEUE = "wiring/test_ages_and_queues.py"
 
 FAULTS = [
@@ -64,6 +65,23 @@ FAULTS = [
          "arrivals, message = np.maximum.accumulate(arrivals), message.take(kept)"),
         ("faultless-wire", "if self._faults is not None:\n            kept",
          "if self._faults is None and sent == -1:\n            kept"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/replicas/channel.py", _TOGETHER,
+        ("loss-of-the-first-replica", "return stream.uniform(instant, replica * first_scan(1))",
+         "return stream.uniform(instant, 0 * replica)"),
+        ("holds-what-another-replica-got",
+         "rows[arrivals[rows] // self._span != ticks // self._span] = -1", "pass"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/replicas/split_block.py", _TOGETHER,
+        ("what-comes-between-wakes-is-lost", "            self._keep_waiting(wake, replica)\n",
+         "            pass\n"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/replicas/lookahead.py", _TOGETHER,
+        ("looks-too-far-ahead", "return min(delays[edge] for edge in opened)",
+         "return 3 * min(delays[edge] for edge in opened)"),
     ),
     *in_file(
         _GROUP, "dsa_des/running/demand.py", (_WIRES, "engine/test_delayed_pictures.py"),

@@ -42,4 +42,52 @@ FAULTS = [
          "residual = y - above / total * each"),
         ("ratio-without-weights", "ratio = above / below", "ratio = math.fsum(m) / math.fsum(n)"),
     ),
+    *in_file(
+        _GROUP, "dsa_des/studies/summary.py", "studies/test_ratios.py",
+        ("copies-count-as-encounters", "together = cluster if len(np.unique(cluster)) < len(used)",
+         "together = cluster if not len(used)"),
+        ("classes-of-all-runs", "rows = rows[self.column(of.only[0])[rows] == of.only[1]]", "pass"),
+        ("ratios-compared-unpaired", "((each[1] - each[0]) ** 2).sum()", "(each**2).sum()"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/cheapest.py", "studies/test_requirements.py",
+        ("estimate-for-interval", "requirement.met(line.estimate.low, line.estimate.high)",
+         "requirement.met(line.estimate.value, line.estimate.value)"),
+        ("cheap-end-mixed-up", "some if requirement.cheap_last else some[::-1]",
+         "some[::-1] if requirement.cheap_last else some"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/requirements.py", "studies/test_requirements.py",
+        ("lower-end-below-the-limit", "return high <= self.limit if",
+         "return low <= self.limit if"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/splitting.py", "encounters/test_splitting.py",
+        ("copies-keep-their-weight", "(found.weights / expected)[places]", "found.weights[places]"),
+        ("never-one-more-by-chance", "(uniform < expected % 1.0)", "(uniform < 0.0)"),
+        ("farther-is-nearer", "(scores[:, np.newaxis] < levels)",
+         "(scores[:, np.newaxis] > levels)"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/risk_metric.py", "wiring/test_risk_ratio_metric.py",
+        ("intruder-s-bearing-from-north", "(closing - course[0]) % 360.0", "closing % 360.0"),
+        ("bearing-to-where-it-goes", "math.atan2(own[1] - other[1], own[0] - other[0])",
+         "math.atan2(other[1] - own[1], other[0] - own[0])"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/generate_command.py", "encounters/test_set_file.py",
+        ("share-taken-for-density", "StepDensity(edges, parts / wide)",
+         "StepDensity(edges, parts)"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/track_tables.py", "encounters/test_track_tables.py",
+        ("track-east-for-north", "return time_s, north, east, alt_ft * FOOT_M",
+         "return time_s, east, north, alt_ft * FOOT_M"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/encounter_traffic.py",
+        "wiring/test_encounter_traffic_keys.py",
+        ("own-flight-of-the-encounter", "self.own = ScriptedTrajectory(",
+         "ScriptedTrajectory("),
+    ),
 ]  # fmt: skip

@@ -202,4 +202,24 @@ FAULTS = [
         _GROUP, "components/metrics/run_ends.py", (_KEYS, "studies/test_cut_off_values.py"),
         ("second-scan-for-first", "at = first + number - 1", "at = first + number"),
     ),
+    *in_file(
+        _GROUP, "components/encounters/risk_metric.py", ("encounters/test_risk_of_a_set.py",),
+        ("risk-without-weights", 'weight, cluster = "encounter_weight", "encounter_family"',
+         'weight, cluster = None, "encounter_family"'),
+        ("copies-are-encounters", 'weight, cluster = "encounter_weight", "encounter_family"',
+         'weight, cluster = "encounter_weight", "encounter"'),
+        ("classes-without-weights",
+         'ratio=RatioOf(*flags, weight, cluster, (f"encounter_{by}", kind))',
+         'ratio=RatioOf(*flags, None, cluster, (f"encounter_{by}", kind))'),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/steered.py", ("encounters/test_risk_of_a_set.py",),
+        ("manoeuvres-of-the-first-replica", "found.setdefault(replica, [])",
+         "found.setdefault(0, [])"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/output.py", ("encounters/test_risk_of_a_set.py",),
+        ("upper-end-for-lower", "[None if r is None else r.interval[0] for r in found]",
+         "[None if r is None else r.interval[1] for r in found]"),
+    ),
 ]  # fmt: skip

@@ -425,6 +425,24 @@ FAULTS = [
          "held &= age_s <= self.p.drop_after_s"),
     ),
     *in_file(
+        _GROUP, "components/radar/own_velocity.py", "wiring/test_range_rates_in_tracks.py",
+        ("own-velocity-backwards", "(moved[1] - moved[0]) / span_s",
+         "(moved[0] - moved[1]) / span_s"),
+    ),
+    *in_file(
+        _GROUP, "components/estimation/frame.py", "wiring/test_range_rates_in_tracks.py",
+        ("own-velocity-of-the-frame", "zip(velocity_m_s, there, strict=True)",
+         "zip(0.0 * velocity_m_s, there, strict=True)"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/without_range.py", "wiring/test_tracks_without_range.py",
+        ("first-range-unused", "if one.ranges is not None:", "if False:"),
+    ),
+    *in_file(
+        _GROUP, "components/association/assignment.py", "association/test_association.py",
+        ("never-is-cheap", "never = 1.0 + 2.0 * float(", "never = -1.0 - 2.0 * float("),
+    ),
+    *in_file(
         _GROUP, "components/avoidance/turn_away.py", "wiring/test_turning_away.py",
         ("rate-is-the-turn", "math.radians(self.p.rate_deg_s)", "math.radians(self.p.turn_deg)"),
         ("never-pauses", "self._free_from[run] = tick + self._pause_ticks",

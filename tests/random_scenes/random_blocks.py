@@ -262,6 +262,20 @@ def tracker(dice: Dice) -> dict[str, Any]:
     return table
 
 
+def estimating_tracker(dice: Dice) -> dict[str, Any]:
+    """Return a tracker that estimates states."""
+    table: dict[str, Any] = {"type": dice.pick("tracking.ekf", "tracking.ukf", "tracking.imm")}
+    dice.maybe(table, "association", 0.6, "nearest", "jpda")
+    if dice.chance(0.6, "late looks that count"):
+        table["late"] = dice.pick("one_step", "rerun")
+        dice.maybe(table, "lag_s", 0.5, 0.3, 3)
+    dice.maybe(table, "initiation", 0.3, "likelihood_ratio")
+    dice.maybe(table, "confirm_m", 0.3, 2)
+    dice.maybe(table, "delete_misses", 0.3, 2)
+    dice.maybe(table, "false_alarms_per_scan", 0.3, 5)
+    return table
+
+
 def avoidance(dice: Dice) -> dict[str, Any]:
     """Return an avoidance."""
     return {

@@ -129,6 +129,10 @@ class _Maker:
             for table in self.blocks.values():
                 if table["type"] == "traffic.random":
                     table["intruders"] = min(table["intruders"], _MOST_GEODESICS)
+        # With dice of their own: scenes without such trackers stay what they were.
+        apart = Dice(7 * seed + 1)
+        if apart.chance(0.3):
+            self._estimating(apart)
         tables = {
             "title": f"random {seed}",
             "duration_s": self._short_enough(duration),
@@ -139,6 +143,25 @@ class _Maker:
             "blocks": self.blocks,
         }
         return Case(seed, tables, self.files, dice.features)
+
+    def _estimating(self, dice: Dice) -> None:
+        """Let trackers that nobody listens to estimate states; sensors then err."""
+        heard = {wire["from"] for wire in self.wires}
+        trackers = [name for name, table in self.blocks.items()
+                    if table["type"] == "tracking.stub" and name not in heard]  # fmt: skip
+        for name in trackers:
+            self.blocks[name] = random_blocks.estimating_tracker(dice)
+            self.dice.features.add("tracker that estimates")
+            for wire in self.wires:
+                if wire["to"] == name and dice.chance(0.6, "fusion.pass_through"):
+                    self.blocks[wire["from"]] = {"type": "fusion.pass_through"}
+        self.dice.features |= dice.features
+        for table in self.blocks.values() if trackers else ():
+            if table["type"].startswith(("radar.", "optical.range")):
+                for key in ("azimuth_resolution_deg", "elevation_resolution_deg"):
+                    table.setdefault(key, 1.0)
+            if table["type"].startswith("radar."):
+                table.setdefault("range_resolution_m", 30)
 
     # -- blocks and wires ----------------------------------------------------------------------
 

@@ -89,5 +89,6 @@ def test_the_generator_leaves_nothing_out(tmp_path):
         "fusion.pick_best", "fusion.gated", "tracker", "avoidance", "latency of traffic",
         "delay_s traffic -> transform", "jitter_s fusion -> tracker",
         "drop_probability sensor -> fusion", "cue loop", "fusion.covariance_intersection",
+        "tracker that estimates", "late looks that count", "fusion.pass_through",
     }  # fmt: skip
     assert wanted - features == set()

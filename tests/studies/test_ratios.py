@@ -118,3 +118,20 @@ def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
         )  # fmt: skip
         kept += found.interval[0] <= truth <= found.interval[1]
     assert 0.925 <= kept / rounds <= 0.975
+
+
+def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
+    """Runs without and with a remedy as values of an axis: those that both have, by hand."""
+    rows = rows_of(
+        [1, 1, 0, 0, 1, 0, 1, 1, 0, 1], np.zeros(10),
+        np.array([1, 2, 3, 4, 9, 1, 2, 3, 4, 9.0]), axis=np.repeat([0.0, 1.0], 5),
+        replica=np.array([0, 1, 2, 3, 4, 0, 1, 2, 3, 5]),
+    )  # fmt: skip
+    (found,) = compare_axis(rows, "x", 0.0, [FLAGS[0]], 0.95, "t", "w")
+    # Below the line 1 + 2, above it 2 of them and 3 that are induced; the fifth ones are alone.
+    assert found.ratio is not None and found.ratio.encounters == 4
+    assert (found.ratio.ratio, found.ratio.induced) == pytest.approx((5 / 3, 1))
+    (plain,) = compare_axis(rows, "x", 0.0, [FLAGS[0]], 0.95, "t")
+    assert plain.ratio is not None and plain.ratio.ratio == 1.0
+    (number,) = compare_axis(rows, "x", 0.0, [FLAGS[2]], 0.95, "t")
+    assert number.ratio is None

@@ -90,7 +90,8 @@ def test_a_wrong_change_fails_its_own_replica(
 
 def test_drawn_targets_run_one_by_one_and_it_is_said(small: Path) -> None:
     base = load_scene("small.toml")
-    rcs = [Replica(k, {"blocks.traffic.intruders[0].rcs_dbsm": float(k)}) for k in (1, 2)]
-    assert "what block traffic tells its neighbours" in (why_apart(base, rcs) or "")
-    where = [Replica(k, {"blocks.traffic.intruders[0].east_m": float(k)}) for k in (1, 2)]
-    assert why_apart(base, where) is None
+    seen = [Replica(k, {"blocks.traffic.intruders[0].contrast": float(k)}) for k in (1, 2)]
+    assert "what block traffic tells its neighbours" in (why_apart(base, seen) or "")
+    for key in ("rcs_dbsm", "east_m"):
+        where = [Replica(k, {f"blocks.traffic.intruders[0].{key}": float(k)}) for k in (1, 2)]
+        assert why_apart(base, where) is None

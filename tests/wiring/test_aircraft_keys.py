@@ -104,7 +104,7 @@ def modelled_one(craft: dict, folder) -> dict:
 def a_model_that_gives_the_two(monkeypatch):
     """What a model makes cannot be put at one place: here it gives what stands in its file."""
     monkeypatch.setattr(
-        "components.encounters.encounter_traffic._made", lambda file, *_: read_set(file)
+        "components.encounters.encounter_traffic._made", lambda key, _: read_set(key[0])
     )
 
 

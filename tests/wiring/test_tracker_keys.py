@@ -289,3 +289,20 @@ def test_what_is_measured_exactly_is_refused_before_the_run(key, quantity):
 def test_a_range_rate_that_is_exact_is_no_part_of_a_track():
     with_rate = tracks(sensors={"radar": {**RADAR, "measures_range_rate": True}})
     assert with_rate == tracks()
+
+
+def test_a_covariance_beyond_what_can_be_computed_is_one_clear_error():
+    from dsa_des.errors import BlockFailure
+
+    camera = {**SEES_ALL, "azimuth_pixels": 3600, "elevation_pixels": 1800}
+    huge = {"start_speed_m_s": 1e12, "delete_above_m": 1e12}
+    with pytest.raises(BlockFailure, match=r"covariance of track \d has become singular"):
+        tracks("tracking.ukf", sensors={"radar": RADAR, "eye": {**camera, "scan_rate_hz": 5}},
+               **huge)  # fmt: skip
+
+
+def test_more_sensors_than_a_mask_has_bits_are_refused():
+    from dsa_des.errors import SceneError
+
+    with pytest.raises(SceneError, match="at most 62 sensors, and 63 lead to it"):
+        tracks(sensors={f"radar{i}": RADAR for i in range(63)}, duration_s=1)
