@@ -52,7 +52,7 @@ def default_values() -> tuple[dict[str, Any], dict[str, str]]:
 def _lines(path: Path, problems: Problems) -> Lines:
     """Return line number, key as written and text of the value by key in lower case."""
     found: Lines = {}
-    for number, line in read_lines(path, problems):
+    for number, line in read_lines(path, problems, "a text file", "lines key = value [unit]"):
         text = line.split("#", 1)[0].strip()
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not key:

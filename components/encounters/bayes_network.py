@@ -18,7 +18,7 @@ class NetworkError(ValueError):
     """A network that cannot be: `variable` says which of its variables is wrong, if one is."""
 
     def __init__(self, message: str, variable: str = "") -> None:
-        super().__init__(f"variable {variable!r}: {message}" if variable else message)
+        super().__init__(f"variable '{variable}': {message}" if variable else message)
         self.variable = variable
 
 

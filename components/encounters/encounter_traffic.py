@@ -20,12 +20,16 @@ from components.encounters.pair_densities import PairingRules
 from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
 from components.encounters.set_file import read_set
+from components.geometry.ellipsoid import line_of_sight
 from components.traffic.files import FileParameters, RecordedTraffic
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.traffic_file import TrafficFile
 from components.traffic.trajectory import SampledTrajectory
 from dsa_des.block.component import ScenePath
+
+#: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
+_FARTHEST_M = 1e6
 
 
 class OneEncounter(FileParameters):
@@ -45,7 +49,7 @@ class OneEncounter(FileParameters):
     lon_deg: float | None = Field(
         default=None, ge=-360, le=360, description="Its longitude; given with `lat_deg`."
     )
-    ownship: Ownship | None = Field(
+    scripted_ownship: Ownship | None = Field(
         default=None,
         description="A start and a flight in the scene, which the ownship flies instead of the "
         "encounter's own, as in `traffic.scripted`; the intruders stay.",
@@ -85,7 +89,8 @@ class _EncounterTraffic(RecordedTraffic):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        if (own := self.p.ownship) is not None:
+        if (own := self.p.scripted_ownship) is not None:
+            self._refuse_another_place(own.lat_deg, own.lon_deg)
             self.own = ScriptedTrajectory(
                 "ownship", lat_deg=own.lat_deg, lon_deg=own.lon_deg,
                 **flight_arguments(own, self.wind),
@@ -104,6 +109,16 @@ class _EncounterTraffic(RecordedTraffic):
         if self.found.skipped:
             notes.append(f"{self.found.skipped} damaged encounters of the set were skipped")
         return TrafficFile(own, others, 0.0, notes)
+
+    def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
+        at = self.found.reference_deg
+        apart_m = float(line_of_sight(lat_deg, lon_deg, 0.0, *at, 0.0)[2])
+        if apart_m > _FARTHEST_M:
+            raise ValueError(
+                f"scripted_ownship: starts {apart_m / 1000:.0f} km from the encounter, whose "
+                f"origin is at {at[0]:g}, {at[1]:g}; lat_deg and lon_deg of the block put the "
+                f"encounter elsewhere (at most {_FARTHEST_M / 1000:.0f} km are allowed)"
+            )
 
     def report(self) -> dict[str, Any]:
         """Return closest approaches, and the encounter with its weight."""

@@ -102,7 +102,7 @@ class _ModelReader:
             return f"the part {shown_value(name)} stands there twice"
         if name not in PARTS:
             return f"there is no part {shown_value(name)}{did_you_mean(name, PARTS)}"
-        return f"the part {name!r} stands where {expected!r} is expected"
+        return f"the part '{name}' stands where '{expected}' is expected"
 
     def model(self) -> EncounterModel:
         labels = self.labels("labels_initial")
@@ -114,8 +114,8 @@ class _ModelReader:
         for place, of in [*enumerate(sources), *targets.items()]:
             if of >= 0 and later[place] != sizes[of]:
                 raise self.fail(
-                    f"r_transition: variable {now[place]!r} has {later[place]} bins, but "
-                    f"{labels[of]!r} has {sizes[of]} in r_initial",
+                    f"r_transition: variable '{now[place]}' has {later[place]} bins, but "
+                    f"'{labels[of]}' has {sizes[of]} in r_initial",
                     self.parts["r_transition"][0],
                 )
         transition = self.network("transition", now, later, sorted(targets))
@@ -142,7 +142,7 @@ class _ModelReader:
             raise self.fail(f"{part}: a name is empty", number)
         name, count = Counter(names).most_common(1)[0]
         if count > 1:
-            raise self.fail(f"{part}: the variable {name!r} stands there twice", number)
+            raise self.fail(f"{part}: the variable '{name}' stands there twice", number)
         return tuple(names)
 
     def match(
@@ -168,7 +168,7 @@ class _ModelReader:
         for place, of in targets.items():
             if f"{labels[of]}{_NOW}" not in now:
                 raise self.fail(
-                    f"labels_transition: {now[place]!r} needs {labels[of] + _NOW!r} beside it",
+                    f"labels_transition: '{now[place]}' needs '{labels[of] + _NOW}' beside it",
                     number,
                 )
         if len(set(sources) - {-1}) + len(targets) != len(now):
@@ -204,7 +204,7 @@ class _ModelReader:
         for value, label in zip(found.tolist(), labels, strict=True):
             if value != int(value) or not 1 <= value <= _MOST_BINS:
                 raise self.fail(
-                    f"{part}: variable {label!r} has {value:g} bins: must be a whole number of 1 "
+                    f"{part}: variable '{label}' has {value:g} bins: must be a whole number of 1 "
                     "or more",
                     number,
                 )
@@ -220,7 +220,7 @@ class _ModelReader:
             for place in range(len(labels)):
                 if place not in drawn and arrows[:, place].any():
                     raise self.fail(
-                        f"G_transition: variable {labels[place]!r} has parents, but is not drawn: "
+                        f"G_transition: variable '{labels[place]}' has parents, but is not drawn: "
                         f"only variables at {_NEXT} are",
                         self.parts["G_transition"][0],
                     )
@@ -239,7 +239,7 @@ class _ModelReader:
             words = text.replace(",", " ").split()
             if len(words) != count or set(words) - {"0", "1"}:
                 raise self.fail(
-                    f"{part}: variable {labels[place]!r}: {count} values of 0 or 1 are needed",
+                    f"{part}: variable '{labels[place]}': {count} values of 0 or 1 are needed",
                     number,
                 )
             found[place] = [int(word) for word in words]
@@ -261,13 +261,13 @@ class _ModelReader:
             edges = np.array([_number(word) for word in text.replace(",", " ").split()])
             if len(edges) != size + 1:
                 raise self.fail(
-                    f"boundaries: variable {label!r} has {size} bins: {size + 1} edges are needed, "
+                    f"boundaries: variable '{label}' has {size} bins: {size + 1} edges are needed, "
                     f"or *; there are {len(edges)}",
                     number,
                 )
             if not np.isfinite(edges).all() or (np.diff(edges) <= 0.0).any():
                 raise self.fail(
-                    f"boundaries: variable {label!r}: edges must be rising numbers", number
+                    f"boundaries: variable '{label}': edges must be rising numbers", number
                 )
             found.append(Bins(edges, size))
         return tuple(found)
@@ -284,7 +284,7 @@ class _ModelReader:
         for rate, label in zip(rates.tolist(), labels, strict=True):
             if rate > 1.0:
                 raise self.fail(
-                    f"resample_rates: variable {label!r}: {rate:g} must lie in [0, 1]: it is the "
+                    f"resample_rates: variable '{label}': {rate:g} must lie in [0, 1]: it is the "
                     "probability per second",
                     number,
                 )
@@ -303,7 +303,7 @@ class _ModelReader:
         odd = [name for name, total in totals.items() if total != common]
         if many >= _MAJORITY and many > len(totals) - 3:
             raise self.fail(
-                f"N_initial: variable {odd[0]!r}: its counts sum to {totals[odd[0]]:.15g}, those "
+                f"N_initial: variable '{odd[0]}': its counts sum to {totals[odd[0]]:.15g}, those "
                 f"of the other variables to {common:.15g}",
                 self.parts["N_initial"][1][0][0],
             )

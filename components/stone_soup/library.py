@@ -9,7 +9,7 @@ its own.
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
+from importlib import import_module
 from itertools import count
 from typing import Any
 
@@ -29,8 +29,10 @@ def needs_stone_soup(what: str) -> None:
     ImportError
         Stone Soup is not installed.
     """
-    if find_spec("stonesoup") is None:
-        raise ImportError(f"{what} needs Stone Soup: pip install 'dsa-des[stonesoup]'")
+    try:
+        import_module("stonesoup")
+    except ImportError as error:
+        raise ImportError(f"{what} needs Stone Soup: pip install 'dsa-des[stonesoup]'") from error
 
 
 class Repeatable:

@@ -10,9 +10,13 @@ from dsa_des.files.input_files import InputFileError, NoSuchFile, is_folder, rea
 
 _SEPARATORS = re.compile(r"[,;]")
 _TOKEN = re.compile(r"\[[^\]]*\]|[^\s,;\[\]]+")
+_TRAFFIC = "a text file with one row per aircraft and time"
+_ROWS = "a row of column names and rows of samples"
 
 
-def read_lines(path: Path, problems: Problems) -> list[tuple[int, str]]:
+def read_lines(
+    path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
+) -> list[tuple[int, str]]:
     """Read a file's lines that hold something, with their numbers.
 
     Parameters
@@ -22,6 +26,8 @@ def read_lines(path: Path, problems: Problems) -> list[tuple[int, str]]:
         end in LF, CR LF or CR.
     problems : Problems
         Told when there is no such file, when it is a directory, binary or empty.
+    needed, holds : str
+        For the messages of a binary and of an empty file: which file is needed, and what in it.
 
     Returns
     -------
@@ -39,9 +45,7 @@ def read_lines(path: Path, problems: Problems) -> list[tuple[int, str]]:
         problems.fail(f"the file {error}")
     text = _decoded(data)
     if text is None:
-        problems.fail(
-            "this is a binary file: a text file with one row per aircraft and time is needed"
-        )
+        problems.fail(f"this is a binary file: {needed} is needed")
     lines = [
         # Not tabs: one at either end delimits an empty cell.
         (number, line.strip(" "))
@@ -49,7 +53,7 @@ def read_lines(path: Path, problems: Problems) -> list[tuple[int, str]]:
     ]
     kept = [(n, line) for n, line in lines if line.strip() and not line.lstrip().startswith("#")]
     if not kept:
-        problems.fail("the file is empty: a row of column names and rows of samples are needed")
+        problems.fail(f"the file is empty: {holds} are needed")
     return kept
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.recorded_columns import (
     RECORDED,
     Columns,
@@ -237,15 +237,17 @@ class Message:
         # Static fields come from the last part: what a wire held before its first message may
         # know less than a real one.
         result = copy(parts[-1])
+        rows = [len(part) for part in parts]
         for name in row_names:
-            setattr(result, name, _join([getattr(part, name) for part in parts]))
+            setattr(result, name, _join([getattr(part, name) for part in parts], rows))
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
             starts = np.cumsum([0] + [int(o[-1] - o[0]) for o in offsets])
             joined = [o[:-1] - o[0] + s for o, s in zip(offsets, starts, strict=False)]
             result.offsets = np.concatenate([*joined, starts[-1:]])  # type: ignore[attr-defined]
+            entries = np.diff(starts).tolist()
             for name in entry_names:
-                setattr(result, name, _join([getattr(part, name) for part in parts]))
+                setattr(result, name, _join([getattr(part, name) for part in parts], entries))
         return result
 
     @classmethod
@@ -295,15 +297,23 @@ def _pick(value: Any, rows: slice | IntArray) -> Any:
     return value[rows]
 
 
-def _join(values: list[Any]) -> Any:
-    first = values[0]
-    if first is None:
+def _join(values: list[Any], counts: list[int]) -> Any:
+    known = next((value for value in values if value is not None), None)
+    if known is None:
         return None
-    if isinstance(first, dict):
-        return {key: _join([value[key] for value in values]) for key in first}
-    if hasattr(first, "join_rows"):
-        return type(first).join_rows(values)
-    return np.concatenate(values)
+    if isinstance(known, dict):
+        tables = [value or {} for value in values]
+        names = dict.fromkeys(name for table in tables for name in table)
+        return {name: _join([table.get(name) for table in tables], counts) for name in names}
+    if hasattr(known, "join_rows"):
+        return type(known).join_rows(values)
+    # What a wire held before the first message may lack columns that real ones have.
+    whole = zip(values, counts, strict=True)
+    return np.concatenate([_nothing(known, n) if value is None else value for value, n in whole])
+
+
+def _nothing(like: AnyArray, count: int) -> AnyArray:
+    return np.full(count, np.nan if like.dtype.kind == "f" else 0, dtype=like.dtype)
 
 
 def offsets_of(row: IntArray, rows: int) -> IntArray:

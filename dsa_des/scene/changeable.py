@@ -32,7 +32,7 @@ class Origin:
 
     def tables(self) -> tuple[SceneFile, list[Problem], list[str]]:
         """Return changed tables, what is wrong with the changes, and what swaps dropped."""
-        file = SceneFile(self.file.path, deepcopy(self.file.data), dict(self.file.sources))
+        file = self.file.copy()
         problems: list[Problem] = []
         dropped: list[str] = []
         for key, value in self.changes:

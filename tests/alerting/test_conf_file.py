@@ -109,6 +109,11 @@ def test_everything_wrong_is_said_at_once_with_its_line(tmp_path):
     assert str(error.value).index("hysteresis_time") < str(error.value).index("One_d_WCV_DTHR")
 
 
+def test_what_is_no_configuration_says_what_one_holds(tmp_path):
+    with pytest.raises(TrafficFileError, match="empty: lines key = value"):
+        read_conf(write(tmp_path, "# nothing"))
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(TrafficFileError, match="there is no such file"):
         read_conf(tmp_path / "none.conf")

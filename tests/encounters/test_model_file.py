@@ -58,12 +58,12 @@ def test_a_good_model_is_read_by_name(tmp_path: Path) -> None:
         ("20 60 90 140", "20 60 90", "variable 'v' has 3 bins: 4 edges are needed, or *; there"),
         ("20 60 90 140", "20 90 60 140", "variable 'v': edges must be rising numbers"),
         ("500 1500 4000\n", "", "boundaries: 6 rows are needed, one for each variable; there"),
-        ("0.3 0.05", "0.3 1.05", "variable '\\\\dot v': 1.05 must lie in [0, 1]"),
+        ("0.3 0.05", "0.3 1.05", "variable '\\dot v': 1.05 must lie in [0, 1]"),
         ("0.3 0.05", "0.3", "resample_rates: 6 are needed, one for each variable; there are 5"),
         ("0.3 0.05", "0.3 x", "'x': must be probabilities of 0 or more"),
         ("2 3 2 3 3 2 \n", "2 3 2 3 3 \n", "6 numbers of bins are needed"),
         ("2 3 2 3 3 2 \n", "2 3 2 3 3 2.5 \n", "variable 'L' has 2.5 bins: must be a whole"),
-        ("2 3 2 3 3 2 2 3 3 ", "2 3 2 3 3 2 2 4 3 ", "has 4 bins, but '\\\\dot h' has 3"),
+        ("2 3 2 3 3 2 2 3 3 ", "2 3 2 3 3 2 2 4 3 ", "has 4 bins, but '\\dot h' has 3"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -136,3 +136,16 @@ def test_a_column_without_a_table_or_twice_is_refused():
 
 def test_the_extras_of_detections_are_columns_of_theirs():
     assert EXTRAS.items() <= Detections.recorded["detections"].items()
+
+
+def test_what_a_wire_held_first_may_lack_columns_that_real_messages_have():
+    """Nothing is lost of the real ones, whatever stands before them."""
+    held = catch()
+    held.note = None
+    real = catch(age_years=np.array([1.0, 2.0, 3.0]), marked=np.array([True, False, True]))
+    for parts, place in (([held, real], slice(3, 6)), ([real, held], slice(0, 3))):
+        joined = Catch.concatenate(parts)
+        np.testing.assert_array_equal(joined.extras["age_years"][place], [1.0, 2.0, 3.0])
+        np.testing.assert_array_equal(joined.extras["marked"][place], [True, False, True])
+        assert joined.extras["marked"].dtype == bool and len(joined.note) == 6
+        assert np.isnan(joined.extras["age_years"]).sum() == 3

@@ -43,7 +43,7 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
     if acts != "turn_away" and dice.chance(0.3, "tracks with states"):
         blocks |= {
             "fusion": {"type": "fusion.pass_through"},
-            "tracker": {"type": "tracking.ekf"},
+            "tracker": {"type": dice.pick("tracking.ekf", "tracking.imm")},
         }
     actor = "tracker" if acts == "turn_away" else "alerting"
     wires: list[Any] = [

@@ -10,6 +10,7 @@ import pytest
 from covering import covers
 from wired import chain, rows, run, sensor
 
+import dsa_des
 from tests.encounters.test_pairing import TURNS
 
 RADAR = sensor("radar.range_boundary", scan_rate_hz=1)
@@ -186,13 +187,17 @@ OWN_FLIGHTS = (
 )  # fmt: skip
 
 
-@covers(*(f"ownship.{key}" for key in FLIGHT), *(f"ownship.legs.{key}" for key in LEGS), of=BOTH)
+@covers(
+    *(f"scripted_ownship.{key}" for key in FLIGHT),
+    *(f"scripted_ownship.legs.{key}" for key in LEGS),
+    of=BOTH,
+)
 @pytest.mark.parametrize("own", OWN_FLIGHTS)
 @pytest.mark.parametrize("kind", BOTH)
 def test_a_scripted_ownship_flies_as_in_scripted_traffic(kind, own, tmp_path):
     """Where it is and where its nose points are those of the same flight without encounters."""
     set_of = events(tmp_path / "set.parquet") if kind == BOTH[0] else model(tmp_path)
-    traffic = {"type": kind, "file": set_of, "encounter": 4, **AT, "ownship": own}
+    traffic = {"type": kind, "file": set_of, "encounter": 4, **AT, "scripted_ownship": own}
     found = []
     for block in (traffic, {"type": "traffic.scripted", "ownship": own}):
         scene = chain({"radar": RADAR}, duration_s=10, record={"truth": True},
@@ -208,7 +213,35 @@ def test_a_scripted_ownship_flies_as_in_scripted_traffic(kind, own, tmp_path):
 def test_intruders_stay_where_the_encounter_has_them(tmp_path):
     file = events(tmp_path / "set.parquet")
     own = {"lat_deg": 0.0, "lon_deg": 0.0, "alt_m": 2000.0}
-    row = seen({"type": "traffic.encounters", "file": file, "encounter": 9, "ownship": own})[3.0]
+    traffic = {"type": "traffic.encounters", "file": file, "encounter": 9, "scripted_ownship": own}
+    row = seen(traffic)[3.0]
     assert row["target"] == "other"
     apart = math.hypot(2000 - 3 * 70, 100)  # it heads south, towards the origin, where we stand
     assert row["true_range_m"] == pytest.approx(apart, abs=1.0)
+
+
+def test_an_ownship_on_another_continent_is_refused(tmp_path):
+    """5,500 km: a scene's own start, and a set whose plane still touches at 0, 0."""
+    own = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 2000.0}
+    traffic = {"type": "traffic.encounters", "file": events(tmp_path / "set.parquet"),
+               "encounter": 9, "scripted_ownship": own}  # fmt: skip
+    with pytest.raises(Exception, match=r"scripted_ownship: starts 5\d\d\d km from the encounter"):
+        seen(traffic)
+    assert seen({**traffic, "lat_deg": 52.0, "lon_deg": 4.4})
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_encounters_own_ownship_flies_in_a_scene_that_had_another(swapped, tmp_path):
+    """Whatever the scripted traffic was told before an encounter took its place."""
+    file = events(tmp_path / "set.parquet")
+    settings = [f"blocks.traffic.file={file}", "blocks.traffic.encounter=9", "duration_s=1"]
+    if swapped:
+        scene = dsa_des.load_scene(
+            "first_light", sets=settings, swaps=["traffic=traffic.encounters"]
+        )
+    else:
+        mine = tmp_path / "mine.toml"
+        mine.write_text('extends = "first_light"\n[blocks.traffic]\ntype = "traffic.encounters"\n')
+        scene = dsa_des.load_scene(str(mine), sets=settings)
+    [first, *_] = [r for r in dsa_des.run(scene).truth.to_pylist() if r["target"] is None]
+    assert (first["lat_deg"], first["lon_deg"]) == pytest.approx((0.0, 0.0), abs=1e-6)

@@ -199,7 +199,7 @@ def test_what_is_wrong_is_said(tmp_path, monkeypatch):
     }.items():
         with pytest.raises(WRONG, match=re.escape(message)):
             run(scene(f"{file}:{name}", 1))
-    monkeypatch.setattr("components.stone_soup.library.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "stonesoup", None)  # as if it were not installed
     with pytest.raises(WRONG, match=r"tracking.stonesoup needs Stone Soup: pip install"):
         run(scene(f"{file}:nothing", 1))
 
