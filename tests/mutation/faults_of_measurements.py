@@ -7,6 +7,7 @@ _VALUES = "wiring/test_measured_values.py"
 _ERRORS = (
     "wiring/test_errors_of_measurement.py::test_the_error_of_one_quantity_tells_nothing_of_another"
 )
+_NOISE_IS = "wiring/test_what_noise_is_drawn_of.py"
 _IN_CELL = "wiring/test_noise_lies_in_its_cell.py"
 _VARIANCES = "wiring/test_variances_of_detections.py"
 _CARRIED = "wiring/test_what_fusion_carries.py"
@@ -276,5 +277,32 @@ FAULTS = [
          "float((targets.believed or {})["),
         ("ground-alarm-beam-axis", "(number + self._draws.uniform(key, scan, draw)) * size",
          "(number + 0.5) * size"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/declaration_by_place.py", _NOISE_IS,
+        ("gate-without-range-error", "gate_m = speed_m_s * apart_s + GATE_DEVIATIONS",
+         "gate_m = speed_m_s * apart_s + 0.0"),
+        ("gate-without-angle-error", "gate_rad += GATE_DEVIATIONS", "gate_rad += 0.0"),
+        ("azimuth-error-high-up", "detections.azimuth_variance_rad2 * level**2",
+         "detections.azimuth_variance_rad2"),
+    ),
+    *in_file(
+        _GROUP, "components/optical/frame_false_alarms.py", _NOISE_IS,
+        ("highest-is-lowest", "highest_elevation_rad=reach.elevation_rad[1]",
+         "highest_elevation_rad=-reach.elevation_rad[0]"),
+        ("strength-by-azimuth", "uniform(_NO_TARGET, scan, _STRENGTH)",
+         "uniform(_NO_TARGET, scan, _AZIMUTH)"),
+        ("elevation-by-azimuth", "uniform(_NO_TARGET, scan, _ELEVATION)",
+         "uniform(_NO_TARGET, scan, _AZIMUTH)"),
+    ),
+    *in_file(
+        _GROUP, "components/messages/false_detections.py", _NOISE_IS,
+        ("targets-first-in-a-pixel", "np.lexsort((*measured, row))",
+         "np.lexsort((*measured[1:], row))"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/measured_strength.py", _NOISE_IS,
+        ("strength-beyond-the-look", "false_alarm_probability=self._block.p.cell_pfa",
+         "false_alarm_probability=self._block.p.false_alarm_probability"),
     ),
 ]  # fmt: skip

@@ -6,6 +6,7 @@ _GROUP = "metrics"
 _SEPARATION = "wiring/test_separation_metrics.py"
 _KEYS = "wiring/test_metric_keys.py"
 _BY_HAND = "studies/test_metrics_by_hand.py"
+_EACH = "wiring/test_metrics_of_each_flight.py"
 _SEVERAL = "wiring/test_metrics_of_several_targets.py"
 
 FAULTS = [
@@ -221,5 +222,34 @@ FAULTS = [
         _GROUP, "dsa_des/studies/output.py", ("encounters/test_risk_of_a_set.py",),
         ("upper-end-for-lower", "[None if r is None else r.interval[0] for r in found]",
          "[None if r is None else r.interval[1] for r in found]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/severity.py", (_EACH,),
+        ("altitudes-swapped", "(own_m, other_m),", "(other_m, own_m),"),
+        ("severity-of-the-first-target", "np.fmax.reduce(values)", "values[0]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/steered.py", (_EACH,),
+        ("anybody-steers", "if names[block] not in self._delays_s:\n                continue",
+         "self._delays_s.setdefault(names[block], 0.0)"),
+        ("latency-left-out", "float(wire.total_delay_s)", "float(wire.delay_s)"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/alert_times.py", (_EACH,),
+        ("loss-of-any-target", "group, self.p.step_s, self.p.target, self.p.losses_s",
+         "group, self.p.step_s, None, self.p.losses_s"),
+        ("alerts-of-any-block", 'mine = counts & is_named(columns["block"], name)',
+         "mine = counts"),
+        ("no-level-below-no-surprise", 'columns["level"] >= self.p.level - 1',
+         'columns["level"] == self.p.level - 1'),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/encounter.py", (_EACH,),
+        ("time-at-any-height", "Volume(*sizes_m[0], horizontal_time_s=tau_s)",
+         "Volume(sizes_m[0][0], 1e5, horizontal_time_s=tau_s)"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/risk_metric.py", (_EACH,),
+        ("class-of-the-last-target", "if distance_m < best[0]:", "if True:"),
     ),
 ]  # fmt: skip
