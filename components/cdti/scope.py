@@ -123,17 +123,19 @@ class Scope:
             self._names, self.names = names, [printable(name) for name in names]
 
     def _take_alerts(self, message: AlertLevels) -> None:
+        contacts = message.contacts()
+        for row, tick in enumerate(message.tick.tolist()):  # an alert goes on from row to row
+            of = slice(int(message.offsets[row]), int(message.offsets[row + 1]))
+            on = sorted(contacts[of][message.level[of] > 0].tolist())
+            self._since = {t: self._since.get(t, tick / self._per_s) for t in on}
         last = message.take(slice(len(message) - 1, len(message)))
-        time_s = int(last.tick[0]) / self._per_s
         contacts = last.contacts()
-        on = {int(t) for t, level in zip(contacts, last.level, strict=True) if level > 0}
-        self._since = {t: self._since.get(t, time_s) for t in sorted(on)}
         times = [last.times[name] for name in sorted(last.times)]
         with np.errstate(invalid="ignore"):
             to_loss = np.fmin.reduce(times) if times else np.full(len(contacts), np.nan)
         self._name(last.roster.names)
         self._alerts = _Alerts(
-            time_s,
+            int(last.tick[0]) / self._per_s,
             contacts,
             last.level,
             np.array([last.relative[name] for name in _RELATIVE]),
@@ -291,6 +293,8 @@ def _sensor(name: str, component: Component) -> dict[str, Any]:
     found: dict[str, Any] = {"name": printable(name), "kind": kind}
     if reach is None or not reach.enabled:
         return {**found, "range": None, "azimuth": None}
-    low, high = (round(math.degrees(edge), 3) for edge in reach.azimuth_rad)
+    # Bounds are in the sensor's axes.
+    turned_deg = getattr(component.p, "mount_azimuth_deg", 0.0)
+    low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
     far = getattr(component, "reach", reach).range_max_m
     return {**found, "range": round(far, 1) if math.isfinite(far) else None, "azimuth": [low, high]}

@@ -1,0 +1,148 @@
+"""What the operator's display shows of a crooked scene is what is there, and whose it is."""
+
+import math
+
+import crooked
+import numpy as np
+import pymap3d
+import pytest
+from test_avoidance_by_bands import CONF
+from wired import SEES_ALL, chain
+
+import dsa_des
+from components.cdti.scope import Scope
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.running.simulation import Simulation
+
+#: The second one conflicts first; the volumes of the alerter that is used are 1500 m wide.
+ASIDE = {"name": "aside", "east_m": 3000.0, "north_m": -5900.0, "up_m": 10.0,
+         "heading_deg": 290.0, "speed_mps": 95.0, "climb_mps": 3.5}  # fmt: skip
+CLOSING = {"name": "closing", "east_m": -2349.0, "north_m": -1855.0, "up_m": 120.0,
+           "heading_deg": 35.0, "speed_mps": 60.0, "climb_mps": -2.0, "roll_deg": 30.0}  # fmt: skip
+TARGETS = {"aside": ASIDE, "closing": CLOSING}
+RADAR = {
+    "type": "radar.range_boundary", "scan_rate_hz": 2, "range_km": 12.0, "errors": "stated",
+    "quantised": False, "azimuth_error_deg": 0.1, "elevation_error_deg": 0.1, "range_error_m": 5.0,
+    "mount_azimuth_deg": 10.0, "azimuth_deg": [-110.0, 120.0],
+}  # fmt: skip
+DURATION_S = 8.2
+
+
+@pytest.fixture(scope="module", params=["tracking.ekf", "tracking.stub"])
+def shown(request, tmp_path_factory):
+    """The display at the end, what was recorded, and the contact of each target."""
+    conf = tmp_path_factory.mktemp("conf") / "two.conf"
+    conf.write_text(CONF.format(rate=3), encoding="utf-8")
+    rules = {"conf": str(conf), "alerter": 2}
+    scene = chain(
+        {"radar": RADAR, "camera": {**SEES_ALL, "azimuth_deg": [-90.0, 90.0], "offset_s": 0.2}},
+        targets=TARGETS.values(), duration_s=DURATION_S, tracker={"type": request.param},
+        fusion={"type": "fusion.pass_through"},
+    )  # fmt: skip
+    if request.param == "tracking.stub":
+        scene["blocks"]["fusion"] = {"type": "fusion.pick_best"}
+    scene["blocks"]["alerting"] = {"type": "alerting.daidalus", "scan_rate_hz": 2, **rules}
+    scene["blocks"]["guidance"] = {"type": "guidance.daidalus", **rules}
+    scene["wires"] += ["traffic -> alerting", "tracker -> alerting -> guidance"]
+    sink = MemorySink()
+    recorder = Recorder([sink])
+    simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder)
+    scope = Scope(simulation)
+    recorder.listeners.append(scope.listen)
+    simulation.run()
+    recorded = {name: table.to_pylist() for name, table in sink.tables().items()}
+    last = [row for row in recorded["alerts"] if row["time_s"] == 8.0]
+    ekf = request.param == "tracking.ekf"
+    contact = {
+        row["target"]: 1_000_000 + row["track"] if ekf else list(TARGETS).index(row["target"])
+        for row in last
+    }
+    return scope, recorded, contact
+
+
+def away(name, seen_s, time_s=DURATION_S):
+    """East, north, up from the ownship at a time to where a target was."""
+    here = crooked.geodetic(crooked.position(crooked.OWNSHIP, time_s))
+    return np.array(pymap3d.ecef2enu(*crooked.position(TARGETS[name], seen_s), *here))
+
+
+def test_contacts_are_where_their_targets_were_and_fly_as_they_do(shown):
+    scope, _, contact = shown
+    picture = scope.picture(DURATION_S)
+    own = picture["own"]
+    assert own["alt"] == pytest.approx(2400.0 + 3.0 * 8.2, abs=1.0)
+    assert (own["speed"], own["climb"]) == pytest.approx((70.0, 3.0), abs=0.2)
+    assert own["heading"] == pytest.approx(222.0)
+    found = {row[0]: row for row in picture["contacts"]}
+    assert set(found) == set(contact.values())
+    level = {one["target"]: one["level"] for one in picture["alerts"]}
+    for name, target in TARGETS.items():
+        _, east, north, up, bearing, age, *flight, shown_level = found[contact[name]]
+        place = away(name, DURATION_S - age)
+        assert 0.0 <= age < 0.5
+        assert [east, north, up] == pytest.approx(place, abs=25.0)
+        assert bearing == pytest.approx(math.degrees(math.atan2(*place[:2])) % 360.0, abs=2.5)
+        heading = math.radians(target["heading_deg"])
+        wanted = [target["speed_mps"] * math.sin(heading), target["speed_mps"] * math.cos(heading)]
+        assert flight == pytest.approx([*wanted, target["climb_mps"]], abs=12.0)
+        assert shown_level == level[contact[name]]
+
+
+def test_alerts_are_those_of_their_targets_the_most_urgent_first(shown):
+    scope, recorded, contact = shown
+    alerts = scope.picture(DURATION_S)["alerts"]
+    assert [one["target"] for one in alerts] == [contact["closing"], contact["aside"]]
+    assert alerts[0]["level"] > alerts[1]["level"] > 0
+    for name, one in zip(("closing", "aside"), alerts, strict=True):
+        rows = [row for row in recorded["alerts"] if row["target"] == name]
+        times = [rows[-1][f"time_to_level_{k}_s"] for k in (1, 2)]
+        assert one["to_loss"] == pytest.approx(min(t for t in times if t is not None), abs=0.006)
+        assert one["closest"] == pytest.approx(rows[-1]["closest_horizontal_m"], abs=0.06)
+        since = 8.0
+        while rows and rows[-1]["level"] > 0:
+            since = rows.pop()["time_s"]
+        assert one["since"] == since < one["at"] == 8.0
+
+
+def test_the_area_of_a_loss_begins_where_a_target_comes_near(shown):
+    """Each of its directions flown straight, from where both were when the alerting looked."""
+    scope, _, _ = shown
+    area = [row for row in scope.picture(DURATION_S)["area"] if row[1] > 0.0]
+    assert len(area) > 20
+    for degrees, near, far in area:
+        assert near < far
+        heading, flown_s = math.radians(degrees), near / 70.0
+        moved = near * np.array([math.sin(heading), math.cos(heading)])
+        apart = [np.linalg.norm(away(name, 8.0 + flown_s, 8.0)[:2] - moved) for name in TARGETS]
+        assert min(abs(distance - 1500.0) for distance in apart) < 250.0
+
+
+def test_bands_are_shown_in_degrees_until_they_are_old(shown):
+    scope, recorded, _ = shown
+    bands = [r for r in recorded["bands"] if r["time_s"] == 8.0 and r["band"] == "direction"]
+    wanted = [
+        [round(math.degrees(r["low_rad"]), 1), round(math.degrees(r["high_rad"]), 1), r["region"]]
+        for r in bands
+    ]
+    assert wanted and scope.picture(DURATION_S)["bands"] == wanted
+    assert scope.picture(8.0 + 1.6)["bands"] == []
+
+
+def test_where_sensors_look_is_said_from_the_nose(shown):
+    radar = next(one for one in shown[0].sensors if one["name"] == "radar")
+    assert (radar["kind"], radar["range"], radar["azimuth"]) == ("radar", 12000.0, [-100.0, 130.0])
+
+
+def test_the_camera_s_picture_is_of_the_chosen_contact(shown):
+    scope, recorded, contact = shown
+    picture = scope.picture(DURATION_S)
+    for chosen in (*contact.values(), -1):
+        name = next((n for n, c in contact.items() if c == chosen), "closing")
+        rows = [r for r in recorded["detections"] if r["block"] == "camera" and r["target"] == name]
+        found = scope.camera(picture, DURATION_S, chosen)
+        if not rows:
+            assert found is None
+            continue
+        assert found["target"] == contact[name]
+        assert found["age"] == pytest.approx(DURATION_S - rows[-1]["time_s"], abs=0.006)
+        assert found["pixels"] == pytest.approx(rows[-1]["pixels"], abs=0.06)
