@@ -30,6 +30,8 @@ from dsa_des.text.safe_text import printable
 
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 _EVERYWHERE = ("0.0.0.0", "::", "")
+_DECIDED = "It lets one browser decide; whoever opens it after that watches."
+_WATCHED = "The scene has no operator.human block: browsers watch, nobody decides."
 
 
 def run_session(
@@ -81,7 +83,7 @@ def run_session(
     crew.attach(server, pacer, admission)
     server.start()
     say(f"display: {server.address(admission.token)}")
-    say("It lets one browser decide; whoever opens it after that watches. Ctrl-C ends the run.")
+    say(f"{_WATCHED if console is None else _DECIDED} Ctrl-C ends the run.")
     if host not in _LOOPBACK:
         open_to = f"note: others in the network of {host} can reach it"
         say(f"{open_to}, and what is sent is not encrypted", err=True)

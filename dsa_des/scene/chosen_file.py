@@ -41,8 +41,9 @@ def chosen_file(asked: Path | str, kind: Literal["scene", "study"] | None = None
 
 
 def _has_neighbour(path: Path) -> bool:
-    """Return whether a file of nearly this name lies in the working directory."""
+    """Return whether a file (no folder) of nearly this name lies in the working directory."""
     try:
-        return nearest(path.name, os.listdir()) is not None
+        files = [entry.name for entry in os.scandir() if entry.is_file()]
+        return nearest(path.name, files) is not None
     except OSError:
         return False

@@ -107,7 +107,10 @@ def test_a_path_that_exists_wins(call: Call, tmp_path: Path) -> None:
         (("compare", "frist_light", "--swap", "gate=gate"), "'first_light'"),
     ],
 )
-def test_a_misspelt_name_gets_the_nearest(call: Call, words: tuple[str, ...], meant: str) -> None:
+def test_a_misspelt_name_gets_the_nearest(
+    call: Call, tmp_path: Path, words: tuple[str, ...], meant: str
+) -> None:
+    (tmp_path / "first").mkdir()  # a run's folder is no scene that could be meant
     done = call(*words)
     assert done.exit_code == 2
     assert f"did you mean the shipped {meant}?" in done.output

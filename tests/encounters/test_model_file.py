@@ -54,7 +54,7 @@ def test_a_good_model_is_read_by_name(tmp_path: Path) -> None:
         ("# G_initial", "# G_initail", "there is no part 'G_initail'; did you mean 'G_initial'?"),
         ("# r_initial", "# N_initial", "'N_initial' stands where 'r_initial' is expected"),
         ('"\\dot h(t)"', '"\\dot hh(t)"', "unknown variable '\\\\dot hh(t)'; did you mean"),
-        ('"\\dot h(t)", ', "", "needs '\\\\dot h(t)' beside it"),
+        ('"\\dot h(t)", ', "", "needs '\\dot h(t)' beside it"),
         ("20 60 90 140", "20 60 90", "variable 'v' has 3 bins: 4 edges are needed, or *; there"),
         ("20 60 90 140", "20 90 60 140", "variable 'v': edges must be rising numbers"),
         ("500 1500 4000\n", "", "boundaries: 6 rows are needed, one for each variable; there"),

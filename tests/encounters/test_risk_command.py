@@ -84,13 +84,15 @@ def test_damaged_encounters_are_skipped_and_counted_on_request(tmp_path: Path) -
 
 
 def test_rows_that_hang_together_are_told_apart_from_encounters(tmp_path: Path) -> None:
-    rows = ["encounter,copy,n,m"]
-    rows += [f"{k},{c},{int(k % 2)},{int(k % 4 == 1)}" for k in range(80) for c in range(3)]
+    rows = ["encounter,copy,n,m,kind"]
+    rows += [f"{k},{c},{int(k % 2)},{int(k % 4 == 1)},x" for k in range(80) for c in range(3)]
     (tmp_path / "t.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     words = (tmp_path / "t.csv", "--nominal", "n", "--mitigated", "m", "--json")
     loose = json.loads(call(*words).stdout)
     found = json.loads(call(*words, "--cluster", "encounter").stdout)
     assert (found["clusters"], loose["clusters"], found["ratio"]) == (80, 240, loose["ratio"])
     assert found["standard_error"] == pytest.approx(loose["standard_error"] * 3**0.5)
+    classes = json.loads(call(*words, "--cluster", "encounter", "--by", "kind").stdout)["classes"]
+    assert classes["x"]["standard_error"] == pytest.approx(found["standard_error"])
     told = call(*words[:-1], "--cluster", "encounter", "--by", "encounter").stdout
     assert "240 encounters in 80 clusters" in told

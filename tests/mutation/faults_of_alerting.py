@@ -235,4 +235,34 @@ FAULTS = [
         ),
         ("always-the-first-target", "code.get(d.target, -1)", "0 if d.target else -1"),
     ),
+    *in_file(
+        _GROUP,
+        "components/alerting/daidalus.py",
+        (_REST_ON,),
+        (
+            "times-of-the-first-level",
+            'f"time_to_level_{k}_s": times_s[:, k - 1].copy()',
+            'f"time_to_level_{k}_s": times_s[:, 0].copy()',
+        ),
+        (
+            "late-sights-by-the-pose-of-now",
+            "self._own.pose_of(sights.measured_tick, came, _begins(came, wake), new)",
+            "self._own.pose_of(came, came, _begins(came, wake), new)",
+        ),
+        (
+            "late-sights-are-of-now",
+            "sights.tick, arrived.tick, row, sights.measured_tick[new])",
+            "sights.tick, arrived.tick, row, arrived.tick[row])",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/guidance_block.py",
+        (_REST_ON,),
+        (
+            "bands-of-the-first-instants",
+            "ticks = wake.ticks[np.array(rows, dtype=np.int64)]",
+            "ticks = wake.ticks[: len(rows)]",
+        ),
+    ),
 ]

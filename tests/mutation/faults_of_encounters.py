@@ -90,4 +90,34 @@ FAULTS = [
         ("own-flight-of-the-encounter", "self.own = ScriptedTrajectory(",
          "ScriptedTrajectory("),
     ),
+    *in_file(
+        _GROUP, "components/encounters/splitting.py", ("encounters/test_what_splits_a_set.py",),
+        ("heights-by-the-radius", "np.abs(apart[2]) / _NMAC.vertical_m",
+         "np.abs(apart[2]) / _NMAC.horizontal_m"),
+        ("copies-at-the-origin", "found.reference_deg,\n        {n", "(0.0, 0.0),\n        {n"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/split_command.py",
+        ("encounters/test_what_splits_a_set.py",),
+        ("one-lot-for-all-seeds", "split_set(found, expected, seed)",
+         "split_set(found, expected, 0)"),
+        ("last-score-counts", "min(v, least.get(n, math.inf))", "v"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/encounter_traffic.py",
+        ("encounters/test_what_splits_a_set.py",),
+        ("weight-of-the-first-is-told", "float(self.found.weights[self.place])",
+         "float(self.found.weights[0])"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/encounter_traffic.py",
+        ("wiring/test_encounter_traffic_keys.py",),
+        ("own-model-for-both", "intruder = parameters.intruder_file or parameters.file",
+         "intruder = parameters.file"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/risk_table.py", ("encounters/test_risk_command.py",),
+        ("classes-of-single-rows", "(n, m, w, labels, together, **options)",
+         "(n, m, w, labels, None, **options)"),
+    ),
 ]  # fmt: skip

@@ -304,5 +304,12 @@ FAULTS = [
         _GROUP, "components/radar/measured_strength.py", _NOISE_IS,
         ("strength-beyond-the-look", "false_alarm_probability=self._block.p.cell_pfa",
          "false_alarm_probability=self._block.p.false_alarm_probability"),
+        ("strength-of-another-target", "np.log10(np.maximum(snr, 1e-6))",
+         "np.log10(np.maximum(snr[::-1], 1e-6))"),
+    ),
+    *in_file(
+        _GROUP, "components/sensor/declaration_by_place.py", "sensor_effects/"
+        "test_declaration_delay.py::test_places_are_remembered_across_windows",
+        ("a-scan-too-few", "(self.n - 1))", "(self.n - 2))"),
     ),
 ]  # fmt: skip

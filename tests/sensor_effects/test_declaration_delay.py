@@ -18,7 +18,8 @@ def test_windows_do_not_change_a_bit(scene, runs):
 def test_places_are_remembered_across_windows(scene, runs):
     """Noise takes part, and a place that was seen before the window began counts."""
     noise = "threshold = 5\nfalse_alarms_per_frame = 0.5"
-    path = scene(f"{RULE}\n{noise}", f"{RULE}\n{noise}\ndeclare_by = 'place'")
+    every = "declare_m = 3\ndeclare_n = 3"  # of as many scans as are remembered
+    path = scene(f"{every}\n{noise}", f"{RULE}\n{noise}\ndeclare_by = 'place'")
     run = runs.run(path)
     for window in (1, 37):
         runs.assert_same(run, runs.run(path, window=window))

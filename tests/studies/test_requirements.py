@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
+from dsa_des.studies import output
 from dsa_des.studies.cheapest import answers, one_sided
 from dsa_des.studies.metric import NUMBER, Result
 from dsa_des.studies.requirements import Requirement
@@ -102,18 +103,35 @@ def test_what_is_wrong_is_said(old: str, new: str, said: str, tmp_path: Path) ->
         read_study(tmp_path / "s.toml")
 
 
-def test_a_study_draws_its_map_and_tells_the_cheapest(tmp_path: Path) -> None:
+def test_a_study_draws_its_map_and_tells_the_cheapest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn, draw = [], output.draw_map
+    monkeypatch.setattr(output, "draw_map", lambda *given: drawn.append(given) or draw(*given))
     text = STUDY.replace("SCENE", str(ROOT / "configs" / "first_light.toml"))
+    across, up = "blocks.eo.scan_rate_hz", "blocks.radar.scan_rate_hz"
+    text = text.replace('kind = "map"\n', f'kind = "map"\nx = "{across}"\ny = "{up}"\n')
+    # The same once more, with the other end of the axis as the cheap one.
+    text += text[text.index("[[requirements]]") :] + 'cheaper = "last"\n'
     (tmp_path / "s.toml").write_text(text, encoding="utf-8")
     words = ["study", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
     done = CliRunner().invoke(main, words, catch_exceptions=False)
     assert done.exit_code == 0 and "cheapest that meets a limit, 97.5 % sure" in done.output
     assert (tmp_path / "out" / "figure-01-map.png").stat().st_size > 5000
     found = pq.read_table(tmp_path / "out" / "requirements.parquet").to_pylist()
-    assert [row["others"] for row in found] == [f"eo.scan_rate_hz = {k}" for k in (1, 3)]
+    assert [row["others"] for row in found] == [f"eo.scan_rate_hz = {k}" for k in (1, 3)] * 2
+    (map_,) = drawn
+    assert map_[2:5] == ("detection_share.radar", "eo.scan_rate_hz", "radar.scan_rate_hz")
+    assert (list(map_[5]), map_[7]) == ([0.2, 0.9], 0.95)
     summary = pq.read_table(tmp_path / "out" / "summary.parquet").to_pylist()
-    for row, eo in zip(found, (1.0, 3.0), strict=True):
+    for number, (row, eo) in enumerate(zip(found, (1.0, 3.0) * 2, strict=True)):
         mine = [r for r in summary if r["result"] == "detection_share.radar"]
         low = {r["radar.scan_rate_hz"]: r["low"] for r in mine if r["eo.scan_rate_hz"] == eo}
-        best = None if low[2.0] < 0.001 else "2" if low[1.0] < 0.001 else "1"
-        assert row["cheapest"] == best and row["confidence"] == pytest.approx(0.975)
+        dear, cheap = (2.0, 1.0) if number < 2 else (1.0, 2.0)
+        best = None if low[dear] < 0.001 else dear if low[cheap] < 0.001 else cheap
+        assert row["cheapest"] == (best and f"{best:g}")
+        assert row["confidence"] == pytest.approx(0.975)
+        (told,) = (r for r in mine if r["eo.scan_rate_hz"] == eo
+                   and r["radar.scan_rate_hz"] == (best or dear))  # fmt: skip
+        for name in ("value", "low", "high"):
+            assert row[name] == told[name]

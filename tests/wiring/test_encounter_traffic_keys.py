@@ -145,6 +145,7 @@ def test_a_model_gives_the_encounter_of_its_number(tmp_path):
     assert np.abs(np.diff(apart)).max() <= 2 * 12 * 1852 / 3600
     mixed = seen({**traffic, "intruder_file": slow, "encounter": 1}, 4)
     assert [row["true_range_m"] for row in mixed.values()] != apart
+    assert mixed != seen({**traffic, "encounter": 1}, 4)
 
 
 @covers("update_rate_hz", of=BOTH)

@@ -5,7 +5,8 @@ import math
 import crooked
 import numpy as np
 import pytest
-from test_alerting_keys import CONF, TARGET
+from test_alerting_keys import CONF, TARGET, entry_s, truth
+from test_alerting_keys import scene as alerting_scene
 from test_alerts_of_estimates import PLAIN, scene
 from wired import rows, run
 
@@ -86,7 +87,7 @@ def deviations_by_hand(state, ahead_s):
 
 def test_each_track_has_its_own_state_deviations_and_margins(tmp_path, told):
     found = run(two_tracks(tmp_path))
-    truth = {(row["time_s"], row["target"]): row for row in rows(found, "truth")}
+    flown = {(row["time_s"], row["target"]): row for row in rows(found, "truth")}
     tracks = rows(found, "state_tracks")
     seen = set()
     for time_s, message, row, place in entries(told):
@@ -97,7 +98,7 @@ def test_each_track_has_its_own_state_deviations_and_margins(tmp_path, told):
         assert wrong == pytest.approx(by_hand, rel=1e-6)
         # By the truth: the target is the one that the track is of.
         name = ("late", "meets")[message.target[place]]
-        own, other = truth[time_s, None], truth[time_s, name]
+        own, other = flown[time_s, None], flown[time_s, name]
         seen.add((number, name))
         relative = {key: message.relative[key][place] for key in message.relative}
         assert relative["up_m"] == pytest.approx(own["alt_m"] - other["alt_m"], abs=12.0)
@@ -228,3 +229,60 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)
+
+
+def test_each_level_has_the_time_to_its_own_volume(tmp_path):
+    """The inner volume is met later than the outer, by the geometry of the straight flights."""
+    path = tmp_path / "levels.conf"
+    path.write_text(CONF.format(m=0) + """\
+large_load_core_detection_inner = gov.nasa.larcfm.ACCoRD.WCV_TCPA
+large_inner_WCV_DTHR = 430 [m]
+large_inner_WCV_ZTHR = 200 [m]
+large_inner_WCV_TTHR = 0 [s]
+large_alert_2_detector = inner
+large_alert_2_region = NEAR
+large_alert_2_alerting_time = 5 [s]
+""", encoding="utf-8")  # fmt: skip
+    one = alerting_scene(tmp_path)
+    one["blocks"]["alerting"]["conf"] = str(path)
+    found = [row for row in rows(run(one), "alerts") if row["time_s"] <= 3.0]
+    assert len(found) > 3
+    for row in found:
+        for level, radius_m in ((1, 900.0), (2, 430.0)):
+            wanted = entry_s(truth(row["time_s"]), radius_m)
+            assert row[f"time_to_level_{level}_s"] == pytest.approx(wanted, rel=0.02)
+        assert row["time_to_level_3_s"] is None
+
+
+def test_sights_that_come_late_are_turned_by_the_pose_of_their_own_instant(tmp_path, told):
+    """2 s late, from an ownship that turns by 2 deg/s: by then its pose is 4 deg off."""
+    one = alerting_scene(tmp_path, {"from": "fusion", "to": "alerting", "delay_s": 2})
+    own = {**TURNING, "legs": [{"kind": "turn", "rate_deg_s": 2.0}]}
+    one["blocks"]["traffic"] |= {"ownship": own, "intruders": [TARGET]}
+    found = run(one)
+    truth_of = {(row["time_s"], row["target"]): row for row in rows(found, "truth")}
+    late = [entry for entry in entries(told) if entry[0] >= 4.0]
+    assert len(late) == 4
+    for time_s, message, _, place in late:
+        own_now, other = truth_of[time_s, None], truth_of[time_s, "meets"]
+        north, east = crooked_level(own_now, other)
+        relative = message.relative["north_m"][place], message.relative["east_m"][place]
+        # Carried on straight for 2 s, while the ownship turns on: 70 m/s by some 4 degrees.
+        assert relative == pytest.approx((-north, -east), abs=25.0)
+        assert math.hypot(north, east) > 800.0
+
+
+def test_bands_are_of_the_instants_of_their_alerts(tmp_path):
+    """Also where the first alerts come long after the first scans, and all scans are one wake."""
+    from test_avoidance_by_bands import scene as by_bands
+
+    one = by_bands(tmp_path)
+    one["wires"] = ["traffic -> alerting -> guidance"]
+    one["blocks"]["guidance"] = {
+        "type": "guidance.daidalus", "conf": one["blocks"].pop("avoidance")["conf"],
+    }  # fmt: skip
+    one["duration_s"] = 40
+    found = run(one)
+    alerted = [row["time_s"] for row in rows(found, "alerts") if row["level"] >= 1]
+    assert alerted[0] > 5.0
+    assert sorted({row["time_s"] for row in rows(found, "bands")}) == alerted

@@ -57,6 +57,24 @@ def test_echoes_have_crossed_the_threshold_of_a_cell(kind):
     assert min(strengths[0]) == pytest.approx(min(strengths[1]), abs=0.7)
 
 
+def test_each_echo_is_measured_about_its_own_strength():
+    """On the mean of many looks, of which `looks` has the strength that decided."""
+    far = [{**target, "east_m": target["east_m"] * k, "north_m": target["north_m"] * k}
+           for k, target in zip((1.0, 1.7), crooked.TARGETS, strict=True)]  # fmt: skip
+    keys = {"swerling": 0, "power_w": 3e5, "scan_rate_hz": 25, "range_km": 12.0}
+    scene = chain({"radar": noisy("radar.swerling", "grid", **keys)}, duration_s=4,
+                  targets=far, record={"looks": True})  # fmt: skip
+    found = run(scene)
+    expected = {(row["scan"], row["target"]): row["snr_db"] for row in rows(found, "looks")}
+    means = []
+    for target in ("rolling", "diving"):
+        mine = rows(found, target=target)
+        off_db = np.array([row["snr_db"] - expected[row["scan"], target] for row in mine])
+        assert 0.7 < (10.0 ** (0.1 * off_db)).mean() < 1.4
+        means.append(np.mean([expected[row["scan"], target] for row in mine]))
+    assert abs(means[0] - means[1]) > 4.0 and min(means) > 15.0
+
+
 def places(first, second, apart_s=0.5, angle_variance=(0.0, 0.0), range_variance=(0.0, 0.0)):
     """Two detections at (angle rad, range m) in two scans."""
     angles = np.array([first[0], second[0]])

@@ -228,7 +228,7 @@ const Plan = (() => {
       c.strokeStyle = Symbols.level(a.level[i]);
       c.lineWidth = 1 + a.level[i];
       c.beginPath(); c.arc(x, y, 14, 0, 2 * Math.PI); c.stroke();
-      Symbols.text(c, `alert ${a.level[i]}`, x + 17, y + 4, Symbols.level(a.level[i]));
+      Symbols.text(c, `alert ${a.level[i]}`, x + 17, y - 7, Symbols.level(a.level[i]));
     }
   }
   function lastSeen(target, t) {

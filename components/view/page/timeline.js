@@ -39,7 +39,7 @@ const Timeline = (() => {
     });
     const step = Symbols.niceStep(Data.duration_s / Math.max(2, canvas.clientWidth / 90));
     for (let t = 0; t <= Data.duration_s; t += step) {
-      Symbols.text(c, `${+(t + Data.start_s).toFixed(3)} s`, x(t), canvas.clientHeight - 4,
+      Symbols.text(c, `${+(t + Data.start_s).toFixed(3)} s`, Math.min(x(t), canvas.clientWidth - 20), canvas.clientHeight - 4,
         Symbols.colours.faint, "center");
     }
     still = { copy, width: canvas.clientWidth, height: canvas.clientHeight, ratio };
