@@ -84,7 +84,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/cdti/crew.py", _WHOLE,
-        ("turns-to-the-other-side", "turn_rad=math.radians(value)", "turn_rad=-math.radians(value)"),
+        ("turns-to-the-other-side", "turn_rad=math.radians(value)",
+         "turn_rad=-math.radians(value)"),
         ("climbs-are-lost", "climb_m=value if kind == CLIMB else 0.0", "climb_m=0.0"),
     ),
     *in_file(
@@ -94,7 +95,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/cdti/contacts.py", _SHOWN,
-        ("tracks-by-their-place", "TRACKS_FROM + message.track[lives]", "TRACKS_FROM + lives"),
+        ("contacts-by-their-place", "TRACKS_FROM + message.track[lives]", "TRACKS_FROM + lives"),
         ("tracks-upside-down", "-message.down_m[with_range]", "message.down_m[with_range]"),
     ),
     *in_file(
