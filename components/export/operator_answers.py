@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from itertools import groupby
 from typing import Any
 
 from components.export.recorded import RecordedTables
@@ -19,9 +20,10 @@ _JUDGED, _ACTS = ("verified", "rejected"), ("turn", "climb")
 def operator_csv(run: RecordedTables) -> bytes:
     """Return a row for each alert: when it came, was on screen, was looked at, judged, acted on.
 
-    An alert of a target lasts as long as its level is above 0 without a gap. To it belongs the
-    first decision of each kind about the target while it lasts; a manoeuvre also where it names no
-    target, but not one that belongs to an alert before. Responses are counted from when the alert
+    An alert of a target, or of a track of it, lasts as long as its level is above 0 without a gap.
+    To it belongs the first decision of each kind about the target, or about "track N" as displays
+    name what is known by a track alone, while it lasts; a manoeuvre also where it names no target,
+    but not one that belongs to an alert before. Responses are counted from when the alert
     came; ``_wall_s`` are seconds since 1970 by the clock on the wall. What did not happen is empty;
     turns are in degrees to the right, climbs in m.
 
@@ -35,7 +37,9 @@ def operator_csv(run: RecordedTables) -> bytes:
             raise UsageError(f"{run.folder}: has no {name}.parquet, which {needed} records")
     decisions = run.tables["decisions"].to_pylist()
     taken: set[int] = set()
-    rows = [_answered(alert, decisions, taken) for alert in _alerts(run.tables["alerts"])]
+    rows = [
+        _answered(alert, names, decisions, taken) for alert, names in _alerts(run.tables["alerts"])
+    ]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -43,26 +47,42 @@ def operator_csv(run: RecordedTables) -> bytes:
     return stream.getvalue().encode("utf-8")
 
 
-def _alerts(table: Any) -> list[dict[str, Any]]:
-    """Return the alerts of all targets in the order in which they came."""
-    on: dict[str, dict[str, Any]] = {}
+def _alerts(table: Any) -> list[tuple[dict[str, Any], set[str | None]]]:
+    """Return the alerts in the order in which they came, and the names of what each is about."""
+    on: dict[Any, dict[str, Any]] = {}
     found = []
-    rows = sorted(table.select(["time_s", "target", "level"]).to_pylist(), key=_time)
-    for row in rows:
-        target, level = row["target"], row["level"]
-        if level > 0:
-            if target not in on:
-                on[target] = {"target": target, "alert_s": row["time_s"], "highest_level": 0,
-                              "ended_s": None}  # fmt: skip
-                found.append(on[target])
-            on[target]["highest_level"] = max(on[target]["highest_level"], level)
-        elif target in on:
-            on.pop(target)["ended_s"] = row["time_s"]
+    for (time_s, block), look in groupby(sorted(table.to_pylist(), key=_look), key=_look):
+        rows = {(block, _about(row)): row for row in look}
+        # A track that its block no longer tells of is gone, and its alert with it.
+        for about in [a for a in on if a[0] == block and isinstance(a[1], int) and a not in rows]:
+            on.pop(about)["ended_s"] = time_s
+        for about, row in rows.items():
+            target, level, track = row["target"], row["level"], row.get("track")
+            if level > 0:
+                if about not in on:
+                    label = None if track is None else f"track {track}"
+                    on[about] = {"target": target or label, "alert_s": time_s,
+                                 "highest_level": 0, "ended_s": None}  # fmt: skip
+                    found.append((on[about], {target, label} - {None}))
+                on[about]["highest_level"] = max(on[about]["highest_level"], level)
+            elif about in on:
+                on.pop(about)["ended_s"] = time_s
     return found
 
 
+def _look(row: dict[str, Any]) -> tuple[float, str]:
+    return float(row["time_s"]), row.get("block", "")
+
+
+def _about(row: dict[str, Any]) -> Any:
+    return row["target"] if row.get("track") is None else row["track"]
+
+
 def _answered(
-    alert: dict[str, Any], decisions: list[dict[str, Any]], taken: set[int]
+    alert: dict[str, Any],
+    names: set[str | None],
+    decisions: list[dict[str, Any]],
+    taken: set[int],
 ) -> dict[str, Any]:
     """Return the row of an alert with the decisions that belong to it."""
     ended_s = math.inf if alert["ended_s"] is None else alert["ended_s"]
@@ -71,7 +91,7 @@ def _answered(
         if not alert["alert_s"] <= one["time_s"] <= ended_s or place in taken:
             continue
         what = one["decision"]
-        about = one["target"] == alert["target"]
+        about = one["target"] in names
         if what in _ACTS and (about or one["target"] is None):
             name = "acted"
         elif about:
@@ -92,7 +112,3 @@ def _answered(
         if f"{name}_s" in row:
             row[f"{short}_response_s"] = round(row[f"{name}_s"] - row["alert_s"], 9)
     return row
-
-
-def _time(row: dict[str, Any]) -> float:
-    return float(row["time_s"])

@@ -1,6 +1,7 @@
 """A session without a browser: who is let in, what is taken in, and what the run folder holds."""
 
 import json
+import math
 import random
 import time
 import urllib.error
@@ -10,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 websockets = pytest.importorskip("websockets", reason="needs the package websockets")
-from live import Session, hear, page, say, wait_for  # noqa: E402
+from live import LATER, Session, hear, page, say, wait_for  # noqa: E402
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
 
 import dsa_des  # noqa: E402
@@ -80,7 +81,8 @@ def test_no_socket_for_a_page_of_another_origin(live, options):
 
 def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
     swaps = ("tracker=tracking.stub",)
-    session = Session(monkeypatch, tmp_path / "run", factor="4", duration="20", swaps=swaps)
+    session = Session(monkeypatch, tmp_path / "run", factor="4", duration="20", swaps=swaps,
+                      sets=(*LATER, "blocks.operator.turn_rate_deg_s=5"))  # fmt: skip
     with page(session) as (socket, welcome), page(session) as (other, beside):
         assert (welcome["role"], beside["role"]) == ("operator", "watcher")
         assert welcome["console"] and not welcome["began"]
@@ -100,10 +102,12 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
         say(socket, **TURN, id=ident(4))
         taken = hear(socket, "taken")
         assert hear(other, "taken")["id"] == ident(2)  # who watches sees what is decided
+        say(socket, **{**TURN, "decision": "climb", "value": 60}, id=ident(6))
+        climbed = hear(socket, "taken")
     # The page is gone; what it was told is taken in stays, and the run goes on.
     with page(session, key=welcome["key"]) as (socket, again):
         assert again["role"] == "operator"
-        assert [one["id"] for one in again["log"]] == [ident(2), ident(4)]
+        assert [one["id"] for one in again["log"]] == [ident(2), ident(4), ident(6)]
         say(socket, **TURN, id=ident(4))  # said again, as if the answer had been lost
         assert hear(socket, "taken") == taken
         assert hear(socket, "end", timeout=120)["why"] == "the scene has come to its end"
@@ -112,8 +116,10 @@ def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
     session.ended()
     decided = pq.read_table(session.out / "decisions.parquet").to_pylist()
     assert [(row["decision"], row["time_s"]) for row in decided] == [
-        ("verified", verified["time"]), ("turn", taken["time"]),
+        ("verified", verified["time"]), ("turn", taken["time"]), ("climb", climbed["time"]),
     ]  # fmt: skip
+    told = [(row["turn_rad"], row["climb_m"]) for row in decided]
+    assert told == [(0.0, 0.0), (pytest.approx(math.pi / 4), 0.0), (0.0, 60.0)]  # to the right, up
     assert abs(decided[1]["wall_time_s"] - time.time()) < 60
     replayed = tmp_path / "replayed"
     dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=replayed)

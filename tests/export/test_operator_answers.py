@@ -54,6 +54,28 @@ def test_every_alert_has_the_first_answers_while_it_lasts():
     assert (again["shown_s"], again["value"], again["looked_s"]) == ("13.0", "-300.0", "")
 
 
+def test_decisions_about_a_track_belong_to_its_alert():
+    """Displays name what a tracker's alert is about by its track, as an operator knows no names."""
+    told = ("time_s", "target", "level", "track")
+    alerts = [
+        (1.0, "a", 2, 7),
+        (1.0, "a", 0, 9),
+        (3.0, "a", 3, 7),
+        (5.0, None, 1, 8),
+    ]  # 7 is gone at 5 s
+    tables = {
+        "alerts": pa.Table.from_pylist([dict(zip(told, one, strict=True)) for one in alerts]),
+        "decisions": pa.Table.from_pylist(
+            [decided(2.0, "shown", "track 7"), decided(6.0, "verified", "track 8")]
+        ),
+    }
+    text = operator_csv(RecordedTables(Path("run"), tables)).decode()
+    first, second = csv.DictReader(io.StringIO(text))
+    assert (first["target"], first["shown_s"], first["highest_level"]) == ("a", "2.0", "3")
+    assert (first["ended_s"], first["judged_s"]) == ("5.0", "")
+    assert (second["target"], second["judged_as"], second["shown_s"]) == ("track 8", "verified", "")
+
+
 def test_a_run_without_a_console_is_refused():
     with pytest.raises(UsageError, match=r"run: has no decisions\.parquet"):
         operator_csv(RecordedTables(Path("run"), {"alerts": pa.table({"time_s": [1.0]})}))

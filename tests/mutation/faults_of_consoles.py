@@ -8,6 +8,8 @@ _PICTURE = "cdti/test_picture.py"
 _ADMISSION = "cdti/test_admission.py"
 _SESSION = "cdti/test_session.py"
 _MESSAGES = "cdti/test_page_messages.py"
+_SHOWN = "wiring/test_what_the_display_shows.py"
+_WHOLE = "cdti/test_session.py::test_a_whole_session_and_its_replay"
 
 FAULTS = [
     *in_file(
@@ -67,5 +69,48 @@ FAULTS = [
          "_body_to_ned(own_attitude_rad * np.array([1.0, 1.0, 0.0])).T"),
         ("plate-as-deep-as-wide", "areas.horizontal_m2 * PLATE_ASPECT_RATIO",
          "areas.horizontal_m2 * 1.0"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/console.py", _CONSOLE,
+        ("level-of-whoever-is-worst", "int(level[place]), tick if", "int(level.max()), tick if"),
+        ("alert-of-when-it-was-sent", "entries, int(arrived.tick[place]))",
+         "entries, int(alerts.tick[place]))"),
+        ("alert-that-comes-with-the-decision-is-missed", 'until, side="right"))',
+         'until, side="left"))'),
+        ("descents-are-not-flown", "abs(decision.climb_m) >= _LEAST_CLIMB_M",
+         "decision.climb_m >= _LEAST_CLIMB_M"),
+        ("manoeuvres-all-at-the-first", "told = [(tick, self._told(d))",
+         "told = [(made[0][0], self._told(d))"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/crew.py", _WHOLE,
+        ("turns-to-the-other-side", "turn_rad=math.radians(value)",
+         "turn_rad=-math.radians(value)"),
+        ("climbs-are-lost", "climb_m=value if kind == CLIMB else 0.0", "climb_m=0.0"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/session.py", _WHOLE,
+        ("replay-at-other-rates", "if key in RecordedOperator.Parameters.model_fields",
+         'if key == "scan_rate_hz"'),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/contacts.py", _SHOWN,
+        ("contacts-by-their-place", "TRACKS_FROM + message.track[lives]", "TRACKS_FROM + lives"),
+        ("tracks-upside-down", "-message.down_m[with_range]", "message.down_m[with_range]"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/scope.py", _SHOWN,
+        ("flights-relative-to-the-ownship",
+         "alerts.own_mps[:, np.newaxis] - alerts.relative[3:]", "-alerts.relative[3:]"),
+        ("flight-of-another-contact", "flights.get(one[0], _UNKNOWN)", "flights.get(0, _UNKNOWN)"),
+        ("level-of-another-contact", "level.get(one[0], 0)",
+         "max(level.values(), default=0)"),
+        ("alert-since-the-last-row", "self._since.get(t, tick / self._per_s)",
+         "tick / self._per_s"),
+        ("rules-of-the-first-alerter", "configuration.alerters[component.p.alerter - 1]",
+         "configuration.alerters[0]"),
+        ("sector-of-an-unturned-radar", "math.degrees(edge) + turned_deg", "math.degrees(edge)"),
+        ("bands-for-ever", "> BANDS_LAST_S", "> 1e9"),
+        ("camera-looks-at-the-first-contact", "contacts.toward[place[0]]", "contacts.toward[0]"),
     ),
 ]  # fmt: skip

@@ -189,3 +189,36 @@ def test_without_a_person_nothing_is_decided_and_it_says_so(tmp_path):
     late = dsa_des.load_scene(scene(tmp_path) | {"duration_s": 50})
     (said,) = Simulation(late).components["avoidance"].warnings()
     assert said == "decisions: 1 of 2 come after the end"
+
+
+def test_a_decision_knows_the_alerts_that_have_come_of_its_own_target(tmp_path):
+    """Two intruders with alerts of different levels, which come 0.7 s late."""
+    table = (
+        "time_s,decision,target,turn_rad,climb_m\n43.7,verified,other,,\n43.7,looked,head_on,,\n"
+        "46.1,turn,other,0.4,\n46.35,climb,,,-70\n"
+    )
+    wanted = scene(tmp_path, scan_rate_hz=10)
+    (tmp_path / "table.csv").write_text(table)
+    wanted["duration_s"] = 47
+    first = wanted["blocks"]["traffic"]["intruders"][0]
+    far = {k: first[k] * 1.2 for k in ("east_m", "north_m")}
+    wanted["blocks"]["traffic"]["intruders"].append({**first, **far, "name": "other"})
+    wanted["wires"] = [
+        "traffic -> alerting",
+        {"from": "alerting", "to": "avoidance", "delay_s": 0.7, "holds": "nothing"},
+        {"from": "avoidance", "to": "traffic", "delay_s": 1, "holds": "nothing"},
+    ]  # fmt: skip
+    found = run(wanted)
+    alerts = {}
+    for row in rows(found, "alerts"):
+        alerts.setdefault(row["target"], []).append((row["time_s"] + 0.7, row["level"]))
+    decided = rows(found, "decisions")
+    # At 43.7 s the alerts of 43 s have just come.
+    for row in decided[:3]:
+        there = [one for one in alerts[row["target"]] if one[0] <= row["time_s"] + 1e-9]
+        began = min(time_s for time_s, level in there if level > 0)
+        assert (row["level"], row["alert_s"]) == (there[-1][1], pytest.approx(began))
+    assert decided[0]["level"] < decided[1]["level"]
+    told = rows(found, "manoeuvres")
+    assert [row["time_s"] for row in told] == [46.1, 46.4]
+    assert (told[0]["turn_rad"], told[1]["climb_m"]) == (0.4, -70.0)

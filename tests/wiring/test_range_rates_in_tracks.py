@@ -74,6 +74,17 @@ def test_rates_that_cannot_be_weighed_are_left_out_and_explained(keys, tracker, 
     assert Simulation(dsa_des.load_scene(scene())).components["tracker"].left_out() == []
 
 
+def test_only_rates_of_who_may_tell_them_are_used():
+    """Another radar's rates may be used, that looks later; those of this one fold."""
+    given = scene()
+    folds = {**RADAR, "range_rate_folds": True, "prf_hz": 20_000.0}
+    given["blocks"] |= {"folds": folds, "radar": {**RADAR, "offset_s": 0.5}}
+    given["wires"] += ["gate -> folds -> fusion"]
+    first, second = rows(run(given), "state_tracks")
+    assert first["north_m_s"] == first["east_m_s"] == first["down_m_s"] == 0.0
+    assert second["north_m_s"] != 0.0
+
+
 def table(simulation_type, scene, **options):
     sink = MemorySink()
     simulation_type(scene, recorder=Recorder([sink]), **options).run()

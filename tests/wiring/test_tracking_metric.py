@@ -8,6 +8,8 @@ import pytest
 from covering import covers
 from wired import chain, measured, rows, run
 
+import dsa_des
+
 RADAR = {
     "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
     "quantised": False, "azimuth_error_deg": 0.1, "elevation_error_deg": 0.1, "range_error_m": 3.0,
@@ -53,6 +55,8 @@ def test_instants_count_as_said():
     seldom = measured(scene(), {"metric": "tracking", "step_s": 3.0})
     assert early["track_completeness"] < late["track_completeness"] == 1.0
     assert seldom["track_completeness"] == 1.0
+    none = measured(scene(), {"metric": "tracking", "from_s": 5.9})
+    assert early["track_nis_per_freedom"] > 0.0 and math.isnan(none["track_nis_per_freedom"])
 
 
 @covers("within_m", "order", of=("[metric tracking]",))
@@ -85,3 +89,31 @@ def test_one_block_s_tracks_count():
     assert mine["track_nees_mean.tracker"] == alone["track_nees_mean"]
     with pytest.raises(Exception, match="'fusd' tells no tracks; did you mean 'fused'"):
         measured(both, {"metric": "tracking", "block": "fusd"})
+
+
+def test_tracks_are_of_the_instant_that_their_states_speak_of():
+    """Told 1.3 s after they were measured, of targets that fly 60 m/s."""
+    found = measured(scene(**{**FINE, "range_bias_m": 0.0}, latency_s=1.3), {"metric": "tracking"})
+    assert found["track_position_error_m"] < 5.0
+
+
+def test_every_replica_has_its_own_tracks_and_first_detections():
+    """A radar that misses: who is first detected, and how well tracked, differs by replica."""
+    given = scene()
+    given["blocks"]["radar"] = {
+        "type": "radar.swerling", "swerling": 2, "scan_rate_hz": 4, "power_w": 60.0,
+        "antenna_gain_db": 30.0, "frequency_hz": 35e9, "bandwidth_hz": 1e6,
+        "false_alarm_probability": 1e-3, "azimuth_resolution_deg": 1.0,
+        "elevation_resolution_deg": 1.0, "range_resolution_m": 30.0,
+    }  # fmt: skip
+    study = dsa_des.study(given, metrics=["tracking"], replicas=3, workers=1)
+    delays = []
+    for replica in study.runs.to_pylist():
+        alone = run({**given, "seed": replica["seed"]})
+        first_s = min(row["time_s"] for row in rows(alone))
+        told = [
+            r["time_s"] for r in rows(alone, "state_tracks") if r["track_status"] == "confirmed"
+        ]
+        delays.append(min(told, default=math.nan) - first_s)
+        assert replica["track_confirmation_s"] == pytest.approx(delays[-1], nan_ok=True)
+    assert len(set(delays)) > 1

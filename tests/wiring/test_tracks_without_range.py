@@ -37,3 +37,23 @@ def test_the_first_range_makes_an_ordinary_track_of_it(kind, association):
     assert row["azimuth_rad"] == pytest.approx(
         wanted, abs=4.0 * row["azimuth_variance_rad2"] ** 0.5
     )
+
+
+@pytest.mark.parametrize("association", ["gnn", "jpda"])
+def test_each_track_takes_the_range_that_was_measured_of_it(association):
+    """Two at one look; how well it is known along the line of sight is what the radar says."""
+    scene = chain(
+        {"eye": EYE, "radar": RADAR}, duration_s=6.1, fusion={"type": "fusion.pass_through"},
+        tracker={"type": "tracking.ekf", "association": association},
+    )  # fmt: skip
+    told = [r for r in rows(run(scene), "state_tracks") if r["time_s"] == 6.0 and r["has_range"]]
+    away = [np.array([r[f"{n}_m"] - r[f"own_{n}_m"] for n in ("north", "east", "down")])
+            for r in told]  # fmt: skip
+    known = sorted(np.linalg.norm(crooked.ned(target, 6.0)) for target in crooked.TARGETS)
+    assert sorted(map(np.linalg.norm, away)) == pytest.approx(known, abs=60.0)
+    for row, line in zip(told, away, strict=True):
+        spread = np.empty((3, 3))
+        for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+            spread[i, j] = spread[j, i] = row[f"covariance_{i}{j}_m2"]
+        line = line / np.linalg.norm(line)
+        assert 12.0 < np.sqrt(line @ spread @ line) < 15.5
