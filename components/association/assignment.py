@@ -50,7 +50,9 @@ def global_nearest(
     distance : (pairs,)
         Squared Mahalanobis distances or other costs.
     missing : (pairs,) or float
-        Price of a pair's track going without; at least the largest distance in its gate.
+        Price of a track going without; at least the largest distance in the gate. All tracks that
+        compete have the same, the largest of theirs: else a wide gate, which costs more to leave
+        empty, would take detections from narrow ones.
 
     Returns
     -------
@@ -79,9 +81,7 @@ def _solved(
     never = 1.0 + 2.0 * float(np.abs(distance).sum() + np.abs(price).sum())
     cost = np.full((len(tracks), len(detections) + len(tracks)), never)
     cost[row, column] = distance
-    alone_price = np.zeros(len(tracks))
-    alone_price[row] = price
-    cost[np.arange(len(tracks)), len(detections) + np.arange(len(tracks))] = alone_price
+    cost[np.arange(len(tracks)), len(detections) + np.arange(len(tracks))] = price.max()
     pair = np.full(cost.shape, -1, dtype=np.int64)
     pair[row, column] = np.arange(len(track))
     found = pair[linear_sum_assignment(cost)]

@@ -119,7 +119,14 @@ class Tables:
         wanted = set(only) or {f.metric for f in self.record.figures if f.metric is not None}
         if self.record.stop_when is not None and not only:
             wanted.add(self.record.stop_when.metric)
-        return [line for line in self.lines if not wanted or line.result.name in wanted]
+        series = {f.metric for f in self.record.figures if f.kind == "series"} - {None}
+        return [
+            line
+            for line in self.lines
+            if not wanted
+            or line.result.name in wanted
+            or (not only and line.result.name.rpartition(".")[0] in series)
+        ]
 
     def write(self) -> None:
         """Write the summary and the differences."""

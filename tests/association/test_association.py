@@ -127,3 +127,12 @@ def test_the_global_assignment_lives_with_costs_below_zero():
         rows = sorted(set(track.tolist()))
         renamed = {(rows.index(t), d): c for (t, d), c in known.items()}
         assert total == pytest.approx(best(len(rows), 3, renamed, price))
+
+
+def test_a_wide_gate_takes_no_detection_from_a_narrow_one():
+    """Leaving the wide one empty is no dearer: the detection goes to whom it is likelier."""
+    wide, narrow = 0, 1
+    track, detection = np.array([wide, narrow]), np.array([0, 0])
+    cost = np.array([1.0 + 6.0, 2.0 - 6.0])  # squared distance and ln|S|
+    price = np.array([9.0 + 6.0, 9.0 - 6.0])  # the gate and ln|S|
+    assert track[global_nearest(track, detection, cost, price)].tolist() == [narrow]

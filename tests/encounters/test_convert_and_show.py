@@ -33,12 +33,16 @@ def paired(folder: Path, text: str = PAIRED, name: str = "1.txt") -> Path:
 
 def test_paired_tracks_become_a_set(tmp_path: Path) -> None:
     out, table = tmp_path / "set.parquet", tmp_path / "weights.csv"
-    table.write_text("encounter,weight\n0,2.5\n1,4\n", encoding="utf-8")
+    table.write_text("encounter,weight\n1,4\n0,2.5\n", encoding="utf-8")
     files = paired(tmp_path), paired(tmp_path, PAIRED.replace("1020", "1025"), "2.txt")
     done = call("convert", *files, "--weights", table, "--at", 40, 5, "--out", out)
     assert done.exit_code == 0 and "2 encounters" in done.stdout
     found = read_set(out)
     assert found.weights.tolist() == [2.5, 4.0] and found.reference_deg == (40.0, 5.0)
+    moved = tmp_path / "moved.parquet"
+    assert call("convert", out, "--at", -41, 174, "--out", moved).exit_code == 0
+    assert read_set(moved).reference_deg == (-41.0, 174.0)
+    assert read_set(moved).weights.tolist() == [2.5, 4.0]
     time_s, north, east, up = found.path(1)
     assert time_s.tolist() == [0, 1, 2]
     assert north == pytest.approx(np.array([90, 0, -90]) * FOOT)

@@ -265,4 +265,15 @@ FAULTS = [
             "ticks = wake.ticks[: len(rows)]",
         ),
     ),
+    *in_file(
+        _GROUP,
+        "components/alerting/encounter.py",
+        ("alerting/test_bounds_of_files.py",),
+        ("bounds-of-the-ownship", "find(*mine) + find(*theirs)", "find(*mine) + 0 * find(*theirs)"),
+        (
+            "velocity-as-wrong-as-position",
+            'both(_longest, "v_ew_std", "v_ns_std", "v_en_std")',
+            'both(_longest, "s_ew_std", "s_ns_std", "s_en_std")',
+        ),
+    ),
 ]

@@ -120,4 +120,16 @@ FAULTS = [
         ("classes-of-single-rows", "(n, m, w, labels, together, **options)",
          "(n, m, w, labels, None, **options)"),
     ),
+    *in_file(
+        _GROUP, "components/encounters/convert_command.py",
+        ("encounters/test_convert_and_show.py::test_paired_tracks_become_a_set",),
+        ("weights-in-the-table-s-order", "return np.array([known[n] for n in found.numbers.tol",
+         "return weight[: len(found)] + 0.0 * np.array([known[n] for n in found.numbers.tol"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/any_format.py",
+        ("encounters/test_convert_and_show.py::test_paired_tracks_become_a_set",),
+        ("a-set-stays-where-it-was", "return found if at is None else",
+         "return found if True else"),
+    ),
 ]  # fmt: skip

@@ -155,4 +155,21 @@ FAULTS = [
         ("error-of-a-known-denominator", "[None if r is None else r.standard_error for r in found]",
          "[None if r is None else r.unpaired_error for r in found]"),
     ),
+    *in_file(
+        _GROUP, "dsa_des/studies/runner.py", ("studies/test_what_decides_and_repeats.py",),
+        ("later-rounds-decide", "folder.results(before_round=number), [", "folder.results(), ["),
+        ("any-confidence-ends-it", "(result, chosen, study.confidence, study.interval)",
+         "(result, chosen, 0.5, study.interval)"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/record.py", ("studies/test_what_decides_and_repeats.py",),
+        ("repeated-without-a-draw", "for draw in self.draws]\n        return swaps, sets",
+         "for draw in self.draws[1:]]\n        return swaps, sets"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/measured_errors.py",
+        ("studies/test_what_decides_and_repeats.py",),
+        ("measured-without-what-is-set", 'sets=[f"{key}={value}" for key, value in sets]',
+         "sets=[]"),
+    ),
 ]  # fmt: skip

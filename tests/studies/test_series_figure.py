@@ -1,6 +1,7 @@
 """Results over a number: which belong together, what bounds their mean, and the figure."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.stats import chi2
 
 from dsa_des.cli import main
 from dsa_des.studies import series_figure
+from dsa_des.studies.output import Tables
 from dsa_des.studies.series_figure import draw_series, of_series
 from dsa_des.studies.statistics import Estimate
 from dsa_des.studies.summary import Line
@@ -62,3 +64,12 @@ def test_what_is_no_series_is_said(small: Path, figure: str, said: str) -> None:
     Path("study.toml").write_text(f'{study}[[figures]]\nkind = "series"\n{figure}\n')
     result = CliRunner().invoke(main, ["study", "study.toml", "--workers", "1", "--out", "out"])
     assert result.exit_code == 2 and said in " ".join(result.output.split())
+
+
+def test_a_study_that_draws_a_series_prints_it():
+    names = ("a.t.1", "a.t.2", "a.t", "b")
+    lines = [SimpleNamespace(result=SimpleNamespace(name=name)) for name in names]
+    record = SimpleNamespace(figures=[SimpleNamespace(kind="series", metric="a.t")], stop_when=None)
+    tables = SimpleNamespace(record=record, lines=lines)
+    assert [line.result.name for line in Tables.shown_lines(tables)] == ["a.t.1", "a.t.2", "a.t"]
+    assert [line.result.name for line in Tables.shown_lines(tables, ["b"])] == ["b"]

@@ -1,0 +1,43 @@
+"""Standard deviations of a file: both aircraft's, along the longest axis, by their own scores."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from components.alert_configuration.conf_file import read_conf
+from components.alerting.encounter import _bounds
+from tests.alerting.conf_text import CONF
+
+SCORES = """
+h_pos_z_score = 1.5
+v_pos_z_score = 2.5
+h_vel_z_score_min = 2
+h_vel_z_score_max = 2
+v_vel_z_score = 3.5
+"""
+OWN = {"s_ew_std": 30.0, "s_ns_std": 10.0, "s_en_std": -15.0, "sz_std": 4.0,
+       "v_ew_std": 3.0, "v_ns_std": 2.0, "v_en_std": 1.0, "vz_std": 0.5}  # fmt: skip
+OTHER = {"s_ew_std": 5.0, "s_ns_std": 40.0, "s_en_std": 12.0, "sz_std": 9.0,
+         "v_ew_std": 1.0, "v_ns_std": 6.0, "v_en_std": -2.0, "vz_std": 1.5}  # fmt: skip
+
+
+def longest(of: dict[str, float], what: str) -> float:
+    """By the eigenvalues of the covariance, whose signed root a file gives."""
+    east, north, root = (of[f"{what}_{axes}_std"] for axes in ("ew", "ns", "en"))
+    matrix = [[east**2, math.copysign(root**2, root)], [math.copysign(root**2, root), north**2]]
+    return math.sqrt(np.linalg.eigvalsh(np.array(matrix)).max())
+
+
+def test_bounds_are_those_of_both_aircraft(tmp_path: Path) -> None:
+    text = "\n".join(line for line in CONF.splitlines() if "z_score" not in line) + SCORES
+    (tmp_path / "a.conf").write_text(text, encoding="utf-8")
+    own = {key: np.array([value]) for key, value in OWN.items()}
+    targets = {key: np.array([[value]]) for key, value in OTHER.items()}
+    relative = tuple(np.full((1, 1), 1000.0) for _ in range(6))
+    found = _bounds(read_conf(tmp_path / "a.conf"), own, targets, relative)
+    wanted = (
+        1.5 * (longest(OWN, "s") + longest(OTHER, "s")), 2.5 * (4.0 + 9.0),
+        2.0 * (longest(OWN, "v") + longest(OTHER, "v")), 3.5 * (0.5 + 1.5),
+    )  # fmt: skip
+    assert np.allclose([float(np.squeeze(bound)) for bound in found], wanted, rtol=1e-12)
