@@ -79,8 +79,6 @@ FAULTS = [
          'until, side="left"))'),
         ("descents-are-not-flown", "abs(decision.climb_m) >= _LEAST_CLIMB_M",
          "decision.climb_m >= _LEAST_CLIMB_M"),
-        ("manoeuvres-all-at-the-first", "told = [(tick, self._told(d))",
-         "told = [(made[0][0], self._told(d))"),
     ),
     *in_file(
         _GROUP, "components/cdti/crew.py", _WHOLE,
