@@ -112,4 +112,34 @@ FAULTS = [
         ("order-of-names", "sorted(found.items(), key=lambda item: item[1])",
          "sorted(found.items())"),
     ),
+    *in_file(
+        _GROUP, "components/metrics/tracking.py", "wiring/test_tracking_metric.py",
+        ("truth-of-when-tracks-are-told", 'truth.at(columns["state_s"][every], origin)',
+         'truth.at(columns["time_s"][every], origin)'),
+        ("innovations-of-the-start",
+         ' & (columns["state_s"][rows] >= self.p.from_s)', ""),
+        ("first-detections-of-all-replicas", 'np.asarray(columns["replica"]) == replica',
+         'np.asarray(columns["replica"]) >= 0'),
+        ("tracks-of-the-first-replica", "np.flatnonzero((replica == number) & told)",
+         "np.flatnonzero((replica == 0) & told)"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/scans.py", "wiring/test_range_rates_in_tracks.py",
+        ("rates-of-whoever-tells-them", "(used & (self.contributors & ~rates_of == 0))", "used"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/without_range.py", "wiring/test_tracks_without_range.py",
+        ("range-of-another-track", "values[pair[blind]] for", "values[pair[0 * blind]] for"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/gated_pairs.py", "wiring/test_tracks_without_range.py",
+        ("first-range-with-another-variance",
+         "(scans.measured[2][cells], scans.variance[2][cells])",
+         "(scans.measured[2][cells], scans.variance[2][cells] * 0.0 + 1.0)"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/one_step.py", "tracking/test_late_looks.py",
+        ("updated-by-a-late-look-and-older-for-it",
+         "np.maximum(now.updated_tick, seen.updated_tick)", "seen.updated_tick"),
+    ),
 ]  # fmt: skip

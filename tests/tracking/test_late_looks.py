@@ -65,6 +65,10 @@ def test_one_step_is_near_what_working_on_all_again_gives(kind):
         _, table = tracked(Simulation, scene(*stop, f"blocks.tracker.late='{late}'", kind=kind))
         rows = {(r["tick"], r["track"]): r for r in table.to_pylist() if r["time_s"] > 2.0}
         tables[late] = rows
+    newest = {}
+    for (_, track), row in tables["one_step"].items():  # a late look is no newer than it is
+        assert row["updated_s"] >= newest.get(track, 0.0)
+        newest[track] = row["updated_s"]
     exact = tables.pop("rerun")
     apart = {}
     for late, rows in tables.items():

@@ -106,7 +106,7 @@ def test_every_replica_has_its_own_tracks_and_first_detections():
         "false_alarm_probability": 1e-3, "azimuth_resolution_deg": 1.0,
         "elevation_resolution_deg": 1.0, "range_resolution_m": 30.0,
     }  # fmt: skip
-    study = dsa_des.study(given, metrics=["tracking"], replicas=3, workers=1)
+    study = dsa_des.study(given, metrics=["tracking"], replicas=3, runs_per_chunk=3)
     delays = []
     for replica in study.runs.to_pylist():
         alone = run({**given, "seed": replica["seed"]})
