@@ -229,9 +229,12 @@ def test_what_a_tolerance_leaves_out_stays_inside_it_over_200_scenes() -> None:
         cells = PathCells(range_m, own, high)
         rcs = np.full(300, 10.0 ** rng.uniform(-2, 2))
         pd = [
-            block._pd(block.echo_snr(cells, rcs), changes["swerling"], None)
+            block._pd(
+                block.echo_snr(cells, rcs), changes["swerling"], None,
+                changes["pulses"], changes["false_alarm_probability"],
+            )
             for block in (exact, rough)
-        ]
+        ]  # fmt: skip
         tables += rough._method == "table"
         assert np.max(np.abs(pd[0] - pd[1])) <= allowed
     assert dropped > 30, "the tolerances must have left something out"

@@ -4,9 +4,10 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.encounter import _bounds
+from components.alerting.encounter import _bounds, read_encounter
 from tests.alerting.conf_text import CONF
 
 SCORES = """
@@ -41,3 +42,28 @@ def test_bounds_are_those_of_both_aircraft(tmp_path: Path) -> None:
         2.0 * (longest(OWN, "v") + longest(OTHER, "v")), 3.5 * (0.5 + 1.5),
     )  # fmt: skip
     assert np.allclose([float(np.squeeze(bound)) for bound in found], wanted, rtol=1e-12)
+
+
+DAA = """\
+NAME lat lon alt trk gs vs time
+[none] [deg] [deg] [m] [deg] [m/s] [m/s] [s]
+own -41.3 174.2 1500 217 60 1 0
+own -41.3 174.2 1500 217 60 1 1
+late -41.28 174.23 1600 120 80 -4 0
+late -41.28 174.23 1600 120 80 -4 0.7
+"""
+
+
+def test_a_sample_that_is_late_is_flown_to_the_ownship_s_time(tmp_path: Path) -> None:
+    """0.3 s at 80 m/s towards 120 degrees, sinking; places by minutes of arc of a nautical mile."""
+    (tmp_path / "a.conf").write_text(CONF, encoding="utf-8")
+    (tmp_path / "a.daa").write_text(DAA, encoding="utf-8")
+    found = read_encounter(tmp_path / "a.daa", read_conf(tmp_path / "a.conf"))
+    first, second = (np.array([part[row, 0] for part in found.relative]) for row in (0, 1))
+    assert first[:2] == pytest.approx(
+        [-0.03 * 60 * 1852 * math.cos(math.radians(41.29)), -0.02 * 60 * 1852], rel=1e-3
+    )
+    way = math.radians(120.0)
+    moved = [-24.0 * math.sin(way), -24.0 * math.cos(way), 0.3 * 4.0]
+    assert second[:3] - first[:3] == pytest.approx(moved, rel=2e-3)
+    assert second[3:] == pytest.approx(first[3:])

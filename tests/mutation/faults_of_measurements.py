@@ -312,4 +312,10 @@ FAULTS = [
         "test_declaration_delay.py::test_places_are_remembered_across_windows",
         ("a-scan-too-few", "(self.n - 1))", "(self.n - 2))"),
     ),
+    *in_file(
+        _GROUP, "components/radar/clutter_alarms.py", _NOISE_IS,
+        ("ground-by-the-look-s-pfa", "self._pfa = block.p.cell_pfa",
+         "self._pfa = block.p.false_alarm_probability"),
+        ("ground-comes-last", "return in_measured_order(joined)", "return joined"),
+    ),
 ]  # fmt: skip

@@ -68,6 +68,7 @@ def cells_of(crafts, count=60):
     return Some(
         roster=roster,
         target=target,
+        craft=target,
         range_m=rng.uniform(200.0, 9000.0, count),
         azimuth_rad=rng.uniform(0.0, 6.2, count),
         elevation_rad=rng.uniform(-1.2, 1.2, count),

@@ -145,7 +145,7 @@ def test_what_a_probability_per_look_comes_to_by_scan_is_said(kind):
 def test_the_thesis_s_probability_is_said_to_be_its():
     default = {key: value for key, value in HEARS_ALL.items() if key != "false_alarm_probability"}
     scene = chain({"radar": {**default, **VIEW, "false_alarms": True}})
-    *_, said = warnings_of(Simulation(dsa_des.load_scene(scene)))
+    said = " ".join(warnings_of(Simulation(dsa_des.load_scene(scene))))
     assert "(the thesis's, as the scene gives none): with 15,000 resolution cells" in said
 
 

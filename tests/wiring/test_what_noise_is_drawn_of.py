@@ -131,3 +131,21 @@ def test_places_of_a_scene_are_as_wrong_as_their_detections(monkeypatch):
         )
         assert new.direction[place] == pytest.approx(ours, abs=1e-6)
         assert (new.scan[place], new.time_s[place]) == (row["scan"], row["time_s"])
+
+
+@pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling"])
+def test_ground_stands_among_the_rest_and_has_crossed_the_threshold_of_a_cell(kind):
+    """Output over noise less 1: at least -ln(Pfa) - 1 of the cell's Pfa, not of the look's."""
+    from test_clutter_false_alarms import RADAR, STILL, TERRAIN
+
+    keys = {**RADAR, "clutter_threshold": "noise", "false_alarm_probability": 0.05,
+            "cell_false_alarm_probability": 1e-3}  # fmt: skip
+    scene = chain({"r": sensor(kind, **keys)}, ownship=STILL, terrain=TERRAIN, duration_s=1,
+                  targets=[{**crooked.ROLLING, "north_m": 90_000.0}])  # fmt: skip
+    found = rows(run(scene))
+    least = 10.0 * math.log10(-math.log(1e-3) - 1.0)
+    strength = [row["snr_db"] for row in found]
+    assert len(found) > 300 and least <= min(strength) < least + 0.3
+    names = ("confidence", "elevation_rad", "azimuth_rad", "range_m", "scan")
+    measured = [[row[name] for row in found] for name in names]
+    assert np.array_equal(np.lexsort(np.array(measured)), np.arange(len(found)))
