@@ -32,7 +32,8 @@ def load() -> None:
         package = importlib.import_module(name)
         for found in pkgutil.walk_packages(package.__path__, f"{name}."):
             if not any(part in found.name for part in _NOT_LOADED):
-                importlib.import_module(found.name)
+                with contextlib.suppress(ImportError):  # an extra that is not installed here
+                    importlib.import_module(found.name)
     gc.collect()
     gc.freeze()
 
