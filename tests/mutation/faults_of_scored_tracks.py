@@ -41,9 +41,9 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/hard_update.py", (_COVER,),
-        ("innovation-after-the-last", "part.nis[which] + innovation_squared(",
-         "0.0 * part.nis[which] + innovation_squared("),
-        ("freedom-of-the-last", "part.freedom[which] + size", "size"),
+        ("innovation-after-the-last", 'before["nis"] + innovation_squared(',
+         '0.0 * before["nis"] + innovation_squared('),
+        ("freedom-of-the-last", 'before["freedom"] + size', "size"),
     ),
     *in_file(
         _GROUP, "components/tracking/step.py", (_COVER,),
