@@ -150,8 +150,7 @@ class ReplicaChannel(Channel):
         if held is None:
             return None
         arrivals, message = held
-        rows = last_at_or_before(arrivals, ticks)
-        rows[arrivals[rows] // self._span != ticks // self._span] = -1
+        rows = self._held_rows(arrivals, ticks)
         self._remember()
         return message, rows
 
@@ -168,14 +167,19 @@ class ReplicaChannel(Channel):
         if held is None:
             return None
         arrivals, message = held
-        rows = last_at_or_before(arrivals, ticks)
-        if arrivals is not ticks:
-            rows[arrivals[rows] // self._span != ticks // self._span] = -1
+        rows = self._held_rows(arrivals, ticks)
         first = int(np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span))
         if first < len(arrivals):
             lasts = first + _last_of_each(arrivals[first:] // self._span)
             self._last = arrivals[lasts], message.take(lasts)
         return message, rows
+
+    def _held_rows(self, arrivals: IntArray, ticks: IntArray) -> IntArray:
+        """Return the row that is held at each tick; -1 where its replica holds nothing yet."""
+        rows = last_at_or_before(arrivals, ticks)
+        if arrivals is not ticks:
+            rows[arrivals[rows] // self._span != ticks // self._span] = -1
+        return rows
 
     def _of_all(self, arrivals: IntArray) -> bool:
         """Whether there is a row of every replica, of rows in order of replica."""
