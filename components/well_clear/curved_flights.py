@@ -10,13 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Intervals are cut down to this, s.
 FINEST_S = 1e-3
 # Flights along the very edge would be cut up all the way: with so many pieces it ends.
 _MOST_PIECES = 100_000
 _FIRST_PIECES = 64
+_PAIRS_AT_ONCE = 128
 
 
 def cylinder_spans(
@@ -25,8 +26,6 @@ def cylinder_spans(
     closing_mps: float,
     horizontal_m: float,
     vertical_m: float,
-    *,
-    first_only: bool = False,
 ) -> FloatArray:
     """Return from when to when two flights are inside a cylinder, its boundary left out.
 
@@ -40,8 +39,6 @@ def cylinder_spans(
         Neither distance changes faster.
     horizontal_m, vertical_m : float
         Radius and half of the height.
-    first_only : bool
-        Whether the first span is enough; only its begin is right then.
 
     Returns
     -------
@@ -57,23 +54,92 @@ def cylinder_spans(
     length = (end_s - begin_s) / _FIRST_PIECES
     start: FloatArray = begin_s + length * np.arange(_FIRST_PIECES, dtype=np.float64)
     found = [np.empty((0, 2))]
-    earliest = np.inf
     while len(start):
         half = 0.5 * length
         across_m, high_m = apart(start + half)
         drift_m = closing_mps * half
-        maybe = (across_m - drift_m < horizontal_m) & (high_m - drift_m < vertical_m)
-        within = (across_m + drift_m <= horizontal_m) & (high_m + drift_m <= vertical_m)
+        maybe, within = _judged(across_m, high_m, drift_m, horizontal_m, vertical_m)
         if length <= FINEST_S or 2 * np.count_nonzero(maybe) > _MOST_PIECES:
             within = maybe = (across_m < horizontal_m) & (high_m < vertical_m)
         if within.any():
-            earliest = min(earliest, float(start[within][0]))
             found.append(np.stack([start[within], start[within] + length], axis=1))
-        cut = start[maybe & ~within & (not first_only or start < earliest)]
+        cut = start[maybe & ~within]
         start = np.sort(np.concatenate([cut, cut + half]))
         length = half
     spans = np.concatenate(found)
     return _joined(spans[np.argsort(spans[:, 0], kind="stable")])
+
+
+def first_inside_cylinder(
+    apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
+    between_s: tuple[FloatArray, FloatArray],
+    closing_mps: FloatArray,
+    horizontal_m: float,
+    vertical_m: float,
+) -> FloatArray:
+    """Return when pairs of flights first are inside a cylinder, s; NaN for those that never are.
+
+    For each pair it is the begin of the first of `cylinder_spans`, to the bit.
+
+    Parameters
+    ----------
+    apart : callable
+        Horizontal distance and difference in height (m, not negative) of pairs (n,) at times (n,).
+    between_s : two of (pairs,)
+        The times looked at.
+    closing_mps : (pairs,)
+        Neither distance changes faster.
+    horizontal_m, vertical_m : float
+        Radius and half of the height.
+    """
+    begin_s, end_s = between_s
+    if len(begin_s) > _PAIRS_AT_ONCE:  # flights along the very edge would take all of the memory
+        rest = (begin_s[_PAIRS_AT_ONCE:], end_s[_PAIRS_AT_ONCE:])
+        return np.concatenate([
+            first_inside_cylinder(
+                apart, (begin_s[:_PAIRS_AT_ONCE], end_s[:_PAIRS_AT_ONCE]),
+                closing_mps[:_PAIRS_AT_ONCE], horizontal_m, vertical_m,
+            ),
+            first_inside_cylinder(
+                lambda pair, time_s: apart(pair + _PAIRS_AT_ONCE, time_s), rest,
+                closing_mps[_PAIRS_AT_ONCE:], horizontal_m, vertical_m,
+            ),
+        ])  # fmt: skip
+    earliest = np.full(len(begin_s), np.inf)
+    length = (end_s - begin_s) / _FIRST_PIECES
+    looked_at = np.flatnonzero(end_s >= begin_s)
+    pair = np.repeat(looked_at, _FIRST_PIECES)
+    number = np.tile(np.arange(_FIRST_PIECES, dtype=np.float64), len(looked_at))
+    start: FloatArray = begin_s[pair] + length[pair] * number
+    while len(start):
+        half = 0.5 * length
+        across_m, high_m = apart(pair, start + half[pair])
+        drift_m = (closing_mps * half)[pair]
+        maybe, within = _judged(across_m, high_m, drift_m, horizontal_m, vertical_m)
+        pieces = np.bincount(pair[maybe], minlength=len(length))
+        last = ((length <= FINEST_S) | (2 * pieces > _MOST_PIECES))[pair]
+        inside = (across_m < horizontal_m) & (high_m < vertical_m)
+        within, maybe = np.where(last, inside, within), np.where(last, inside, maybe)
+        np.minimum.at(earliest, pair[within], start[within])
+        cut = maybe & ~within & (start < earliest[pair])
+        pair, start = pair[cut], start[cut]
+        start = np.concatenate([start, start + half[pair]])
+        pair = np.concatenate([pair, pair])
+        length = half
+    return np.where(np.isfinite(earliest), earliest, np.nan)
+
+
+def _judged(
+    across_m: FloatArray,
+    high_m: FloatArray,
+    drift_m: FloatArray | float,
+    horizontal_m: float,
+    vertical_m: float,
+) -> tuple[BoolArray, BoolArray]:
+    """Return which pieces may hold a time inside, and which are surely inside all through."""
+    maybe = (across_m - drift_m < horizontal_m) & (high_m - drift_m < vertical_m)
+    within = (across_m + drift_m <= horizontal_m) & (high_m + drift_m <= vertical_m)
+    return maybe, within
 
 
 def _joined(spans: FloatArray) -> FloatArray:

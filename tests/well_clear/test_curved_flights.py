@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from components.well_clear.curved_flights import FINEST_S, cylinder_spans
+from components.well_clear.curved_flights import FINEST_S, cylinder_spans, first_inside_cylinder
 
 D_M, Z_M = 610.0, 76.0
 
@@ -47,8 +47,29 @@ def test_begins_and_ends_are_within_the_bound(phase, tilt):
     found = cylinder_spans(apart, (0.0, 150.0), fastest, D_M, Z_M)
     assert len(wanted) >= 1 and found.shape == wanted.shape
     assert np.abs(found - wanted).max() <= FINEST_S
-    first = cylinder_spans(apart, (0.0, 150.0), fastest, D_M, Z_M, first_only=True)
-    assert first[0, 0] == pytest.approx(found[0, 0], abs=FINEST_S)
+
+
+def test_the_first_begin_of_many_pairs_is_that_of_each():
+    """More pairs than are looked at together; some never come inside, some have no time."""
+    rng = np.random.default_rng(4)
+    each = [weaving(*some) for some in rng.uniform([0, -6], [3, 9], (140, 2))]
+    begin_s, end_s = rng.uniform(0.0, 40.0, 140), rng.uniform(30.0, 150.0, 140)
+
+    def apart(pair, time_s):
+        found = np.empty((2, len(pair)))
+        for number in set(pair.tolist()):
+            mine = pair == number
+            found[:, mine] = each[number][0](time_s[mine])
+        return found
+
+    fastest = np.array([speed for _, speed in each])
+    first = first_inside_cylinder(apart, (begin_s, end_s), fastest, D_M, Z_M)
+    wanted = [
+        cylinder_spans(alone, (b, e), v, D_M, Z_M)[:1, 0]
+        for (alone, v), b, e in zip(each, begin_s.tolist(), end_s.tolist(), strict=True)
+    ]
+    assert np.isnan(first).sum() == sum(len(one) == 0 for one in wanted) > 5
+    assert first[~np.isnan(first)].tolist() == np.concatenate(wanted).tolist()
 
 
 def test_a_pass_between_two_samples_is_found():
