@@ -262,4 +262,11 @@ FAULTS = [
         ("class-of-the-last-target", "start + int(np.argmin(distance_m[start : start + len(run)]))",
          "start + len(run) - 1"),
     ),
+    *in_file(
+        _GROUP, "components/metrics/mitigated.py", ("wiring/test_mitigated_metric.py",),
+        ("manoeuvres-of-the-first-replica-only",
+         "mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]",
+         "mitigated = read_flights(group, self.p.step_s, None, read, 3, "
+         "{0: told[0]} if 0 in told else {})[:2]"),
+    ),
 ]  # fmt: skip
