@@ -265,8 +265,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/metrics/mitigated.py", ("wiring/test_mitigated_metric.py",),
         ("manoeuvres-of-the-first-replica-only",
-         "mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]",
-         "mitigated = read_flights(group, self.p.step_s, None, read, 3, "
+         "mitigated = read_flights(group, self.p.step_s, None, read, told)[:2]",
+         "mitigated = read_flights(group, self.p.step_s, None, read, "
          "{0: told[0]} if 0 in told else {})[:2]"),
     ),
 ]  # fmt: skip
