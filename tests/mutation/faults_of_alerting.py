@@ -303,4 +303,43 @@ FAULTS = [
             'both(_longest, "s_ew_std", "s_ns_std", "s_en_std")',
         ),
     ),
+    *in_file(
+        _GROUP,
+        "components/alerting/bands_over_time.py",
+        ("alerting/test_bands_of_several_aircraft.py",),
+        (
+            "bands-by-the-first-one-s-level",
+            "alerts.early_level[:, target]",
+            "alerts.early_level[:, 0]",
+        ),
+        ("bands-never-early", "alerts.early_level[:, target]", "0 * alerts.early_level[:, target]"),
+        ("bands-of-a-file-without-margins", "early, there, bounds)", "early, there, None)"),
+        (
+            "bands-of-who-is-gone",
+            "encounter.present[:, target] & (encounter.alerter",
+            "(encounter.alerter",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/spread.py",
+        ("alerting/test_bands_of_several_aircraft.py",),
+        (
+            "spread-never-early",
+            "(early, level.early_alerting_time_s),",
+            "(early, level.alerting_time_s),",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/daidalus.py",
+        (_REST_ON,),
+        ("held-tracks-count-again", "new &= sights.updated  # others", "new &= True  # others"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/followed_tracks.py",
+        (_REST_ON,),
+        ("target-of-its-height", "np.linalg.norm(away, axis=2)", "np.abs(away[..., 2])"),
+    ),
 ]

@@ -252,4 +252,11 @@ FAULTS = [
         _GROUP, "components/encounters/risk_metric.py", (_EACH,),
         ("class-of-the-last-target", "if distance_m < best[0]:", "if True:"),
     ),
+    *in_file(
+        _GROUP, "components/metrics/mitigated.py", ("wiring/test_mitigated_metric.py",),
+        ("manoeuvres-of-the-first-replica-only",
+         "mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]",
+         "mitigated = read_flights(group, self.p.step_s, None, read, 3, "
+         "{0: told[0]} if 0 in told else {})[:2]"),
+    ),
 ]  # fmt: skip
