@@ -1,6 +1,6 @@
 """Flights of tracks with states: as estimated, carried on straight, in the ownship's plane."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,10 +49,12 @@ class _Estimates(NamedTuple):
         )
 
     def take(self, which: IntArray | BoolArray) -> "_Estimates":
-        return _Estimates(*(part[..., which] for part in self))
+        parts: Any = (part[..., which] for part in self)
+        return _Estimates(*parts)
 
     def with_more(self, more: "_Estimates") -> "_Estimates":
-        return _Estimates(*(np.concatenate(both, axis=-1) for both in zip(self, more, strict=True)))
+        both: Any = zip(self, more, strict=True)
+        return _Estimates(*(np.concatenate(parts, axis=-1) for parts in both))
 
 
 _NONE = _Estimates(
