@@ -309,7 +309,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/sensor/declaration_by_place.py", "sensor_effects/"
         "test_declaration_delay.py::test_places_are_remembered_across_windows",
-        ("a-scan-too-few", "(self.n - 1))", "(self.n - 2))"),
+        ("a-scan-too-few", "- self.n + 1", "- self.n + 2"),
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", _NOISE_IS,
