@@ -552,8 +552,8 @@ FAULTS = [
         _GROUP, "components/tracking/cues.py", _CUES,
         ("cones-of-the-state-s-instant", "lasts_s**2 * covariance[3:, 3:]",
          "0.0 * covariance[3:, 3:]"),
-        ("cues-as-often-as-tracks", "tick - self._last_tick < self._every_ticks",
-         "tick - self._last_tick < 0"),
+        ("cues-as-often-as-tracks", "tick[rows] - self._last_tick[of] >= self._every_ticks",
+         "tick[rows] - self._last_tick[of] >= 0"),
         ("all-tracks-cue", "if not self.p.tentative:", "if False:"),
     ),
     *in_file(
