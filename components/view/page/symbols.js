@@ -5,16 +5,13 @@ const Symbols = (() => {
     "level1", "level2", "level3", "recovery"];
   let colours = {};
   function readTheme() {
-    const style = getComputedStyle(document.documentElement);
-    colours = Object.fromEntries(
-      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    colours = Canvas.theme(names);
   }
 
   function level(number) {
     return colours[`level${Math.min(Math.max(number, 1), 3)}`];
   }
 
-  // Markers are added to the path at a place; many of one kind are drawn at once.
   // Regions of guidance, by their number: colour and words.
   const REGIONS = ["none", "far", "mid", "near", "recovery", "unknown"];
   function region(number) {
@@ -23,6 +20,7 @@ const Symbols = (() => {
     return { name, colour: level(number), dash: [] };
   }
 
+  // Markers are added to the path at a place; many of one kind are drawn at once.
   const paths = {
     o: (c, x, y, r) => { c.moveTo(x + r, y); c.arc(x, y, r, 0, 2 * Math.PI); },
     s: (c, x, y, r) => c.rect(x - 0.85 * r, y - 0.85 * r, 1.7 * r, 1.7 * r),
@@ -35,11 +33,21 @@ const Symbols = (() => {
     p: (c, x, y, r) => polygon(c, x, y, r, 5, 0),
     h: (c, x, y, r) => polygon(c, x, y, r, 6, 0),
     8: (c, x, y, r) => polygon(c, x, y, r, 8, Math.PI / 8),
+    "*": (c, x, y, r) => star(c, x, y, r, 5, 0.4, 0),
+    P: (c, x, y, r) => star(c, x, y, r, 4, 0.35, 0),
+    X: (c, x, y, r) => star(c, x, y, r, 4, 0.35, Math.PI / 4),
   };
   function polygon(c, x, y, r, corners, turn) {
     for (let i = 0; i < corners; i++) {
       const angle = turn + (2 * Math.PI * i) / corners;
       c[i ? "lineTo" : "moveTo"](x + r * Math.sin(angle), y - r * Math.cos(angle));
+    }
+    c.closePath();
+  }
+  function star(c, x, y, r, points, inner, turn) {
+    for (let i = 0; i < 2 * points; i++) {
+      const angle = turn + (Math.PI * i) / points, far = i % 2 ? inner * r : r;
+      c[i ? "lineTo" : "moveTo"](x + far * Math.sin(angle), y - far * Math.cos(angle));
     }
     c.closePath();
   }
@@ -105,33 +113,11 @@ const Symbols = (() => {
     c.restore();
   }
 
-  function text(c, words, x, y, colour, align = "left") {
-    c.font = "12px system-ui, sans-serif";
-    c.textAlign = align;
-    c.fillStyle = colour;
-    c.fillText(words, x, y);
-  }
-
-  // A canvas of the size that it has on screen, in its pixels; returns its context, cleared.
-  function ready(canvas) {
-    const ratio = window.devicePixelRatio || 1;
-    const width = Math.round(canvas.clientWidth * ratio);
-    const height = Math.round(canvas.clientHeight * ratio);
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
-    const c = canvas.getContext("2d");
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
-    return c;
-  }
-
   function niceStep(least) {
     const power = 10 ** Math.floor(Math.log10(least));
     return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
   }
 
   return { get colours() { return colours; }, readTheme, level, region, mark, outline, Batch, aircraft,
-    text, ready, niceStep };
+    niceStep };
 })();
