@@ -81,8 +81,8 @@ NOISY = {
 _MISSED = 0.3
 _CLASS = f"{__name__ if __name__ != '__main__' else 'components.evidence.track_consistency'}:"
 #: Straight flights have no noise of their own, but level flight follows the Earth: 60 m/s bend by
-#: a = v²/R = 0.57 mm/s² from a straight line of the frame. White acceleration of intensity a² T makes
-#: velocities as uncertain within the T = 37 s of a scene as they become wrong by a T.
+#: a = v²/R = 0.57 mm/s² from a straight line of the frame. White acceleration of intensity a² T
+#: makes velocities as uncertain within the T = 37 s of a scene as they become wrong by, a T.
 STILL = {"acceleration_intensity_m2_s3": 1.2e-5}
 
 
@@ -135,9 +135,9 @@ class Case:
 
 _EKF = {"type": "tracking.ekf", **STILL}
 _DEGREE = math.radians(1.0)
-#: Of turns that a computer flies: all but no noise within a model, and turns that begin at any time.
+#: Of turns that a computer flies: all but no noise in a model, and turns begin at any time.
 _STEADY = {
-    "acceleration_intensity_m2_s3": 0.01, "turn_acceleration_intensity_m2_s3": 1e-4,
+    "acceleration_intensity_m2_s3": 0.01, "turn_acceleration_intensity_m2_s3": 1.2e-5,
     "transition_rates_per_s": [[0.0, 0.05], [0.01, 0.0]],
 }  # fmt: skip
 #: The default of `tracking.imm`.
