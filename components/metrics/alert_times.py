@@ -75,8 +75,9 @@ class AlertTimes(TargetMetric):
         """Return all of it for every replica."""
         told = self._told.of(group) if self.p.steered else None
         lost_s, nmac_s, _ = read_flights(
-            group, self.p.step_s, self.p.target, self.p.losses_s, 3, told
-        )
+            group, self.p.step_s, self.p.target, self.p.losses_s, 3, told,
+            to_the_end=self.p.steered or not self._told,
+        )  # fmt: skip
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

@@ -5,6 +5,7 @@ Loss of well clear is by default that of ASTM F3442 for small unmanned aircraft,
 horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -33,6 +34,8 @@ from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
 #: Where a closest approach may be cut off, see `components.traffic.censored.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
+#: The end of a run that a block ended before its time.
+_EARLY_END = "the early end of the run"
 _NOWHERE = (float("inf"), float("nan"), "")
 _BEFORE = ("detection", "declaration")
 _CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
@@ -118,6 +121,8 @@ def read_flights(
     read: Callable[[list[RelativeFlight]], tuple[float, ...]],
     width: int,
     told: Mapping[int, Told] | None = None,
+    *,
+    to_the_end: bool = False,
 ) -> FloatArray:
     """Return what `read` makes of every replica's flights, shape (width, replicas).
 
@@ -135,6 +140,9 @@ def read_flights(
         How many values it returns.
     told : mapping, optional
         What the ownship of a replica was told to fly; others fly on as they are.
+    to_the_end : bool
+        Look at each no longer than its run, which may have ended early; else as long as it was
+        meant to last.
     """
     known: dict[tuple[Any, ...], tuple[float, ...]] = {}
     values = np.empty((width, len(group)))
@@ -142,13 +150,18 @@ def read_flights(
     moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
     scenes = group.scenes if moved else [group.scene] * len(group)
     for number, scene in enumerate(scenes):
+        until_s = math.inf
+        if to_the_end and group.ended_early[number]:
+            until_s = float(group.duration_s[number])
         if told and number in told:
-            found = separations(scene, step_s, told[number])
+            found = separations(scene, step_s, told[number], until_s)
             values[:, number] = read([s for s in found if target in (None, s.name)])
             continue
-        key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
+        flights = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
+        key = (*flights, until_s)
         if key not in known:
-            found = group.once(("separations", step_s, *key), partial(separations, scene, step_s))
+            make = partial(separations, scene, step_s, (), until_s)
+            found = group.once(("separations", step_s, *key), make)
             known[key] = read([s for s in found if target in (None, s.name)])
         values[:, number] = known[key]
     return values
@@ -170,7 +183,7 @@ class _Encounter(TargetMetric):
     ) -> FloatArray:
         """Return what `read` makes of every replica's flights as flown, (width, replicas)."""
         told = self._told.of(group)
-        return read_flights(group, self.p.step_s, self.p.target, read, width, told)
+        return read_flights(group, self.p.step_s, self.p.target, read, width, told, to_the_end=True)
 
 
 class ClosestApproach(_Encounter):
@@ -201,7 +214,8 @@ class ClosestApproach(_Encounter):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         distance, time_s, code = self.of_flights(group, _closest, 3)
-        at = np.array(_ENDS)[code.astype(int)]
+        at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
+        at[(at == END) & group.ended_early] = _EARLY_END
         found: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,

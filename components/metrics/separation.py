@@ -3,6 +3,7 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -82,7 +83,10 @@ _SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
 
 
 def separations(
-    scene: Scene, step_s: float | None, told: Sequence[tuple[float, Manoeuvre]] = ()
+    scene: Scene,
+    step_s: float | None,
+    told: Sequence[tuple[float, Manoeuvre]] = (),
+    until_s: float = math.inf,
 ) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
@@ -94,14 +98,16 @@ def separations(
         between them for losses (`first_inside`), with a grid of `STEP_S` for all else.
     told : sequence of (time in s, Manoeuvre)
         What the ownship was told to fly, in order of time; by default it flies on.
+    until_s : float
+        When the run ended, where that was before its time.
     """
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
-    count = regular_count(step_s or STEP_S, float(duration))
-    end_s = float(duration)
+    end_s = min(float(duration), until_s)
+    count = regular_count(step_s or STEP_S, end_s)
     if told:
         source.own = SteeredFlight(source.own)
         for time_s, manoeuvre in told:

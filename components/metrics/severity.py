@@ -84,7 +84,9 @@ class Severity(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
         told = self._told.of(group)
-        found = read_flights(group, self.p.step_s, self.p.target, self._severities, 2, told)
+        found = read_flights(
+            group, self.p.step_s, self.p.target, self._severities, 2, told, to_the_end=True
+        )
         return {"slowc_percent": found[0], "pnmac": found[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
