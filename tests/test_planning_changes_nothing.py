@@ -31,10 +31,17 @@ UNFINISHED = {
 LARGE = ("benchmark/sparse.toml", "benchmark/ten_thousand.toml")
 #: Filters and loops take seconds for a whole run; by then everything has been seen, s.
 ENDS_S = {
-    "avoidance/crossing_tracked.toml": 90,
-    "avoidance/crossing_tracked_late.toml": 90,
-    "operator/session.toml": 35,
-    "tracking/architectures.toml": 15,
+    "avoidance/crossing.toml": 50,
+    "avoidance/crossing_pilot.toml": 50,
+    "avoidance/crossing_seen_late.toml": 110,
+    "avoidance/crossing_tracked.toml": 55,
+    "avoidance/crossing_tracked_late.toml": 105,
+    "benchmark/closed_loop_risk.toml": 60,
+    "operator/session.toml": 15,
+    "systems/afrl_tracked.toml": 25,
+    "tracking/architectures.toml": 10,
+    "tracking/cueing.toml": 20,
+    "tracking/flown_intercept.toml": 30,
 }
 SCENES = sorted(
     name
@@ -70,6 +77,7 @@ def assert_nothing_changed(folders: dict[bool, Path]) -> None:
     names = sorted(path.name for path in folders[False].iterdir())
     assert names == sorted(path.name for path in folders[True].iterdir())
     assert {"detections.parquet", "scans.parquet"} <= set(names)
+    assert pq.read_metadata(folders[False] / "detections.parquet").num_rows > 0
     for name in names:
         if name != "scans.parquet":
             same = (folders[False] / name).read_bytes() == (folders[True] / name).read_bytes()

@@ -153,4 +153,16 @@ FAULTS = [
         ("a-set-stays-where-it-was", "return found if at is None else",
          "return found if True else"),
     ),
+    *in_file(
+        _GROUP, "components/encounters/generate_command.py",
+        ("wiring/test_encounter_traffic_keys.py",),
+        ("intruder-of-the-ownship-s-model", "PairSampler(own, intruder, seed, rules)",
+         "PairSampler(own, own, seed, rules)"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/encounter_traffic.py",
+        ("wiring/test_encounter_traffic_keys.py",),
+        ("place-told-as-number", '"number": int(self.found.numbers[self.place])',
+         '"number": self.place'),
+    ),
 ]  # fmt: skip

@@ -172,4 +172,22 @@ FAULTS = [
         ("measured-without-what-is-set", 'sets=[f"{key}={value}" for key, value in sets]',
          "sets=[]"),
     ),
+    *in_file(
+        _GROUP, "dsa_des/studies/measured_errors.py",
+        ("wiring/test_what_a_folder_says_of_its_first_run.py",),
+        ("measured-without-swaps", 'swaps=[f"{block}={name}" for block, name in swaps]',
+         "swaps=[]"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/explained.py",
+        ("wiring/test_what_a_folder_says_of_its_first_run.py",),
+        ("scene-of-the-last-cell", "text = text or to_toml(scene.resolved())",
+         "text = to_toml(scene.resolved())"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/map_figure.py", ("studies/test_requirements.py",),
+        ("parts-in-another-order", '_PARTS = ("value", "low", "high")',
+         '_PARTS = ("value", "high", "low")',
+         "each part is read from the estimate and drawn by its name"),
+    ),
 ]  # fmt: skip

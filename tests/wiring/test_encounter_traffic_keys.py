@@ -7,11 +7,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pymap3d
 import pytest
+from click.testing import CliRunner
 from covering import covers
 from wired import chain, rows, run, sensor
 
 import dsa_des
-from tests.encounters.test_pairing import TURNS
+from components.encounters.command import encounters
+from tests.encounters.test_pairing import GAS, TURNS
 
 RADAR = sensor("radar.range_boundary", scan_rate_hz=1)
 BOTH = ("traffic.encounters", "traffic.encounter_model")
@@ -61,6 +63,14 @@ def test_the_encounter_of_a_number_is_flown(tmp_path):
         assert found[float(t)]["true_range_m"] == pytest.approx(apart, abs=1.0)
     other = seen({"type": "traffic.encounters", "file": file, "encounter": 9})
     assert other[0.0]["true_range_m"] == pytest.approx(math.hypot(2000, 100), abs=1.0)
+
+
+def test_a_run_tells_the_number_and_the_weight_of_its_encounter(tmp_path):
+    scene = chain({"radar": RADAR})
+    scene["blocks"]["traffic"] = {
+        "type": "traffic.encounters", "file": events(tmp_path / "set.parquet"), "encounter": 9,
+    }  # fmt: skip
+    assert run(scene).info["summary"]["encounter"] == {"number": 9, "weight": 0.5}
 
 
 @covers("lat_deg", "lon_deg", of=BOTH)
@@ -209,6 +219,26 @@ def test_a_scripted_ownship_flies_as_in_scripted_traffic(kind, own, tmp_path):
     assert len(mine) == len(plain) > 9
     for one, other in zip(mine, plain, strict=True):
         assert one == other
+
+
+def test_each_aircraft_of_a_generated_set_flies_by_the_model_of_its_own(tmp_path):
+    """Speeds as in the ownship's file and in the intruder's, whose classes do not overlap."""
+    slow, fast = tmp_path / "slow.txt", tmp_path / "fast.txt"
+    slow.write_text(GAS, encoding="utf-8")
+    fast.write_text(GAS.replace("70 80 100 140 160", "270 280 300 340 360"), encoding="utf-8")
+    out = tmp_path / "set.parquet"
+    words = ["generate", "--model", slow, "--intruder-model", fast, "--count", 2, "--first", 5,
+             "--at", AT["lat_deg"], AT["lon_deg"], "--out", out]  # fmt: skip
+    done = CliRunner().invoke(encounters, [str(w) for w in words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    scene = chain({"radar": RADAR}, record={"truth": True})
+    scene["blocks"]["traffic"] = {"type": "traffic.encounters", "file": str(out), "encounter": 6}
+    found = rows(run(scene), "truth")
+    for row in found:
+        way = [row[f"velocity_{axis}_m_s"] * 3600.0 / 1852.0 for axis in ("north", "east", "down")]
+        least, most = (70.0, 160.0) if row["target"] is None else (270.0, 360.0)
+        assert least - 1.0 < math.hypot(*way) < most + 1.0
+    assert len({row["target"] for row in found}) == 2
 
 
 def test_intruders_stay_where_the_encounter_has_them(tmp_path):

@@ -10,6 +10,8 @@ from covering import covers
 from test_alert_time_metric import behind
 from wired import chain, measured, rows, run, sensor
 
+import dsa_des
+
 KIND = ("[metric mitigated]",)
 RADAR = sensor("radar.range_boundary", scan_rate_hz=20)
 SIZES = {"horizontal_m": 600.0, "vertical_m": 100.0, "nmac_horizontal_m": 150.0,
@@ -84,6 +86,21 @@ def test_a_coarse_step_steps_over_a_short_event():
 def test_a_wire_whose_delay_is_not_known_is_refused(wire):
     with pytest.raises(Exception, match="must have a fixed delay in"):
         measured(scene(**wire), {"metric": "mitigated"})
+
+
+def test_replicas_measured_together_have_their_own_manoeuvres(flown):
+    """Whoever turns at 200 m turns too late, and whoever does at 800 m flies as above."""
+    size = flown[:, 0].min() * 0.99
+    sizes = {**SIZES, "horizontal_m": size, "nmac_horizontal_m": size, "nmac_vertical_m": 100.0}
+    runs = dsa_des.study(
+        scene(), metrics=[{"metric": "mitigated", **sizes}], replicas=3, workers=1,
+        draws={"blocks.avoidance.range_km": {"choice": [0.8, 0.2]}}, runs_per_chunk=3,
+    ).runs.to_pylist()  # fmt: skip
+    late = [row["draw.avoidance.range_km"] == 0.2 for row in runs]
+    assert any(late) and not all(late[1:])
+    for event in ("well_clear_lost", "nmac"):
+        assert [row[f"{event}_nominal"] for row in runs] == [1, 1, 1]
+        assert [row[f"{event}_mitigated"] for row in runs] == late
 
 
 def test_without_a_loop_there_is_nothing_to_compare():

@@ -90,8 +90,18 @@ def test_rules_of_fusion_differ_in_their_spread():
     found = {}
     for rule in ("independent", "determinant"):
         both["blocks"]["fused"]["rule"] = rule
-        run = run_rung(dsa_des.load_scene(both), "fused")
+        loaded = dsa_des.load_scene(both)
+        run = run_rung(loaded, "fused")
         found[rule] = values_of(RULE, run, run)
+    ticks, values = found["determinant"]
+    told = [r for r in dsa_des.run(loaded)["state_tracks"].to_pylist() if r["block"] == "fused"]
+    assert {r["track"] for r in told} == {1, 2}
+    for row in told:
+        at = np.flatnonzero(ticks == row["tick"])[0], row["track"] - 1
+        assert values["position"][at].tolist() == [row[f"{a}_m"] for a in ("north", "east", "down")]
+        spread = np.sqrt(sum(row[f"covariance_{i}{i}_m2"] for i in range(3)))
+        assert values["spread"][at] == pytest.approx(spread, rel=1e-12)
+    assert np.count_nonzero(~np.isnan(values["spread"])) == len(told)
     same = errors_against(RULE, found["determinant"], found["determinant"])
     assert same["position"].maximum == same["spread"].maximum == 0.0
     other = errors_against(RULE, found["independent"], found["determinant"])

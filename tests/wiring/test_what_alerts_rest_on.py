@@ -128,6 +128,71 @@ def test_each_track_has_its_own_state_deviations_and_margins(tmp_path, told):
     assert seen == {(1, "meets"), (2, "late")}
 
 
+def test_targets_at_one_height_are_told_apart_by_where_they_are(tmp_path):
+    """A track is of the target that it is at, not of the first one at its height."""
+    one = scene(tmp_path)
+    away = {**TARGET, "name": "far", "east_m": -3900.0, "north_m": 300.0, "heading_deg": 120.0}
+    far, near = (at_height(target, 2520.0) for target in (away, TARGET))
+    one["blocks"]["traffic"]["intruders"] = [far, near]
+    found = run(one)
+    named = {row["track"]: row["target"] for row in rows(found, "alerts")}
+    last = {row["track"]: row for row in rows(found, "state_tracks")}
+    assert sorted(named.values()) == ["far", "meets"]
+    for number, name in named.items():
+        target = far if name == "far" else near
+        own = crooked.geodetic(crooked.position(crooked.OWNSHIP, last[number]["state_s"]))
+        there = crooked.ned(target, last[number]["state_s"])
+        assert np.linalg.norm(estimated_ned(last[number], own) - there) < 50.0
+
+
+def at_height(target, alt_m):
+    """A target that starts where it did, but at a height above the ellipsoid."""
+    lat_deg, lon_deg, _ = crooked.geodetic(crooked.position(target))
+    kept = {key: value for key, value in target.items() if key not in ("east_m", "north_m", "up_m")}
+    return {**kept, "lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m}
+
+
+def estimated_ned(state, own):
+    """A recorded estimate from the ownship's place, m."""
+    import pymap3d
+
+    frame = [state[f"origin_{name}"] for name in ("lat_deg", "lon_deg", "alt_m")]
+    at = pymap3d.ned2geodetic(*(state[f"{axis}_m"] for axis in ("north", "east", "down")), *frame)
+    return np.array(pymap3d.geodetic2ned(*at, *own))
+
+
+def test_what_a_tracker_only_holds_counts_once(tmp_path, told):
+    """One radar sees a target twice a second; another one's rows repeat what is held of it."""
+    one = alerting_scene(tmp_path, "tracker -> alerting", duration_s=4, fit_s=2)
+    errs = {"errors": "stated", "quantised": False, "azimuth_error_deg": 0.3,
+            "elevation_error_deg": 0.2, "range_error_m": 15.0}  # fmt: skip
+    radar = one["blocks"]["radar"] = {**one["blocks"]["radar"], **errs, "scan_rate_hz": 2}
+    one["blocks"]["often"] = {**radar, "scan_rate_hz": 10, "azimuth_deg": [-10.0, 120.0]}
+    one["wires"].append("gate -> often -> fusion")
+    one["blocks"]["traffic"]["intruders"].append(crooked.DIVING)
+    found = run(one)
+    seen = rows(found, block="radar", target="diving")
+    assert not rows(found, block="often", target="diving")
+    assert len(rows(found, "tracks", target="diving")) > 4 * len(seen)
+    time_s = np.array([row["time_s"] for row in seen])
+    body = np.array([
+        row["range_m"] * crooked.direction(row["azimuth_rad"], row["elevation_rad"]) for row in seen
+    ])  # fmt: skip
+    north, east, down = crooked.attitude(crooked.OWNSHIP).T @ body.T
+    count = 0
+    for now_s, message, _, place in entries(told):
+        if message.target[place] == 1 and now_s >= 1.5:
+            near = (time_s >= now_s - 2.0) & (time_s <= now_s)
+            relative = message.relative
+            for axis, at in (("east", east), ("north", north), ("up", -down)):
+                rate, here = np.polyfit(time_s[near] - now_s, at[near], 1)
+                motion = "climb_mps" if axis == "up" else f"{axis}_mps"
+                assert relative[f"{axis}_m"][place] == pytest.approx(-here, rel=1e-6)
+                assert relative[motion][place] == pytest.approx(-rate, rel=1e-6)
+            count += 1
+    assert count == 5
+
+
 def crooked_level(own, other):
     """North and east of a recorded target."""
     import pymap3d
@@ -225,7 +290,8 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     flights = EstimatedFlights()
     flights.add(np.array([1]), tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
                                       east_m_s=east, down_m_s=-up))  # fmt: skip
-    _, state, _ = flights.states(1, 3.0, np.array([4]), place)
+    now, begin = np.array([1]), np.array([0])
+    _, _, state, _ = flights.states(now, np.array([3.0]), begin, place[:, np.newaxis])
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)
