@@ -68,11 +68,11 @@ class ClosestApproachPassed(Component):
         states = wake["states"]
         if states is None or len(states.columns) == 0:
             return None
+        own = states.own_lat_deg, states.own_lon_deg, states.own_alt_m
+        lat_deg, lon_deg, alt_m = (values[:, np.newaxis] for values in own)
         _, _, range_m = line_of_sight(
-            *(own[:, np.newaxis] for own in (states.own_lat_deg, states.own_lon_deg,
-                                             states.own_alt_m)),
-            states.lat_deg, states.lon_deg, states.alt_m, validate=False,
-        )  # fmt: skip
+            lat_deg, lon_deg, alt_m, states.lat_deg, states.lon_deg, states.alt_m, validate=False
+        )
         replica = wake.replica
         first = np.append(True, replica[1:] != replica[:-1])
         starts, numbers = np.flatnonzero(first), replica[first]
