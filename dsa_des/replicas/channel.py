@@ -130,16 +130,18 @@ class ReplicaChannel(Channel):
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds in each replica at each of `ticks`; see `Channel.sample`."""
+        if not self._time.side_by_side:
+            return self._sample_along(ticks, end)
         new = self.collect(end)
         if new is not None:
             self._passed.append(new)
             rows = last_at_or_before(new[0], ticks)
             if bool((new[0][rows] == ticks).all()):
                 # What has come at the very instant is held: what was before need not be looked up.
-                if self._time.side_by_side and self._of_all(new[0]):
+                if self._of_all(new[0]):
                     self._passed, self._last = [new], None  # nothing older is held by any replica
                 elif len(self._passed) > _MOST_PASSED:
-                    self._remember(ticks)
+                    self._remember()
                 return new[1], rows
         if self._last is not None:
             self._passed.insert(0, self._last)
@@ -148,10 +150,36 @@ class ReplicaChannel(Channel):
         if held is None:
             return None
         arrivals, message = held
-        rows = last_at_or_before(arrivals, ticks)
-        rows[arrivals[rows] // self._span != ticks // self._span] = -1
-        self._remember(ticks)
+        rows = self._held_rows(arrivals, ticks)
+        self._remember()
         return message, rows
+
+    def _sample_along(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
+        """Return what `sample` does where replicas lie end to end: those passed never come again.
+
+        So a window keeps no more of what has come than the last row of its last replica.
+        """
+        new, old = self.collect(end), self._last
+        if old is not None and old[0][-1] < ticks[0] - ticks[0] % self._span:
+            old = None
+        held = _in_order([part for part in (old, new) if part is not None])
+        self._last = None
+        if held is None:
+            return None
+        arrivals, message = held
+        rows = self._held_rows(arrivals, ticks)
+        first = int(np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span))
+        if first < len(arrivals):
+            lasts = first + _last_of_each(arrivals[first:] // self._span)
+            self._last = arrivals[lasts], message.take(lasts)
+        return message, rows
+
+    def _held_rows(self, arrivals: IntArray, ticks: IntArray) -> IntArray:
+        """Return the row that is held at each tick; -1 where its replica holds nothing yet."""
+        rows = last_at_or_before(arrivals, ticks)
+        if arrivals is not ticks:
+            rows[arrivals[rows] // self._span != ticks // self._span] = -1
+        return rows
 
     def _of_all(self, arrivals: IntArray) -> bool:
         """Whether there is a row of every replica, of rows in order of replica."""
@@ -160,19 +188,18 @@ class ReplicaChannel(Channel):
         replica = arrivals // self._span
         return 1 + int(np.count_nonzero(replica[1:] != replica[:-1])) == self._time.replicas
 
-    def _remember(self, ticks: IntArray) -> None:
-        """Keep of what has passed the last row of each replica that may ask for it."""
+    def _remember(self) -> None:
+        """Keep of what has passed the last row of each replica."""
         held = _in_order(([] if self._last is None else [self._last]) + self._passed)
         self._passed, self._last = [], None
-        if held is None:
-            return
-        arrivals, message = held
-        replica = arrivals // self._span
-        ends = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
-        if not self._time.side_by_side:  # those that have passed never come again
-            ends = ends[replica[ends] >= ticks[-1] // self._span]
-        if len(ends):
-            self._last = arrivals[ends], message.take(ends)
+        if held is not None:
+            lasts = _last_of_each(held[0] // self._span)
+            self._last = held[0][lasts], held[1].take(lasts)
+
+
+def _last_of_each(replica: IntArray) -> IntArray:
+    """Return the place of the last row of each replica, of rows in order of replica."""
+    return np.flatnonzero(np.append(replica[1:] != replica[:-1], True))
 
 
 def _in_order(parts: list[tuple[IntArray, Message]]) -> tuple[IntArray, Message] | None:
