@@ -16,7 +16,7 @@ _PER = re.compile(r"_([a-z]+2?)_per_([a-z]+)$")
 #: Words of two letters that are none but words.
 _WORDS = {"at", "by", "in", "is", "no", "of", "on", "or", "to", "up"}
 #: Abbreviations that hold vowels.
-_ABBREVIATIONS = {"nees", "nis", "ospa", "gospa", "nmac", "siap", "tcas"}
+_ABBREVIATIONS = {"nees", "ospa", "gospa", "nmac", "siap"}
 _CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
 
 
