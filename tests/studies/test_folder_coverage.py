@@ -15,11 +15,11 @@ from dsa_des.studies.record import results_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.studies.summary import compare_axis, summarise
 from tests.studies.encounter_folder import rows_of, write_encounter, write_scene
+from tests.studies.table_rows import rows_of_table
 
 SENSOR = '''
 import numpy as np
 from components.sensor import Look, Sensor, SensorParameters
-from tests.studies.table_rows import rows_of_table
 
 
 class ByChanceParameters(SensorParameters):
