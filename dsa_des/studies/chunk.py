@@ -15,7 +15,8 @@ import pyarrow.parquet as pq
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
-from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import CLASS, RATIO, SHARE, TRIALS, Group, Metric, Result, wanted_by
 from dsa_des.studies.seal import parquet

@@ -20,7 +20,9 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
-from dsa_des.replicas.replicas import Recorded, Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.drawn_columns import scenes_of
+from dsa_des.replicas.replicas import Recorded
 from dsa_des.scene.scene import Scene
 
 METRICS = "dsa_des.metrics"
@@ -160,9 +162,9 @@ class Group:
         return found
 
     @cached_property
-    def scenes(self) -> list[Scene]:
+    def scenes(self) -> Sequence[Scene]:
         """The scene of every replica with its changes."""
-        return [scene_of(self.scene, replica) for replica in self.replicas]
+        return scenes_of(self.scene, self.replicas)
 
 
 def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:

@@ -11,8 +11,9 @@ from components.evidence.benchmark.cases import SCENES, replicas_of, scene_of
 from components.evidence.benchmark.cases import chosen as chosen_cases
 from components.examples import folder
 from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Failed, Replica, run_replicas
+from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.chunk import run_chunk
