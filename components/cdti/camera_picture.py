@@ -49,15 +49,8 @@ def silhouette(
     pixel_rad : (across, up)
         What a pixel sees.
     """
-    azimuth, elevation = direction_rad
     to_body = _body_to_ned(own_attitude_rad).T @ _body_to_ned(target_attitude_rad)
-    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    along = np.array([
-        math.cos(elevation) * math.cos(azimuth),
-        math.cos(elevation) * math.sin(azimuth),
-        -math.sin(elevation),
-    ])  # fmt: skip
-    up = np.cross(right, along)  # body z points down
+    right, up, _ = _axes(direction_rad)
     scale = np.stack([right / pixel_rad[0], up / pixel_rad[1]]) @ to_body / range_m
     radius = math.sqrt(areas.front_m2 / math.pi)
     half = 0.25 * areas.side_m2 / radius if radius else 0.0
@@ -71,6 +64,65 @@ def silhouette(
         [chord, span, 0.0], [chord, -span, 0.0], [-chord, -span, 0.0], [-chord, span, 0.0],
     ])  # fmt: skip
     return Silhouette(fuselage, corners @ scale.T)
+
+
+class Horizon(NamedTuple):
+    """The horizon on the picture, as a straight line.
+
+    Parameters
+    ----------
+    height : float
+        Distance of the line from the middle of the picture, pixels; positive where the middle is
+        below it.
+    tilt_rad : float
+        Where the line's upper side points, clockwise from the top of the picture.
+    """
+
+    height: float
+    tilt_rad: float
+
+
+def horizon(
+    own_attitude_rad: FloatArray,
+    direction_rad: tuple[float, float],
+    dip_rad: float,
+    pixel_rad: tuple[float, float],
+) -> Horizon:
+    """Return where the horizon lies on the picture around a direction.
+
+    Parameters
+    ----------
+    own_attitude_rad : (3,)
+        Yaw, pitch and roll, NED to body.
+    direction_rad : (azimuth, elevation)
+        Of the middle of the picture, in the ownship's body axes.
+    dip_rad : float
+        How far the horizon lies below the level.
+    pixel_rad : (across, up)
+        What a pixel sees.
+
+    Notes
+    -----
+    The sine of the elevation over the level is linear in the direction; what is far from the middle
+    lies where its tangent there puts it.
+    """
+    right, up, along = _axes(direction_rad)
+    upward = -_body_to_ned(own_attitude_rad)[2]
+    across, upright = float(right @ upward) * pixel_rad[0], float(up @ upward) * pixel_rad[1]
+    missing = -math.sin(dip_rad) - float(along @ upward)
+    return Horizon(missing / max(math.hypot(across, upright), 1e-12), math.atan2(across, upright))
+
+
+def _axes(direction_rad: tuple[float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the picture's axes to the right and up and the line of sight, in body axes."""
+    azimuth, elevation = direction_rad
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    along = np.array([
+        math.cos(elevation) * math.cos(azimuth),
+        math.cos(elevation) * math.sin(azimuth),
+        -math.sin(elevation),
+    ])  # fmt: skip
+    return right, np.cross(right, along), along  # body z points down
 
 
 def _body_to_ned(attitude_rad: FloatArray) -> FloatArray:

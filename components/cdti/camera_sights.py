@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.cdti.camera_picture import silhouette
+from components.cdti.camera_picture import horizon, silhouette
 from components.cdti.own_flight import OwnNow
 from components.geometry.attitude import ned_to_body
 from components.messages.alerts import TRACKS_FROM
@@ -91,18 +91,20 @@ class CameraSights:
         attitude = np.array(
             [getattr(states, f"{a}_rad")[-1, place] for a in ("yaw", "pitch", "roll")]
         )
+        own_attitude = np.array([own.heading_rad, own.pitch_rad, own.roll_rad])
+        pixel_rad = camera.pixel_azimuth_rad, camera.pixel_elevation_rad
         aircraft = roster.aircraft[target]
         drawn = silhouette(
             aircraft.ir if camera.areas == "ir" else aircraft.eo,
             attitude,
-            np.array([own.heading_rad, own.pitch_rad, own.roll_rad]),
+            own_attitude,
             (azimuth, elevation),
             range_m,
-            (camera.pixel_azimuth_rad, camera.pixel_elevation_rad),
+            pixel_rad,
         )
+        line = horizon(own_attitude, (azimuth, elevation), _dip_rad(own.alt_m), pixel_rad)
         strength = camera.p.static_weight * pixels
         contrast = (margin + camera.p.threshold) / strength if strength > 0.0 else 0.0
-        up = elevation + own.pitch_rad * math.cos(azimuth) - own.roll_rad * math.sin(azimuth)
         return {
             "target": contact,
             "sensor": printable(name),
@@ -110,9 +112,9 @@ class CameraSights:
             "age": round(max(time_s - seen_s, 0.0), 2),
             "pixels": round(pixels, 1),
             "contrast": round(contrast, 3),
-            # Above or below the horizon, small attitudes taken as small.
-            "background": "sky" if up >= -_dip_rad(own.alt_m) else "ground",
-            "horizon": round((-_dip_rad(own.alt_m) - up) / camera.pixel_elevation_rad, 1),
+            "background": "sky" if line.height <= 0.0 else "ground",
+            "horizon": round(line.height, 1),
+            "tilt": round(math.degrees(line.tilt_rad), 2),
             "fuselage": np.round(drawn.fuselage, 2).tolist(),
             "wing": np.round(drawn.wing, 2).tolist(),
         }

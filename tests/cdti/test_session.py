@@ -82,7 +82,8 @@ def test_no_socket_for_a_page_of_another_origin(live, options):
 def test_a_whole_session_and_its_replay(tmp_path, monkeypatch):
     swaps = ("tracker=tracking.stub",)
     session = Session(monkeypatch, tmp_path / "run", factor="4", duration="20", swaps=swaps,
-                      sets=(*LATER, "blocks.operator.turn_rate_deg_s=5"))  # fmt: skip
+                      sets=(*LATER, "blocks.operator.turn_rate_deg_s=5",
+                            "blocks.operator.latency_s=0.4"))  # fmt: skip
     with page(session) as (socket, welcome), page(session) as (other, beside):
         assert (welcome["role"], beside["role"]) == ("operator", "watcher")
         assert welcome["console"] and not welcome["began"]

@@ -9,6 +9,8 @@ _ADMISSION = "cdti/test_admission.py"
 _SESSION = "cdti/test_session.py"
 _MESSAGES = "cdti/test_page_messages.py"
 _SHOWN = "wiring/test_what_the_display_shows.py"
+_LOST = "wiring/test_contacts_that_are_lost.py"
+_CAMERA = "wiring/test_the_display_s_camera.py"
 _WHOLE = "cdti/test_session.py::test_a_whole_session_and_its_replay"
 
 FAULTS = [
@@ -110,5 +112,75 @@ FAULTS = [
         ("sector-of-an-unturned-radar", "math.degrees(edge) + turned_deg", "math.degrees(edge)"),
         ("bands-for-ever", "> BANDS_LAST_S", "> 1e9"),
         ("camera-looks-at-the-first-contact", "contacts.toward[place[0]]", "contacts.toward[0]"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/camera_sights.py", _CAMERA,
+        ("picture-from-twice-as-far", "message.true_range_m[real],\n",
+         "2.0 * message.true_range_m[real],\n"),
+        ("picture-of-the-oldest-camera", "name = max(names", "name = min(names"),
+        ("pitch-for-roll", "np.array([own.heading_rad, own.pitch_rad, own.roll_rad])",
+         "np.array([own.heading_rad, own.roll_rad, own.pitch_rad])"),
+        ("picture-of-long-ago-is-of-a-track", "time_s - seen[:, 0] < LATELY_S",
+         "time_s - seen[:, 0] < 1e9"),
+        ("attitude-of-the-first-target", '_rad")[-1, place]', '_rad")[-1, 0]'),
+        ("attitude-of-the-window-s-start", '_rad")[-1, place]', '_rad")[0, place]'),
+        ("contrast-of-the-margin", "(margin + camera.p.threshold) / strength",
+         "margin / strength"),
+        ("pixels-across-for-pixels-up", "camera.pixel_azimuth_rad, camera.pixel_elevation_rad",
+         "camera.pixel_elevation_rad, camera.pixel_azimuth_rad"),
+        ("infrared-picture-of-daylight-areas", "aircraft.ir if camera.areas",
+         "aircraft.eo if camera.areas"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/camera_picture.py", _CAMERA,
+        ("horizon-of-a-bank-to-the-other-side", "-_body_to_ned(own_attitude_rad)[2]",
+         "-_body_to_ned(own_attitude_rad * np.array([1.0, 1.0, -1.0]))[2]"),
+        ("horizon-above-the-level", "missing = -math.sin(dip_rad)",
+         "missing = math.sin(dip_rad)"),
+        ("horizon-tilts-the-other-way", "math.atan2(across, upright)",
+         "math.atan2(-across, upright)"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/contacts.py", (_LOST, _SHOWN),
+        ("track-seen-whenever-it-is-told", "message.updated_s[lives]", "message.state_s[lives]"),
+        ("deleted-tracks-are-shown", "np.flatnonzero(message.track_status != DELETED)",
+         "np.flatnonzero(message.track_status >= 0)"),
+        ("lines-from-where-the-ownship-is-now", "own.poses(message.measured_tick)",
+         "own.poses(message.measured_tick + 10**12)"),
+        ("who-is-not-fused-now-is-lost", "stays = ~np.isin(before.number, found.number)",
+         "stays = np.zeros(len(before.number), dtype=bool)"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/own_flight.py", _SHOWN,
+        ("flight-before-this-message-forgotten", "keep = self._tick < states.tick[0]",
+         "keep = self._tick < -1"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/scope.py", _SHOWN,
+        ("time-to-the-last-loss", "np.fmin.reduce(times)", "np.fmax.reduce(times)"),
+        ("area-of-all-targets", "alerts.relative[:, on]", "alerts.relative"),
+    ),
+    *in_file(
+        _GROUP, "components/cdti/session.py", _WHOLE,
+        ("replay-without-the-console-s-latency", "**kept, **options,", "**kept,"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/desk.py", _CONSOLE,
+        ("only-the-last-decision-counts", "for laid in found]", "for laid in found[-1:]]"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/human.py", _CONSOLE,
+        ("decision-at-the-wake-s-first-instant", "wake.ticks[-1]", "wake.ticks[0]",
+         "a block that is not windowed is woken at one instant at a time"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/console.py", _CONSOLE,
+        ("all-told-with-the-first-decision", "told = [(tick, self._told(d))",
+         "told = [(made[0][0], self._told(d))"),
+    ),
+    *in_file(
+        _GROUP, "components/operator/recorded.py", _CONSOLE,
+        ("decision-at-the-scan-before-it", "self._ticks[first : self._next])]",
+         'self._ticks[first : self._next], side="right") - 1]'),
     ),
 ]  # fmt: skip

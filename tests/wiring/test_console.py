@@ -124,6 +124,20 @@ def test_a_decision_comes_at_the_first_scan_not_before_it(tmp_path, kind, keys, 
     assert told["time_s"] == pytest.approx(time_s, abs=1e-6)
 
 
+def test_decisions_of_one_window_are_each_of_their_own_scan(tmp_path):
+    """Nothing leads back to the alerts: the whole run is one window."""
+    wanted = scene(tmp_path, scan_rate_hz=2, offset_s=0.2)
+    (tmp_path / "table.csv").write_text(
+        "time_s,decision,turn_rad,climb_m\n3,looked,,\n7.1,turn,0.2,\n7.3,climb,,40\n9.2,turn,-0.1,\n"
+    )
+    wanted["duration_s"] = 12
+    wanted["wires"].pop()
+    found = run(wanted)
+    assert [row["time_s"] for row in rows(found, "decisions")] == [3.2, 7.2, 7.7, 9.2]
+    told = [(row["time_s"], row["turn_rad"], row["climb_m"]) for row in rows(found, "manoeuvres")]
+    assert told == [(7.2, 0.2, 0.0), (7.7, 0.0, 40.0), (9.2, -0.1, 0.0)]
+
+
 @covers("jitter_s", of=BOTH)
 @pytest.mark.parametrize("kind", BOTH)
 def test_scans_that_jitter_take_decisions_at_other_times(tmp_path, kind):

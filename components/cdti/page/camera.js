@@ -45,11 +45,14 @@ const Camera = (() => {
     const around = picture.infrared ? COLD : below ? GROUND : SKY;
     s.fillStyle = grey(picture.infrared ? COLD : SKY);
     s.fillRect(0, 0, wide, high);
-    const horizon = high / 2 - picture.horizon;
-    if (horizon < high) {
-      s.fillStyle = grey(picture.infrared ? COLD + 25 : GROUND);
-      s.fillRect(0, Math.max(horizon, 0), wide, high);
-    }
+    // The ground below the horizon, which stands askew on the picture of a camera that banks.
+    s.save();
+    s.translate(wide / 2, high / 2);
+    s.rotate((picture.tilt * Math.PI) / 180);
+    s.fillStyle = grey(picture.infrared ? COLD + 25 : GROUND);
+    const far = wide + high;
+    s.fillRect(-far, Math.max(-picture.horizon, -far), 2 * far, 2 * far);
+    s.restore();
     const change = Math.min(Math.max(picture.contrast, 0), 1);
     s.fillStyle = grey(picture.infrared ? around + change * (255 - around) : around * (1 - change));
     fill(s, picture.wing, wide / 2, high / 2);

@@ -1,0 +1,136 @@
+"""The camera's picture beside the display is of the chosen contact, as it flies now."""
+
+import math
+
+import crooked
+import numpy as np
+import pytest
+from wired import SEES_ALL, chain
+
+import dsa_des
+from components.cdti.scope import Scope
+from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.running.simulation import Simulation
+
+EO = {"front_m2": 6.0, "side_m2": 22.0, "horizontal_m2": 40.0}
+IR = {"front_m2": 2.0, "side_m2": 5.0, "back_m2": 2.0, "horizontal_m2": 12.0}
+#: High above, its picture is that of the second camera.
+ROLLING = {**crooked.ROLLING, "eo": EO, "ir": IR, "contrast": 0.21, "contrast_ir": 0.64}
+#: Turns left by 5 deg every second, far to the left of the nose, just over the horizon.
+TURNING = {"name": "turning", "east_m": 1500.0, "north_m": -2300.0, "up_m": -38.0,
+           "heading_deg": 290.0, "speed_mps": 65.0, "legs": [{"kind": "turn", "rate_deg_s": -5.0}],
+           "eo": EO, "ir": IR, "contrast": 0.37, "contrast_ir": 0.88}  # fmt: skip
+BELOW = {**crooked.DIVING, "eo": EO, "contrast": 0.55}
+TARGETS = {"below": BELOW, "turning": TURNING, "rolling": ROLLING}
+RADAR = {
+    "type": "radar.range_boundary", "scan_rate_hz": 2, "range_km": 12.0, "errors": "stated",
+    "quantised": False, "azimuth_error_deg": 0.1, "elevation_error_deg": 0.1, "range_error_m": 5.0,
+}  # fmt: skip
+#: The second sees what is to the right of the nose alone, and sees it later.
+CAMERAS = {
+    "eye": {**SEES_ALL, "offset_s": 0.2},
+    "again": {**SEES_ALL, "type": "optical.ir", "offset_s": 0.6, "azimuth_deg": [20.0, 50.0],
+              "azimuth_pixels": 4500},
+}  # fmt: skip
+PIXEL_RAD = {"eye": np.radians([0.01, 0.01]), "again": np.radians([30 / 4500, 0.01])}
+DURATION_S = 4.0
+#: The last instant at which anybody looks.
+LAST_S = 3.6
+
+
+@pytest.fixture(scope="module", params=["tracking.ekf", "tracking.stub"])
+def seen(request):
+    """The display at the end, the contact of each target, and the detections by camera."""
+    ekf = request.param == "tracking.ekf"
+    scene = chain(
+        {"radar": RADAR, **CAMERAS}, targets=[{**t, "name": n} for n, t in TARGETS.items()],
+        duration_s=DURATION_S, tracker={"type": request.param},
+        fusion={"type": "fusion.pass_through" if ekf else "fusion.pick_best"},
+    )  # fmt: skip
+    tables = MemorySink()
+    recorder = Recorder([tables])
+    simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder)
+    scope = Scope(simulation)
+    recorder.listeners.append(scope.listen)
+    simulation.run()
+    contact = {}
+    for number, _, _, _, bearing, *_ in scope.picture(DURATION_S)["contacts"]:
+        off = {n: abs(bearing_deg(t) - bearing) for n, t in TARGETS.items()}
+        contact.setdefault(min(off, key=off.get), number)
+    assert set(contact) == set(TARGETS)
+    found = {(r["block"], r["target"]): r for r in tables.tables()["detections"].to_pylist()}
+    return scope, contact, found
+
+
+def bearing_deg(target):
+    return math.degrees(math.atan2(target["east_m"], target["north_m"])) % 360.0
+
+
+def attitude(name):
+    """Of the turning one, that of a coordinated turn for so long."""
+    if name != "turning":
+        return crooked.attitude(TARGETS[name])
+    bank_deg = math.degrees(math.atan(65.0 * math.radians(-5.0) / 9.80665))
+    return crooked.rotation(290.0 - 5.0 * LAST_S, 0.0, bank_deg)
+
+
+def test_the_newest_picture_of_the_chosen_contact_is_shown(seen):
+    scope, contact, found = seen
+    for name, sensor in (("turning", "eye"), ("rolling", "again"), ("below", "eye")):
+        shown = scope.camera(scope.picture(DURATION_S), DURATION_S, contact[name])
+        detected = found[sensor, name]
+        assert (shown["target"], shown["sensor"]) == (contact[name], sensor)
+        assert shown["age"] == pytest.approx(DURATION_S - detected["time_s"], abs=0.006)
+        assert shown["pixels"] == pytest.approx(detected["pixels"], abs=0.06)
+        key = "contrast_ir" if sensor == "again" else "contrast"
+        assert shown["contrast"] == pytest.approx(TARGETS[name][key], abs=6e-4)
+
+
+@pytest.mark.parametrize(("name", "sensor"), [("turning", "eye"), ("rolling", "again")])
+def test_wings_lie_on_the_picture_as_they_are_seen(seen, name, sensor):
+    """Corners of the plate, turned from the target's axes into the camera's, as angles."""
+    scope, contact, found = seen
+    shown = scope.camera(scope.picture(DURATION_S), DURATION_S, contact[name])
+    detected = found[sensor, name]
+    middle = detected["azimuth_rad"], detected["elevation_rad"]
+    centre = detected["true_range_m"] * crooked.direction(*middle)
+    area = (IR if sensor == "again" else EO)["horizontal_m2"]
+    span, chord = math.sqrt(3.0 * area), math.sqrt(area / 3.0)
+    wanted = []
+    for along, across in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+        corner = np.array([along * chord / 2, across * span / 2, 0.0])
+        turned = crooked.attitude(crooked.OWNSHIP) @ attitude(name).T @ corner
+        azimuth, elevation = crooked.angles(centre + turned)
+        off = (azimuth - middle[0]) * math.cos(middle[1]), elevation - middle[1]
+        wanted.append(off / PIXEL_RAD[sensor])
+    wanted = np.array(wanted)
+    assert np.abs(wanted).max() > 7.0
+    assert np.array(shown["wing"]) == pytest.approx(wanted, abs=0.02 * np.abs(wanted).max())
+
+
+def test_the_horizon_is_where_it_is_and_stands_askew(seen):
+    """Along the line on the picture, lines of sight touch the Earth."""
+    scope, contact, found = seen
+    picture = scope.picture(DURATION_S)
+    shown = scope.camera(picture, DURATION_S, contact["turning"])
+    detected = found["eye", "turning"]
+    tilt = math.radians(shown["tilt"])
+    assert 1.0 < abs(shown["horizon"]) < 100.0 and abs(shown["tilt"]) > 10.0
+    dip = math.acos(6_371_000.0 / (6_371_000.0 + picture["own"]["alt"]))
+    for along in (-80.0, 0.0, 80.0):
+        right = shown["horizon"] * math.sin(tilt) + along * math.cos(tilt)
+        up = shown["horizon"] * math.cos(tilt) - along * math.sin(tilt)
+        elevation = detected["elevation_rad"] + up * PIXEL_RAD["eye"][1]
+        azimuth = detected["azimuth_rad"] + right * PIXEL_RAD["eye"][0] / math.cos(elevation)
+        line = crooked.attitude(crooked.OWNSHIP).T @ crooked.direction(azimuth, elevation)
+        assert crooked.angles(line)[1] == pytest.approx(-dip, abs=math.radians(0.02))
+    behind = {n: scope.camera(picture, DURATION_S, c)["background"] for n, c in contact.items()}
+    assert behind == {"turning": "sky", "rolling": "sky", "below": "ground"}
+
+
+def test_an_old_picture_is_of_a_target_and_of_no_track(seen):
+    """Who was seen where a track now is may have been anybody."""
+    scope, contact, _ = seen
+    for name, number in contact.items():
+        later = scope.camera(scope.picture(DURATION_S + 3.0), DURATION_S + 3.0, number)
+        assert (later is None) is (number >= 1_000_000), name
