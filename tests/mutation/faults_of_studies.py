@@ -10,6 +10,13 @@ _SUMMARIES = "studies/test_summaries_by_hand.py"
 
 FAULTS = [
     *in_file(
+        _GROUP, "dsa_des/replicas/drawn_columns.py", "studies/test_drawn_columns.py",
+        ("values-next-to-zero-unchecked", "key=lambda value: (value == 0, abs(value))", "key=abs"),
+        ("validators-unwatched", "                if read:\n", "                if not read:\n"),
+        ("fields-as-if-not-given", "old.model_fields_set | parts.keys()", "old.model_fields_set"),
+        ("any-offset-keeps-the-ticks", "NANOSECONDS % value.denominator", "0 % value.denominator"),
+    ),
+    *in_file(
         _GROUP, "dsa_des/studies/statistics.py", _INTERVALS,
         ("biased-spread", "/ (count - 1) / count)", "/ count / count)"),
         ("spread-of-one-value", "/ (count - 1) / count)", "/ (count - 1))"),
