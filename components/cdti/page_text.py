@@ -1,11 +1,10 @@
 """The page of the display: one HTML file with style and program inside, and what it may do."""
 
-import base64
-import hashlib
-import re
 from functools import cache
-from importlib.resources import files
 
+from components.view.page_program import page_filled, page_part, page_program
+
+_PACKAGE = "components.cdti"
 #: The program's parts, in the order in which they need each other.
 SCRIPTS = ("link.js", "symbols.js", "scope.js", "camera.js", "sound.js", "panel.js", "app.js")
 
@@ -16,16 +15,9 @@ def page() -> tuple[str, str]:
 
     All that is said of a run comes over the socket, and is put on screen as text.
     """
-    folder = files("components.cdti") / "page"
-
-    def part(name: str) -> str:
-        return (folder / name).read_text(encoding="utf-8")
-
-    script = "\n".join(part(name) for name in SCRIPTS)
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    contents = {"style": part("style.css"), "script": script}
-    text = re.sub(r"\{\{(\w+)\}\}", lambda mark: contents[mark[1]], part("cdti.html"))
-    return text, digest
+    script, digest = page_program(_PACKAGE, SCRIPTS)
+    contents = {"style": page_part(_PACKAGE, "style.css"), "script": script}
+    return page_filled(_PACKAGE, "cdti.html", contents), digest
 
 
 def headers(socket_address: str) -> dict[str, str]:

@@ -1,16 +1,14 @@
 """The page itself: one HTML file with style, program and data inside."""
 
-import base64
-import hashlib
 import json
-import re
 from html import escape
-from importlib.resources import files
 from typing import Any
 
+from components.view.page_program import page_filled, page_part, page_program
 from components.view.picture import RunPicture
 from dsa_des.text.safe_text import printable
 
+_PACKAGE = "components.view"
 #: The program's parts, in the order in which they need each other.
 SCRIPTS = (
     "data.js", "symbols.js", "plan.js", "altitude.js", "timeline.js", "table.js", "app.js",
@@ -24,13 +22,7 @@ def page_text(picture: RunPicture) -> str:
     of the run can carry no markup: it stands in JSON without angle brackets, and the program puts
     it on screen as text.
     """
-    folder = files("components.view") / "page"
-
-    def part(name: str) -> str:
-        return (folder / name).read_text(encoding="utf-8")
-
-    script = "\n".join(part(name) for name in SCRIPTS)
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    script, digest = page_program(_PACKAGE, SCRIPTS)
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
         "base-uri 'none'; form-action 'none'"
@@ -38,12 +30,11 @@ def page_text(picture: RunPicture) -> str:
     contents = {
         "policy": escape(policy, quote=True),
         "title": escape(printable(picture.title)),
-        "style": part("style.css"),
+        "style": page_part(_PACKAGE, "style.css"),
         "data": _json(picture.packed()),
         "script": script,
     }
-    # In one pass: what is put in may hold such marks itself.
-    return re.sub(r"\{\{(\w+)\}\}", lambda mark: contents[mark[1]], part("view.html"))
+    return page_filled(_PACKAGE, "view.html", contents)
 
 
 def _json(content: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ const Scope = (() => {
   }
 
   function draw(frame, scene, chosen, drawn) {
-    const c = Symbols.ready(canvas);
+    const c = Canvas.ready(canvas);
     const width = canvas.clientWidth, height = canvas.clientHeight;
     const x0 = width / 2, y0 = height / 2;
     const outer = Math.max(Math.min(width, height) / 2 - 34, 20);
@@ -73,7 +73,7 @@ const Scope = (() => {
       c.stroke();
       if (part === 4) break;
       const words = `${+((range * part) / 4000).toFixed(2)} km`;
-      Symbols.text(c, words, x0 + ((outer * part) / 4) * 0.7071 + 3, y0 + ((outer * part) / 4) * 0.7071,
+      Canvas.text(c, words, x0 + ((outer * part) / 4) * 0.7071 + 3, y0 + ((outer * part) / 4) * 0.7071,
         colours.faint);
     }
     for (let mark = 0; mark < 360; mark += 10) {
@@ -86,18 +86,18 @@ const Scope = (() => {
       c.stroke();
       const fromTop = Math.abs(((mark - heading + 540) % 360) - 180);
       if (mark % 30 === 0 && fromTop > 8) {
-        Symbols.text(c, String(mark / 10).padStart(2, "0"), x0 + (outer + 10) * Math.sin(angle),
+        Canvas.text(c, String(mark / 10).padStart(2, "0"), x0 + (outer + 10) * Math.sin(angle),
           y0 - (outer + 10) * Math.cos(angle) + 4, colours.faint, "center");
       }
     }
-    Symbols.text(c, `range ${+(range / 1000).toFixed(2)} km`, canvas.clientWidth - 8,
+    Canvas.text(c, `range ${+(range / 1000).toFixed(2)} km`, canvas.clientWidth - 8,
       canvas.clientHeight - 8, colours.ink, "right");
     const words = `${String(Math.round(heading) % 360).padStart(3, "0")}°`;
     c.fillStyle = colours.ground;
     c.fillRect(x0 - 24, y0 - outer - 32, 48, 20);
     c.strokeStyle = colours.ink;
     c.strokeRect(x0 - 24, y0 - outer - 32, 48, 20);
-    Symbols.text(c, words, x0, y0 - outer - 17, colours.ink, "center", 14);
+    Canvas.text(c, words, x0, y0 - outer - 17, colours.ink, "center", 14);
   }
 
   // Detection range: EO in blue, unbroken; radar in green, dashed; IR in violet, dotted.
@@ -120,7 +120,7 @@ const Scope = (() => {
     const words = `${sensor.name} ${+(sensor.range / 1000).toFixed(1)} km`;
     const side = sensor.kind === "radar" ? low + (high - low) * 0.2 : low + (high - low) * 0.8;
     const angle = side * rad;
-    Symbols.text(c, words, x0 + (r - 34) * Math.sin(angle), y0 - (r - 14) * Math.cos(angle),
+    Canvas.text(c, words, x0 + (r - 34) * Math.sin(angle), y0 - (r - 14) * Math.cos(angle),
       Symbols.colours[sensor.kind], "center");
   }
 
@@ -182,7 +182,7 @@ const Scope = (() => {
     c.stroke();
     const [x, y] = at(bearing, range * 0.9);
     const left = x > canvas.clientWidth / 2;
-    Symbols.text(c, `${scene.name(number)} no range`, left ? x - 8 : x + 8, y,
+    Canvas.text(c, `${scene.name(number)} no range`, left ? x - 8 : x + 8, y,
       Symbols.colours.sight, left ? "right" : "left");
     drawn.lines.push({ number, bearing, level });
   }
@@ -225,14 +225,14 @@ const Scope = (() => {
     const colour = level >= 3 ? Symbols.colours.warning
       : level > 0 ? Symbols.colours.caution : Symbols.colours.traffic;
     if (tagged) {
-      Symbols.text(c, tag, x, up >= 0 ? y - 19 : y + 29, colour, "center");
-      if (arrow) Symbols.text(c, arrow, x + 17, y + 5, colour, "left", 16);
+      Canvas.text(c, tag, x, up >= 0 ? y - 19 : y + 29, colour, "center");
+      if (arrow) Canvas.text(c, arrow, x + 17, y + 5, colour, "left", 16);
       const words = level ? `${scene.name(number)} ${Symbols.WORDS[Math.min(level, 3)]}`
         : scene.name(number);
       const low = y + (up >= 0 ? 16 : -8), away = arrow ? 28 : 20;
       c.font = "12px system-ui, sans-serif";
       const fits = x + away + c.measureText(words).width < canvas.clientWidth;
-      Symbols.text(c, words, fits ? x + away : x - 20, low, colour, fits ? "left" : "right");
+      Canvas.text(c, words, fits ? x + away : x - 20, low, colour, fits ? "left" : "right");
     }
     drawn.symbols.push({ number, x, y, level, shape: Symbols.shape(level, course !== null), tag,
       arrow, off });

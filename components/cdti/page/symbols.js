@@ -9,9 +9,7 @@ const Symbols = (() => {
   let colours = {};
 
   function readTheme() {
-    const style = getComputedStyle(document.documentElement);
-    colours = Object.fromEntries(
-      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    colours = Canvas.theme(names);
   }
   function shape(level, directed) {
     if (level >= 3) return "square";
@@ -77,25 +75,5 @@ const Symbols = (() => {
     c.stroke();
     c.restore();
   }
-  function text(c, words, x, y, colour, align = "left", size = 12) {
-    c.font = `${size}px system-ui, sans-serif`;
-    c.textAlign = align;
-    c.fillStyle = colour;
-    c.fillText(words, x, y);
-  }
-  function ready(canvas) {
-    const ratio = window.devicePixelRatio || 1;
-    const width = Math.round(canvas.clientWidth * ratio);
-    const height = Math.round(canvas.clientHeight * ratio);
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
-    const c = canvas.getContext("2d");
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
-    return c;
-  }
-  return { get colours() { return colours; }, WORDS, readTheme, shape, traffic, altitude, climb, own,
-    text, ready };
+  return { get colours() { return colours; }, WORDS, readTheme, shape, traffic, altitude, climb, own };
 })();

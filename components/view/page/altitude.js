@@ -4,7 +4,7 @@ const Altitude = (() => {
   const canvas = document.getElementById("altitude");
 
   function draw(t, options) {
-    const c = Symbols.ready(canvas);
+    const c = Canvas.ready(canvas);
     const width = canvas.clientWidth, height = canvas.clientHeight;
     const own = Data.ownship(t);
     const marks = [];
@@ -36,10 +36,10 @@ const Altitude = (() => {
     c.stroke();
     const step = Symbols.niceStep(far / 4);
     for (let m = step; m < far; m += step) {
-      Symbols.text(c, `${+(m / 1000).toFixed(2)} km`, x(m), height - 4, Symbols.colours.faint, "center");
+      Canvas.text(c, `${+(m / 1000).toFixed(2)} km`, x(m), height - 4, Symbols.colours.faint, "center");
     }
     for (const up of [-apart / 1.2, 0, apart / 1.2]) {
-      Symbols.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
+      Canvas.text(c, `${Math.round(own.alt + up)} m`, left - 4, y(own.alt + up) + 4,
         Symbols.colours.faint, "right");
     }
     if (options.bands) {  // altitudes that lose separation, beside the scale

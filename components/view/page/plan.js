@@ -27,7 +27,7 @@ const Plan = (() => {
       c.arc(x, y, (i * step) / view.perPixel, 0, 2 * Math.PI);
       c.stroke();
       const km = (i * step) / 1000;
-      Symbols.text(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
+      Canvas.text(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
         y - (i * step) / view.perPixel - 3, Symbols.colours.faint);
     }
   }
@@ -113,7 +113,7 @@ const Plan = (() => {
         const [u, v] = place(one.east + 10 * one.rate[0], one.north + 10 * one.rate[1]);
         c.moveTo(x, y); c.lineTo(u, v);
       }
-      if (few) Symbols.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
+      if (few) Canvas.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
     }
     c.stroke();
   }
@@ -173,7 +173,7 @@ const Plan = (() => {
     c.setLineDash([8, 4]);
     c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
     c.setLineDash([]);
-    Symbols.text(c, label, p + 6, q, Symbols.colours.track);
+    Canvas.text(c, label, p + 6, q, Symbols.colours.track);
   }
 
   function tracks(c, t, drawn) {
@@ -206,7 +206,7 @@ const Plan = (() => {
         path.moveTo(x, y);
         path.lineTo(u, v);
       }
-      if (few) Symbols.text(c, label, x + 10, y - 6, Symbols.colours.track);
+      if (few) Canvas.text(c, label, x + 10, y - 6, Symbols.colours.track);
     }
     c.stroke(sure);
     c.setLineDash([3, 3]);
@@ -228,7 +228,7 @@ const Plan = (() => {
       c.strokeStyle = Symbols.level(a.level[i]);
       c.lineWidth = 1 + a.level[i];
       c.beginPath(); c.arc(x, y, 14, 0, 2 * Math.PI); c.stroke();
-      Symbols.text(c, `alert ${a.level[i]}`, x + 17, y - 7, Symbols.level(a.level[i]));
+      Canvas.text(c, `alert ${a.level[i]}`, x + 17, y - 7, Symbols.level(a.level[i]));
     }
   }
   function lastSeen(target, t) {
@@ -242,7 +242,7 @@ const Plan = (() => {
   }
 
   function draw(t, options, drawn) {
-    const c = Symbols.ready(canvas);
+    const c = Canvas.ready(canvas);
     view.width = canvas.clientWidth;
     view.height = canvas.clientHeight;
     const own = Data.ownship(t);

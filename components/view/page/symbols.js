@@ -5,9 +5,7 @@ const Symbols = (() => {
     "level1", "level2", "level3", "recovery"];
   let colours = {};
   function readTheme() {
-    const style = getComputedStyle(document.documentElement);
-    colours = Object.fromEntries(
-      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    colours = Canvas.theme(names);
   }
 
   function level(number) {
@@ -105,33 +103,11 @@ const Symbols = (() => {
     c.restore();
   }
 
-  function text(c, words, x, y, colour, align = "left") {
-    c.font = "12px system-ui, sans-serif";
-    c.textAlign = align;
-    c.fillStyle = colour;
-    c.fillText(words, x, y);
-  }
-
-  // A canvas of the size that it has on screen, in its pixels; returns its context, cleared.
-  function ready(canvas) {
-    const ratio = window.devicePixelRatio || 1;
-    const width = Math.round(canvas.clientWidth * ratio);
-    const height = Math.round(canvas.clientHeight * ratio);
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
-    const c = canvas.getContext("2d");
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
-    return c;
-  }
-
   function niceStep(least) {
     const power = 10 ** Math.floor(Math.log10(least));
     return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999);
   }
 
   return { get colours() { return colours; }, readTheme, level, region, mark, outline, Batch, aircraft,
-    text, ready, niceStep };
+    niceStep };
 })();

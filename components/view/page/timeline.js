@@ -32,14 +32,14 @@ const Timeline = (() => {
     const high = (canvas.clientHeight - 18) / Math.max(1, all.length);
     all.forEach((row, place) => {
       const top = place * high + 2, low = top + high - 4;
-      Symbols.text(c, row.name.slice(0, 11), 4, (top + low) / 2 + 4, Symbols.colours.ink);
+      Canvas.text(c, row.name.slice(0, 11), 4, (top + low) / 2 + 4, Symbols.colours.ink);
       if (row.number !== undefined) scansOf(c, row.number, top, low);
       else if (row.name === "alerts") alertsOf(c, top, low);
       else for (const t of Data.tables.manoeuvres.time_s) tick(c, t, top, low, Symbols.colours.own, 2);
     });
     const step = Symbols.niceStep(Data.duration_s / Math.max(2, canvas.clientWidth / 90));
     for (let t = 0; t <= Data.duration_s; t += step) {
-      Symbols.text(c, `${+(t + Data.start_s).toFixed(3)} s`, Math.min(x(t), canvas.clientWidth - 20), canvas.clientHeight - 4,
+      Canvas.text(c, `${+(t + Data.start_s).toFixed(3)} s`, Math.min(x(t), canvas.clientWidth - 20), canvas.clientHeight - 4,
         Symbols.colours.faint, "center");
     }
     still = { copy, width: canvas.clientWidth, height: canvas.clientHeight, ratio };
@@ -70,7 +70,7 @@ const Timeline = (() => {
     const ratio = window.devicePixelRatio || 1;
     if (!still || still.width !== canvas.clientWidth || still.height !== canvas.clientHeight
         || still.ratio !== ratio) drawStill();
-    const c = Symbols.ready(canvas);
+    const c = Canvas.ready(canvas);
     c.drawImage(still.copy, 0, 0, canvas.clientWidth, canvas.clientHeight);
     c.fillStyle = Symbols.colours.own;
     c.fillRect(x(t) - 1, 0, 2, canvas.clientHeight - 16);

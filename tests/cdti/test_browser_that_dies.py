@@ -1,0 +1,96 @@
+"""The operator's browser is killed: the run waits for another, and keeps what was decided.
+
+Left out by name where Playwright's Python package, websockets or a Chromium is missing.
+"""
+
+import math
+import os
+import shutil
+import signal
+import subprocess
+from contextlib import contextmanager
+
+import pyarrow.parquet as pq
+import pytest
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+pytest.importorskip("websockets", reason="needs the package websockets")
+from live import Session, hear, page, say, wait_for  # noqa: E402
+
+import dsa_des  # noqa: E402
+from components.cdti import crew  # noqa: E402
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+if CHROMIUM is None:
+    pytest.skip("needs a Chromium: there is no program chromium", allow_module_level=True)
+
+
+@contextmanager
+def chromium(folder):
+    """A browser with processes of its own, and the address at which it takes orders."""
+    process = subprocess.Popen(
+        [CHROMIUM, "--headless=new", "--no-sandbox", "--remote-debugging-port=0",
+         f"--user-data-dir={folder}", "about:blank"],
+        start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    said = folder / "DevToolsActivePort"
+    try:
+        port, _ = wait_for(lambda: said.exists() and said.read_text().split())
+        yield process, f"http://127.0.0.1:{port}"
+    finally:
+        kill(process)
+
+
+def kill(process):
+    """End it and all it has started, without a word."""
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait(timeout=30)
+
+
+def test_a_browser_that_is_killed_leaves_a_run_that_another_goes_on_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(crew, "GONE_S", 0.2)
+    sets = ("blocks.operator.unattended='pauses'", "record.truth=true")
+    session = Session(monkeypatch, tmp_path / "run", factor="8", duration="8", sets=sets)
+    with chromium(tmp_path / "profile") as (process, orders), sync_api.sync_playwright() as play:
+        browser = play.chromium.connect_over_cdp(orders)
+        screen = browser.contexts[0].new_page()
+        screen.goto(session.address)
+        screen.wait_for_function("() => App.state().role === 'operator'")
+        with session.socket() as watcher:
+            screen.keyboard.press("Enter")
+            wait_for(lambda: hear(watcher, "frame")["t"] > 1.0)
+            screen.select_option("#turn-by", "30")
+            screen.locator("#scope").focus()
+            screen.keyboard.press("ArrowLeft")
+            taken = hear(watcher, "taken")
+            kill(process)
+            last = wait_for(lambda: (f := hear(watcher, "frame"))["operators"] == 0 and f)
+            stood = hear_until_it_stands(watcher, last["t"])
+            token = session.new_address().partition("token=")[2]
+    assert taken["time"] <= stood < 7.0
+    with page(session, token=token) as (socket, welcome):
+        assert welcome["role"] == "operator"
+        assert [one["id"] for one in welcome["log"]] == [taken["id"]]
+        say(socket, type="decide", decision="climb", target=-1, value=50, id="c" * 16)
+        climbed = hear(socket, "taken")
+        assert stood <= climbed["time"] < stood + 1.0
+        hear(socket, "end")
+    session.ended()
+    rows = pq.read_table(session.out / "decisions.parquet").to_pylist()
+    assert [(row["decision"], row["time_s"]) for row in rows] == [
+        ("turn", taken["time"]), ("climb", climbed["time"])
+    ]  # fmt: skip
+    assert rows[0]["turn_rad"] == pytest.approx(math.radians(-30))
+    again = dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"))
+    for name in ("truth", "decisions", "manoeuvres"):
+        assert again[name].equals(pq.read_table(session.out / f"{name}.parquet")), name
+
+
+def hear_until_it_stands(watcher, time_s):
+    """The last instant of which a picture comes, a second before which none came."""
+    while True:
+        try:
+            time_s = hear(watcher, "frame", timeout=1.0)["t"]
+        except TimeoutError:
+            return time_s
