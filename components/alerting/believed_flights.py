@@ -2,34 +2,30 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from components.alert_configuration.margins import Deviations
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
-_NONE: IntArray = np.empty(0, dtype=np.int64)
-
 
 class BelievedFlights(NamedTuple):
-    """Flights as they are believed at some scans.
+    """Flights as they are believed at some scans: a row for each scan, or for each flight.
 
     Parameters
     ----------
-    known : (scans, columns) of bool
-    relative : six of (scans, columns)
+    known : (rows, columns) of bool
+    relative : six of (rows, columns)
         East, north, up in m and their rates in m/s, ownship less target.
-    target : (scans, columns) of int or None
+    scan : (rows,) of int or None
+        Which scan each row belongs to; by default, rows are scans.
+    target : (rows,) of int or None
         By default, columns are targets; -1 for a track that belongs to none.
-    number : (columns,) of int or None
+    number : (rows,) of int or None
         Of tracks.
-    deviations : Deviations of (scans, columns) or None
-    new : (n,) of int
-        Columns that held something else before.
+    deviations : Deviations of (rows,) or None
     """
 
     known: BoolArray
     relative: tuple[FloatArray, ...]
+    scan: IntArray | None = None
     target: IntArray | None = None
     number: IntArray | None = None
     deviations: Deviations | None = None
-    new: IntArray = _NONE

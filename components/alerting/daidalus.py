@@ -14,10 +14,10 @@ from components.alerting.believed_flights import BelievedFlights
 from components.alerting.followed_tracks import FollowedTracks
 from components.alerting.lasting_memory import LastingMemory
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
-from components.alerting.memory import AlertMemory
 from components.alerting.own_poses import OwnPoses
 from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
+from components.alerting.track_memory import TrackMemory
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
 from components.guidance.situation import State
@@ -108,11 +108,8 @@ class DaidalusAlerting(Component):
         self._alerter = configuration.alerters[self.p.alerter - 1]
         self._roster: Any = None
         self._own = OwnPoses(self.context.ticks_per_s)
-        self._followed = FollowedTracks(self._configuration["hysteresis_time"])
-
-    def serves_replicas(self) -> bool:
-        """Say no where tracks are followed by their numbers, which belong to a run."""
-        return super().serves_replicas() and self._source != "estimates"
+        self._followed = FollowedTracks()
+        self._of_tracks = TrackMemory(memory_rule(configuration))
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
@@ -138,9 +135,7 @@ class DaidalusAlerting(Component):
             self._roster = states.roster
             count = len(states.roster)
             self._fit = StraightFit(self.p.fit_s, count)
-            rule = memory_rule(self._configuration)
-            self._memory = LastingMemory(rule, count)
-            self._of_tracks = AlertMemory(rule, 0)
+            self._memory = LastingMemory(memory_rule(self._configuration), count)
         self._own.add(arrived.tick, states, wake)
         if self._source in ("tracks", "fused"):
             return
@@ -187,32 +182,29 @@ class DaidalusAlerting(Component):
         own = self._own.states(ticks, begins, 0.0 if estimated else self.p.fit_s)
         if estimated:
             places = self._own.place(ticks)
-            flights = self._followed.flights(ticks, times.tolist(), own, places)
-            self._of_tracks.grow(flights.known.shape[1])
-            self._of_tracks.forget(flights.new)
-            self._own.forget_before(int(ticks[-1]))
+            flights = self._followed.flights(ticks, times, begins, own, places)
         else:
             known, state = self._fit.states(begins, ticks, times)
             # Positions count from the ownship: its own less theirs is the other way round.
             flights = BelievedFlights(known, tuple(-state))
-            self._forget(ticks, times, wake)
         known, relative = flights.known, [np.ravel(part) for part in flights.relative]
         bounds = None
         if flights.deviations is not None:
             deviations = Deviations(*(np.ravel(part) for part in flights.deviations))
             bounds = margins(self._configuration, deviations, np.hypot(*relative[:2]))
-        pairs = AlertPairs(tuple(relative), self._own_flights(own, known.shape), bounds)
+        scan = np.arange(len(ticks)) if flights.scan is None else flights.scan
+        pairs = AlertPairs(tuple(relative), self._own_flights(own, scan, known.shape), bounds)
         times_s, *both = levels_without_memory(self._configuration, self._alerter, pairs)
         due, early = (part.reshape(*known.shape, len(self._alerter.levels)) for part in both)
-        level = (
-            self._of_tracks.levels(times, known, due, early)
-            if estimated
-            else self._memory.levels(wake.replica_of(ticks), times, known, due, early)
-        )
+        runs = wake.replica_of(ticks)
+        if flights.number is None:
+            level = self._memory.levels(runs, times, known, due, early)
+        else:
+            level = self._of_tracks.levels(
+                runs[scan], flights.number, times[scan], due[:, 0], early[:, 0]
+            )
+        self._forget(ticks, times, wake)
         row, column = np.nonzero(known)
-        if flights.number is not None:
-            # By their numbers: which column a track has depends on when others came.
-            column = column[np.lexsort((flights.number[column], row))]
         place = row * known.shape[1] + column
         lookahead_s = self._configuration["lookahead_time"]
         found = separation(relative, lookahead_s, np.full(known.size, np.nan))
@@ -221,14 +213,14 @@ class DaidalusAlerting(Component):
         told = {} if flights.deviations is None else flights.deviations._asdict()
         return AlertLevels(
             ticks,
-            offsets_of(row, len(ticks)),
-            column if flights.target is None else flights.target[row, column],
+            offsets_of(scan[row], len(ticks)),
+            column if flights.target is None else flights.target,
             level[place],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
             found.time_to_closest_s[place],
             found.miss_horizontal_m[place],
             found.miss_vertical_m[place],
-            {} if flights.number is None else {"track": flights.number[column]},
+            {} if flights.number is None else {"track": flights.number},
             {name: np.ravel(part)[place] for name, part in told.items()},
             {name: part[place] for name, part in zip(_RELATIVE, relative, strict=True)},
             own,
@@ -237,23 +229,33 @@ class DaidalusAlerting(Component):
 
     def _forget(self, ticks: IntArray, times: FloatArray, wake: Wake) -> None:
         """Drop what no later scan asks for."""
-        span = round(self.p.fit_s * self.context.ticks_per_s)
+        estimated = self._source == "estimates"
+        span = 0 if estimated else round(self.p.fit_s * self.context.ticks_per_s)
+        runs = wake.replica_of(ticks)
+        if estimated:
+            self._followed.forget_before(ticks, wake)
+            ends = np.flatnonzero(np.append(runs[1:] != runs[:-1], True))
+            self._of_tracks.forget(runs[ends], times[ends])
         if wake.side_by_side:
             # The scans of the next stretch of time come after all of these.
             self._fit.forget_before(float(times.min()))
-            self._own.set_aside(int(wake.own_ticks(ticks).min()) - span, wake)
+            earliest = int(wake.own_ticks(ticks).min()) - span
+            self._own.set_aside(earliest, wake, late_sights=not estimated)
             return
         last = ticks[-1:]
         begin = int(_begins(last, wake)[0])  # what was before is of runs that have passed
         self._fit.forget_ticks_before(begin)
         self._fit.forget_before(float(times[-1]))
-        self._memory.forget_before(int(wake.replica_of(last)[0]))
+        for memory in (self._memory, self._of_tracks):
+            memory.forget_before(int(runs[-1]))
         self._own.forget_before(int(last[0]) - span, begin)
 
-    def _own_flights(self, own: Mapping[str, FloatArray], shape: tuple[int, ...]) -> State:
+    def _own_flights(
+        self, own: Mapping[str, FloatArray], scan: IntArray, shape: tuple[int, ...]
+    ) -> State:
         """Return the ownship's flight beside every target, in its own plane."""
         zero = np.zeros(shape)
-        motion = (np.nan_to_num(own[name]) for name in _OWN_MOTION)
+        motion = (np.nan_to_num(own[name])[scan] for name in _OWN_MOTION)
         alt_m, *velocity = (np.repeat(part, shape[1]) for part in motion)
         return State(zero.ravel(), zero.ravel(), alt_m, *velocity)
 

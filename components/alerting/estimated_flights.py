@@ -1,6 +1,6 @@
 """Flights of tracks with states: as estimated, carried on straight, in the ownship's plane."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,13 +17,11 @@ _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _PAIRS = tuple(COVARIANCE)
 
 
-class _Row(NamedTuple):
-    """The tracks that are told at one instant.
+class _Estimates(NamedTuple):
+    """Tracks as they were told.
 
     Parameters
     ----------
-    came : int
-        Tick at which they came.
     number : (tracks,)
     time_s : (tracks,)
         That their states speak of.
@@ -34,100 +32,130 @@ class _Row(NamedTuple):
         Of the frame: latitude, longitude (deg), height (m).
     """
 
-    came: int
     number: IntArray
     time_s: FloatArray
     state: FloatArray
     covariance: FloatArray
     origin: FloatArray
 
+    @classmethod
+    def of(cls, tracks: StateTracks) -> "_Estimates":
+        return cls(
+            tracks.track,
+            tracks.state_s,
+            np.stack([getattr(tracks, name) for name in _STATE]),
+            np.stack([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
+            np.stack([tracks.origin_lat_deg, tracks.origin_lon_deg, tracks.origin_alt_m]),
+        )
+
+    def take(self, which: IntArray | BoolArray) -> "_Estimates":
+        parts: Any = (part[..., which] for part in self)
+        return _Estimates(*parts)
+
+    def with_more(self, more: "_Estimates") -> "_Estimates":
+        both: Any = zip(self, more, strict=True)
+        return _Estimates(*(np.concatenate(parts, axis=-1) for parts in both))
+
+
+_NONE = _Estimates(
+    np.empty(0, dtype=np.int64), np.empty(0), np.empty((6, 0)), np.empty((21, 0)), np.empty((3, 0))
+)
+
 
 class EstimatedFlights:
-    """What has come of a tracker's states: confirmed and coasted tracks that have a range."""
+    """What has come of trackers' states: confirmed and coasted tracks that have a range.
+
+    Of one run or of many; what came in each run stands together, in order.
+    """
 
     def __init__(self) -> None:
-        self._rows: list[_Row] = []
+        #: When each row came, where its tracks begin and how many there are.
+        self._came: IntArray = np.empty(0, dtype=np.int64)
+        self._begin: IntArray = np.empty(0, dtype=np.int64)
+        self._count: IntArray = np.empty(0, dtype=np.int64)
+        self._told = _NONE
 
     def add(self, came: IntArray, tracks: StateTracks) -> None:
         """Take in what a tracker told, and when each row came."""
         good = tracks.has_range & np.isin(tracks.track_status, (CONFIRMED, COASTED))
-        state = np.stack([getattr(tracks, name) for name in _STATE])
-        covariance = np.stack([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS])
-        origin = np.stack([tracks.origin_lat_deg, tracks.origin_lon_deg, tracks.origin_alt_m])
-        for row, tick in enumerate(came.tolist()):
-            begin, end = tracks.offsets[row], tracks.offsets[row + 1]
-            mine = begin + np.flatnonzero(good[begin:end])
-            self._rows.append(
-                _Row(
-                    tick,
-                    tracks.track[mine],
-                    tracks.state_s[mine],
-                    state[:, mine],
-                    covariance[:, mine],
-                    origin[:, mine],
-                )
-            )
+        before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
+        self._came = np.concatenate([self._came, came])
+        self._begin = np.concatenate([self._begin, len(self._told.number) + before[:-1]])
+        self._count = np.concatenate([self._count, np.diff(before)])
+        self._told = self._told.with_more(_Estimates.of(tracks).take(np.flatnonzero(good)))
+        if bool((self._came[1:] < self._came[:-1]).any()):
+            self._keep_rows(np.argsort(self._came, kind="stable"))
 
-    def numbers(self, until: int) -> IntArray:
-        """Return all tracks that are told from the last row on until an instant, ascending."""
-        some = [row.number for row in self._rows if row.came <= until]
-        return np.unique(np.concatenate(some)) if some else np.empty(0, dtype=np.int64)
+    def _keep_rows(self, which: IntArray | BoolArray) -> None:
+        self._came, self._begin = self._came[which], self._begin[which]
+        self._count = self._count[which]
 
-    def forget_before(self, tick: int) -> None:
-        """Drop the rows that a later one has replaced at an instant."""
-        until = sum(row.came <= tick for row in self._rows)
-        self._rows = self._rows[max(until - 1, 0) :]
+    def keep(self, which: BoolArray) -> None:
+        """Keep some of the rows that came."""
+        if which.all():
+            return
+        self._keep_rows(which)
+        self._told = self._told.take(_each(self._begin, self._count)[1])
+        self._begin = np.cumsum(self._count) - self._count
+
+    @property
+    def came(self) -> IntArray:
+        """When the rows that are remembered came."""
+        return self._came
 
     def states(
-        self, now: int, now_s: float, numbers: IntArray, own_place: FloatArray
-    ) -> tuple[BoolArray, FloatArray, Deviations]:
-        """Return whose flight is known at an instant, its state, and how uncertain it is.
+        self, now: IntArray, now_s: FloatArray, begins: IntArray, own_place: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray, Deviations]:
+        """Return the flights that are known at some instants, by instant and track.
 
         Parameters
         ----------
-        now : int
+        now : (instants,) of int
             Ticks; what comes later is not known yet.
-        now_s : float
-            The same; states are carried on straight until then.
-        numbers : (tracks,) of int
-            Tracks that are asked for, ascending.
-        own_place : (3,)
+        now_s : (instants,)
+            The same, since the start of the run; states are carried on straight until then.
+        begins : (instants,) of int
+            When the run of each begins.
+        own_place : (3, instants)
             Of the ownship: latitude and longitude (rad), height (m).
 
         Returns
         -------
-        known : (tracks,) of bool
-        state : (6, tracks)
-            Place from the ownship, east, north, up in its plane, and velocity over ground there; 0
-            where nothing is known.
-        deviations : Deviations of (tracks,)
+        instant, number : (flights,) of int
+            Place of the instant, and the track's number; ascending.
+        state : (6, flights)
+            Place from the ownship, east, north, up in its plane, and velocity over ground there.
+        deviations : Deviations of (flights,)
         """
-        count = len(numbers)
-        known, state = np.zeros(count, dtype=bool), np.zeros((6, count))
-        deviations = Deviations(*np.zeros((4, count)))
-        row = next((row for row in reversed(self._rows) if row.came <= now), None)
-        if row is None or len(row.number) == 0:
-            return known, state, deviations
-        place = np.searchsorted(numbers, row.number)
-        known[place] = True
-        ahead_s = now_s - row.time_s
-        state[:, place] = _in_plane(row, ahead_s, own_place)
-        for whole, part in zip(deviations, _deviations(row.covariance, ahead_s), strict=True):
-            whole[place] = part
-        return known, state, deviations
+        last = np.searchsorted(self._came, now, side="right") - 1
+        some = np.flatnonzero(last >= np.searchsorted(self._came, begins))
+        place, entry = _each(self._begin[last[some]], self._count[last[some]])
+        instant = some[place]
+        order = np.lexsort((self._told.number[entry], instant))
+        instant, told = instant[order], self._told.take(entry[order])
+        ahead_s = now_s[instant] - told.time_s
+        state = _in_plane(told, ahead_s, own_place[:, instant])
+        return instant, told.number, state, _deviations(told.covariance, ahead_s)
 
 
-def _in_plane(row: _Row, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
+def _each(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the row of every entry of some rows, and its place."""
+    row = np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    return row, np.arange(len(row)) + (begin - first)[row]
+
+
+def _in_plane(told: _Estimates, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
     """Return places and velocities in the plane that touches the sphere below the ownship."""
-    north, east, down = row.state[:3] + row.state[3:] * ahead_s
+    north, east, down = told.state[:3] + told.state[3:] * ahead_s
     lat_deg, lon_deg, alt_m = enu_to_geodetic(
         east, north, -down,
-        reference_lat_deg=row.origin[0], reference_lon_deg=row.origin[1],
-        reference_alt_m=row.origin[2],
+        reference_lat_deg=told.origin[0], reference_lon_deg=told.origin[1],
+        reference_alt_m=told.origin[2],
     )  # fmt: skip
     # The frame's axes are those of its origin; velocity counts along those of the target's place.
-    there, here = ned_axes(lat_deg, lon_deg), ned_axes(row.origin[0], row.origin[1])
-    in_space = sum(v * axis for v, axis in zip(row.state[3:], here, strict=True))
+    there, here = ned_axes(lat_deg, lon_deg), ned_axes(told.origin[0], told.origin[1])
+    in_space = sum(v * axis for v, axis in zip(told.state[3:], here, strict=True))
     v_north, v_east, v_down = ((in_space * axis).sum(axis=0) for axis in there)
     own_lat, own_lon, own_alt_m = own_place
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)

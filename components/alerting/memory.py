@@ -43,7 +43,6 @@ class AlertMemory:
 
     def __init__(self, rule: MemoryRule, count: int) -> None:
         self._rule = rule
-        self._count = count
         self._last_s = np.full(count, _LONG_AGO_S)
         self._output = np.full(count, _NONE, dtype=np.int64)
         self._risen_s = np.full(count, _LONG_AGO_S)
@@ -54,21 +53,6 @@ class AlertMemory:
         self._last_s[which] = self._risen_s[which] = _LONG_AGO_S
         self._output[which] = _NONE
         self._queue[which] = _NONE
-
-    def grow(self, count: int) -> None:
-        """Remember so many targets from now on; those that come in addition are new."""
-        more = count - self._count
-        self._count = count
-        self._last_s = np.concatenate([self._last_s, np.full(more, _LONG_AGO_S)])
-        self._output = np.concatenate([self._output, np.full(more, _NONE)])
-        self._risen_s = np.concatenate([self._risen_s, np.full(more, _LONG_AGO_S)])
-        empty = np.full((more, self._queue.shape[1]), _NONE)
-        self._queue = np.concatenate([self._queue, empty])
-        self._own_time_s = np.concatenate([self._own_time_s, np.full(more, np.nan)])
-
-    def forget(self, which: IntArray) -> None:
-        """Take some targets as new ones."""
-        self._last_s[which] = _LONG_AGO_S
 
     def take(self, which: IntArray) -> "AlertMemory":
         """Return the memory of some targets, to be put back with `put`."""

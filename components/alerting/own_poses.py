@@ -135,7 +135,7 @@ class OwnPoses:
         keep = max(min(old, len(self._tick) - _KEPT_POSES), 0)
         self._keep(slice(max(keep, int(np.searchsorted(self._came, begin))), None))
 
-    def set_aside(self, own_tick: int, wake: Wake) -> None:
+    def set_aside(self, own_tick: int, wake: Wake, *, late_sights: bool) -> None:
         """Set poses of runs side by side aside that only what comes late asks for.
 
         Parameters
@@ -143,6 +143,8 @@ class OwnPoses:
         own_tick : int
             Velocities are asked for from then on, since the start of the runs.
         wake : Wake
+        late_sights : bool
+            Whether anything may come late; else these poses are dropped.
         """
         run, own = wake.replica_of(self._came), wake.own_ticks(self._tick)
         changes = np.append(run[1:] != run[:-1], True)
@@ -152,5 +154,6 @@ class OwnPoses:
         recent[:-1] |= recent[1:] & ~changes[:-1]
         old = np.flatnonzero(~recent)
         if 2 * len(old) > len(recent):
-            self._old.append([getattr(self, name)[old] for name in _COLUMNS])
+            if late_sights:
+                self._old.append([getattr(self, name)[old] for name in _COLUMNS])
             self._keep(np.flatnonzero(recent))

@@ -61,6 +61,7 @@ class NavigationErrors(_Navigation):
     """What the ownship believes of its position and attitude: biases and white noise."""
 
     acts_on = "ownship"
+    lockstep = True
 
     def build(self, block: Any) -> Callable[[TrafficStates], Belief]:
         """Return what gives the belief at each instant.
@@ -75,10 +76,14 @@ class NavigationErrors(_Navigation):
 
         def believed(states: TrafficStates) -> Belief:
             # An instant may take more bits than a scan number has: the rest goes to the target.
-            instant = nanosecond_of(states.tick, block.context.ticks_per_s)
+            replica, own = np.zeros_like(states.tick), states.tick
+            if block.span_ticks:
+                replica, own = np.divmod(states.tick, block.span_ticks)
+            instant = nanosecond_of(own, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
-            draws = [stream.normal(high, low, draw) for draw in range(6)]
+            drawn = stream.of_rows(replica)
+            draws = [drawn.normal(high, low, draw) for draw in range(6)]
             lat, lon, alt = position_with_error(
                 states.own_lat_deg,
                 states.own_lon_deg,
@@ -107,6 +112,7 @@ class NavigationReport(_Navigation):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
     acts_on = "report"
+    lockstep = True
 
     def build(self, block: Any) -> Callable[[Detections, RelativeTargets, IntArray], Detections]:
         """Return what adds the columns to a report."""

@@ -9,6 +9,7 @@ from components.geometry.attitude import body_to_ned, unit_vector
 from components.messages.detections import Detections
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.timeline import split_scans
 
 #: How far apart two measurements of one place are taken to lie, in standard deviations.
 GATE_DEVIATIONS = 3.0
@@ -125,6 +126,7 @@ class DeclarationByPlace(Effect):
 
     name = "declaration by place"
     acts_on = "report"
+    lockstep = True
     neutral = False
     outside_the_proof = "without it whatever is reported is declared"
 
@@ -158,6 +160,7 @@ class DeclaredPlaces:
         self.m, self.n = p.declare_m, p.declare_n
         self._speed_m_s = p.declare_speed_m_s
         self._rate_rad_s = np.radians(p.declare_rate_deg_s)
+        self._block = block
         self._ticks_per_s = block.context.ticks_per_s
         self._memory: SeenPlaces | None = None
         self._first: dict[str, tuple[int, float]] = {}
@@ -166,16 +169,27 @@ class DeclaredPlaces:
     def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
         """Return the report with a column ``declared``."""
         new = self._places(detections)
-        known = new if self._memory is None else self._memory.then(new)
+        known, asked = new, np.arange(len(new))
+        if self._memory is not None:
+            known = self._memory.then(new)
+            order = np.argsort(known.scan, kind="stable")  # replicas come back one after the other
+            known, asked = known.take(order), np.flatnonzero(order >= len(self._memory))
         company = scans_with_company(
-            known, np.arange(len(known) - len(new), len(known)), self.n,
-            speed_m_s=self._speed_m_s, rate_rad_s=self._rate_rad_s,
-        )  # fmt: skip
+            known, asked, self.n, speed_m_s=self._speed_m_s, rate_rad_s=self._rate_rad_s
+        )
         declared = company >= self.m
         if len(detections):
-            self._memory = known.take(known.scan > int(detections.scan[-1]) - (self.n - 1))
-        self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
+            self._memory = known.take(known.scan > self._last_scans(detections, known) - self.n + 1)
+        if not self._block.span_ticks:
+            self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
         return replace(detections, extras={**detections.extras, "declared": declared})
+
+    def _last_scans(self, detections: Detections, known: SeenPlaces) -> IntArray:
+        """Return the last scan of each one's replica, its own where this report has none of it."""
+        replica, _ = split_scans(detections.scan)
+        place = np.searchsorted(replica, split_scans(known.scan)[0], side="right") - 1
+        last = detections.scan[np.maximum(place, 0)]
+        return np.where(split_scans(last)[0] == split_scans(known.scan)[0], last, known.scan)
 
     def _places(self, detections: Detections) -> SeenPlaces:
         counts = np.diff(detections.offsets)
@@ -185,9 +199,10 @@ class DeclaredPlaces:
             turned = (own[f"own_{name}_rad"] for name in ("heading", "pitch", "roll"))
             direction = body_to_ned(*direction, *turned)
         level = np.cos(detections.elevation_rad)
+        measured, span = detections.measured_ticks(), self._block.span_ticks
         return SeenPlaces(
             scan=np.repeat(detections.scan, counts),
-            time_s=detections.measured_ticks() / self._ticks_per_s,
+            time_s=(measured % span if span else measured) / self._ticks_per_s,
             direction=np.stack(direction, axis=-1),
             range_m=detections.range_m,
             angle_variance_rad2=detections.azimuth_variance_rad2 * level**2

@@ -21,6 +21,7 @@ class DeclarationRule(Effect):
 
     name = "declaration"
     acts_on = "declaration"
+    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``declare_m`` and ``declare_n``."""
@@ -52,27 +53,33 @@ class Declarations:
     def __init__(self, m: int, n: int) -> None:
         self.m, self.n = m, n
         self._names: tuple[str, ...] = ()
-        self._memory: BoolArray | None = None
+        #: Of all targets of the first replica, of the second, and so on.
+        self._memory: BoolArray = no_looks_yet(n, 0)
         self._first_tick: IntArray = np.empty(0, dtype=np.int64)
         self._first_range_m: FloatArray = np.empty(0)
 
     def __call__(self, cells: "Cells", look: "Look") -> "Look":
         """Return the look with a column ``declared``."""
-        if self._memory is None:
-            self._names = cells.roster.names
-            self._memory = no_looks_yet(self.n, len(self._names))
-            self._first_tick = np.full(len(self._names), -1, dtype=np.int64)
-            self._first_range_m = np.full(len(self._names), np.nan)
-        declared, self._memory = declare_looks(
-            cells.target, look.detected, self.m, self.n, self._memory
-        )
-        self._note_first(cells, np.flatnonzero(declared))
+        self._names = cells.roster.names
+        who = cells.replica * len(self._names) + cells.target
+        replicas = int(cells.replica.max(initial=0)) + 1
+        if len(self._memory) < replicas * len(self._names):
+            self._remember(replicas * len(self._names))
+        declared, self._memory = declare_looks(who, look.detected, self.m, self.n, self._memory)
+        self._note_first(cells, who, np.flatnonzero(declared))
         if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
             return look
         return replace(look, extras={**look.extras, "declared": declared})
 
-    def _note_first(self, cells: "Cells", declared: IntArray) -> None:
-        target, place = np.unique(cells.target[declared], return_index=True)
+    def _remember(self, count: int) -> None:
+        """Remember so many targets."""
+        more = count - len(self._memory)
+        self._memory = np.concatenate([self._memory, no_looks_yet(self.n, more)])
+        self._first_tick = np.append(self._first_tick, np.full(more, -1))
+        self._first_range_m = np.append(self._first_range_m, np.full(more, np.nan))
+
+    def _note_first(self, cells: "Cells", who: IntArray, declared: IntArray) -> None:
+        target, place = np.unique(who[declared], return_index=True)
         new = self._first_tick[target] < 0
         first = declared[place[new]]
         self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]

@@ -13,7 +13,7 @@ from components.messages.columns import COVARIANCE
 from components.messages.cues import CueCones
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, NonNegativeRational, Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.ports import Input, Output
@@ -79,13 +79,16 @@ class Cues(Component):
     outputs = {"cues": Output(CueCones, "Where to look more closely.")}
     Parameters = CueParameters
     windowed = True
+    lockstep = True
+    side_by_side = True
     rewindable = True
 
     def setup(self) -> None:
         """Start with nothing told."""
         self._every_ticks = math.ceil(self.p.every_s * self.context.ticks_per_s)
-        self._last_tick = -self._every_ticks
-        self._silent = True
+        #: Of each replica, when it was told last, and whether that was nothing.
+        self._last_tick: IntArray = np.empty(0, dtype=np.int64)
+        self._silent: BoolArray = np.empty(0, dtype=bool)
 
     def run(self, wake: Wake) -> CueCones | None:
         """Tell the cones of the tracks at every instant at which they are due."""
@@ -93,18 +96,30 @@ class Cues(Component):
         if tracks is None:
             return None
         row, entry, half_rad = self._wanted(tracks)
-        many = np.bincount(row, minlength=len(tracks)).tolist()
-        due = []
-        for place, tick in enumerate(wake.ticks.tolist()):
-            if tick - self._last_tick < self._every_ticks or (self._silent and not many[place]):
-                continue
-            due.append(place)
-            self._last_tick, self._silent = tick, not many[place]
-        if not due:
+        rows = self._due(wake, np.bincount(row, minlength=len(tracks)) > 0)
+        if not len(rows):
             return None
-        rows = np.array(due, dtype=np.int64)
         told = np.isin(row, rows)
         return self._message(wake.ticks, tracks, rows, row[told], entry[told], half_rad[told])
+
+    def _due(self, wake: Wake, some: BoolArray) -> IntArray:
+        """Return the rows at which cues are told, given at which of them there are some."""
+        replica, tick = wake.replica, wake.own_ticks(wake.ticks)
+        more = max(int(replica[-1]) + 1 - len(self._silent), 0)
+        self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
+        self._silent = np.append(self._silent, np.ones(more, dtype=bool))
+        due = np.zeros(len(tick), dtype=bool)
+        turn = np.arange(len(tick)) - np.searchsorted(replica, replica)
+        order = np.argsort(turn, kind="stable")
+        for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
+            of = replica[rows]
+            told = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
+                some[rows] | ~self._silent[of]
+            )
+            due[rows] = told
+            self._last_tick[of[told]] = tick[rows[told]]
+            self._silent[of[told]] = ~some[rows[told]]
+        return np.flatnonzero(due)
 
     def _wanted(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
         """Return the row and entry of each track that cues, and its cone's half angle."""

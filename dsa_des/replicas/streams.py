@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.time.randomness import Stream, Streams, key_of
+from dsa_des.time.randomness import Stream, Streams, UInt64Array, key_of
 from dsa_des.time.timeline import split_scans
 
 
@@ -26,9 +26,23 @@ class ReplicaStream(Stream):
         self._low = keys & np.uint64(0xFFFFFFFF)
         self._high = keys >> np.uint64(32)
 
+    def of_rows(self, replica: IntArray) -> Stream:
+        """Return the draws of rows of these replicas, one by one."""
+        return _RowStream(self._low[replica], self._high[replica])
+
     def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
         replica, numbers = split_scans(scans)
         return (self._low[replica], self._high[replica]), numbers
+
+
+class _RowStream(Stream):
+    """The draws of rows whose keys are known; every number of a scan's 48 bits counts."""
+
+    def __init__(self, low: UInt64Array, high: UInt64Array) -> None:
+        self._keys = low, high
+
+    def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
+        return self._keys, scans
 
 
 class ReplicaStreams(Streams):

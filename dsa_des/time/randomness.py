@@ -104,6 +104,13 @@ class Stream:
             for first, second in _BUMPS
         ]
 
+    def of_rows(self, replica: IntArray) -> "Stream":
+        """Return the draws of rows of these replicas, whose scan numbers do not say which.
+
+        Where many run in lock step; in a run by itself they are those of this stream.
+        """
+        return self
+
     def _key_and_scan(self, scans: IntArray) -> tuple[tuple[Any, Any], IntArray]:
         """Return the generator's key, and the scan numbers that count."""
         return self._key, scans

@@ -13,28 +13,54 @@ _REST_ON = "wiring/test_what_alerts_rest_on.py"
 FAULTS = [
     *in_file(
         _GROUP,
-        "components/alerting/daidalus.py",
-        (_ESTIMATES,),
-        (
-            "tracks-by-their-place",
-            "np.lexsort((flights.number[column], row))",
-            "np.lexsort((column, row))",
-        ),
-    ),
-    *in_file(
-        _GROUP,
         "components/alerting/estimated_flights.py",
         (_ESTIMATES,),
         ("tentative-tracks-count", "(CONFIRMED, COASTED)", "(CONFIRMED, COASTED, 0)"),
         (
             "estimates-are-not-carried-on",
-            "row.state[:3] + row.state[3:] * ahead_s",
-            "row.state[:3]",
+            "told.state[:3] + told.state[3:] * ahead_s",
+            "told.state[:3]",
+        ),
+        (
+            "tracks-of-another-run",
+            "last >= np.searchsorted(self._came, begins)",
+            "last >= 0",
+        ),
+        (
+            "tracks-as-they-came",
+            "np.lexsort((self._told.number[entry], instant))",
+            "np.arange(len(entry))",
+        ),
+        (
+            "rows-keep-others-tracks",
+            "self._told.take(_each(self._begin, self._count)[1])",
+            "self._told.take(np.arange(self._count.sum()))",
         ),
         ("down-for-up", "east, north, -down,", "east, north, down,"),
         ("sinking-for-climbing", "            -v_down,", "            v_down,"),
         ("covariance-is-not-carried-on", "ahead_s**2 * of(i + 3, j + 3)", "0.0 * of(i + 3, j + 3)"),
         ("deviation-of-the-height-of-north", "root(later(2, 2))", "root(later(0, 0))"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/track_memory.py",
+        (_ESTIMATES,),
+        ("runs-share-a-memory", "run * _MOST_TRACKS + number", "0 * _MOST_TRACKS + number"),
+        (
+            "tracks-are-never-forgotten",
+            "np.flatnonzero(away_s <= self._rule.hysteresis_s)",
+            "np.arange(len(away_s))",
+        ),
+        (
+            "tracks-of-others-are-forgotten",
+            "np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)",
+            "np.where(runs[last] == of, times_s[last] - self._seen_s, np.inf)",
+        ),
+        (
+            "new-tracks-push-old-ones-aside",
+            "memory.put(old, self._memory)",
+            "memory.put(np.arange(len(old)), self._memory)",
+        ),
     ),
     *in_file(
         _GROUP,
@@ -125,8 +151,8 @@ FAULTS = [
         ),
         (
             "own-altitude-lost",
-            "(np.nan_to_num(own[name]) for name in _OWN_MOTION)",
-            '(np.nan_to_num(own[name]) * (name != "alt_m") for name in _OWN_MOTION)',
+            "(np.nan_to_num(own[name])[scan] for name in _OWN_MOTION)",
+            '((name != "alt_m") * np.nan_to_num(own[name])[scan] for name in _OWN_MOTION)',
         ),
     ),
     *in_file(
@@ -135,8 +161,8 @@ FAULTS = [
         (_REST_ON,),
         (
             "velocity-along-the-frame",
-            "there, here = ned_axes(lat_deg, lon_deg), ned_axes(row.origin[0], row.origin[1])",
-            "there = here = ned_axes(row.origin[0], row.origin[1])",
+            "there, here = ned_axes(lat_deg, lon_deg), ned_axes(told.origin[0], told.origin[1])",
+            "there = here = ned_axes(told.origin[0], told.origin[1])",
         ),
     ),
     *in_file(

@@ -31,7 +31,7 @@ FAULTS = [
         ("azimuth-as-wide-high-up", "tracks.azimuth_variance_rad2[entry] * level * level",
          "tracks.azimuth_variance_rad2[entry]"),
         ("one-sigma-of-a-direction", "self.p.sigmas * np.sqrt(told))", "np.sqrt(told))"),
-        ("no-more-cones-is-not-told", "(self._silent and not many[place])", "not many[place]"),
+        ("no-more-cones-is-not-told", "some[rows] | ~self._silent[of]", "some[rows]"),
         ("deleted-tracks-cue", "wanted = tracks.track_status != DELETED",
          "wanted = tracks.track_status > -9"),
     ),

@@ -46,9 +46,8 @@ FAULTS = [
         _GROUP, "components/sensor/declaration_by_place.py",
         ("sensor_effects/test_declaration_delay.py::test_places_are_remembered_across_windows",
          "wiring/test_what_is_remembered_across_windows.py", _ALIKE),
-        ("places-forgotten", "known = new if self._memory is None else self._memory.then(new)",
-         "known = new"),
-        ("places-of-one-scan-fewer", "- (self.n - 1))", "- (self.n - 2))"),
+        ("places-forgotten", "if self._memory is not None:", "if False:"),
+        ("places-of-one-scan-fewer", "- self.n + 1", "- self.n + 2"),
         ("places-declared-by-any", "declared = company >= self.m", "declared = company >= 1"),
         ("places-in-body-axes", "        if own:\n            turned",
          "        if False:\n            turned"),
@@ -310,7 +309,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/sensor/declaration_by_place.py", "sensor_effects/"
         "test_declaration_delay.py::test_places_are_remembered_across_windows",
-        ("a-scan-too-few", "(self.n - 1))", "(self.n - 2))"),
+        ("a-scan-too-few", "- self.n + 1", "- self.n + 2"),
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", _NOISE_IS,

@@ -142,4 +142,30 @@ FAULTS = [
         ("updated-by-a-late-look-and-older-for-it",
          "np.maximum(now.updated_tick, seen.updated_tick)", "seen.updated_tick"),
     ),
+    *in_file(
+        _GROUP, "components/tracking/one_step.py", "wiring/test_late_looks_in_one_step.py",
+        ("not-of-the-instant-of-another-look", "& (before.tick <= tick[", "& (before.tick < tick["),
+        ("models-as-before-the-late-look",
+         "weights=_weights_now(weights, then.weights, seen.weights, now.weights)",
+         "weights=now.weights"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/without_range.py", "wiring/test_tracks_without_range.py",
+        ("directions-from-the-first-ownship", "place.position_m[:, which]",
+         "place.position_m[:, which * 0]"),
+        ("ranged-tracks-in-polar-too", "blind = (~part.ranged[track]).nonzero()[0]",
+         "blind = (~part.ranged[track] | True).nonzero()[0]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/tracking.py", "wiring/test_tracking_metric.py",
+        ("targets-there-at-the-start", "truth.at(instants[told], np.zeros",
+         "truth.at(instants[told] * 0, np.zeros"),
+    ),
+    *in_file(
+        _GROUP, "components/export/stone_soup_run.py", (_SOUP,),
+        ("swept-looks-as-the-scan-begins", 'np.where(np.isfinite(lit), lit, columns["time_s"])',
+         'columns["time_s"]'),
+        ("variances-of-the-look-s-first", "variances[:, rows_of], says)",
+         "variances[:, [rows_of[0]] * len(rows_of)] if rows_of else variances[:, rows_of], says)"),
+    ),
 ]  # fmt: skip

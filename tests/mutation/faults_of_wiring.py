@@ -552,8 +552,8 @@ FAULTS = [
         _GROUP, "components/tracking/cues.py", _CUES,
         ("cones-of-the-state-s-instant", "lasts_s**2 * covariance[3:, 3:]",
          "0.0 * covariance[3:, 3:]"),
-        ("cues-as-often-as-tracks", "tick - self._last_tick < self._every_ticks",
-         "tick - self._last_tick < 0"),
+        ("cues-as-often-as-tracks", "tick[rows] - self._last_tick[of] >= self._every_ticks",
+         "tick[rows] - self._last_tick[of] >= 0"),
         ("all-tracks-cue", "if not self.p.tentative:", "if False:"),
     ),
     *in_file(
@@ -650,5 +650,28 @@ FAULTS = [
     *in_file(
         "clocks", "dsa_des/running/rewind.py", "tracking/test_cued_declaration.py",
         ("loops-start-anywhere", "self._rewinder.sure_ticks or small", "small"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/flown_together.py",
+        ("wiring/test_steered_flights_of_each_row.py",),
+        ("every-row-knows-the-manoeuvre",
+         "known = known + _later(replica, wake.ticks, ownship, ticks)", "known = known + 1"),
+        ("truth-of-all-that-is-known",
+         "own = self._own.each(self._replica, time_s.reshape(-1), self._known)",
+         "own = self._own.each(self._replica, time_s.reshape(-1))"),
+        ("epochs-as-long-as-the-first-one-s", "self._epoch_s[of[new]], self._width)",
+         "self._epoch_s[of[:1]].repeat(len(new)), self._width)"),
+        ("epochs-kept-after-a-turn", "self._epochs.forget(ownship)", "pass",
+         "an epoch that is known has had rows, so a manoeuvre that comes later begins after the "
+         "epoch did: who was near at its start stays as it was"),
+        ("manoeuvres-flown-before-they-are-due", "due = (last >= ticks) & (last < end)",
+         "due = last >= -1 * ticks",
+         "it begins at its own instant all the same, and the next wake has no row before that"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/own_velocity.py",
+        ("wiring/test_steered_flights_of_each_row.py",),
+        ("own-velocity-of-the-first-row", "flights = targets.revisit.take_rows(row)",
+         "flights = targets.revisit.take_rows(row * 0)"),
     ),
 ]  # fmt: skip

@@ -113,7 +113,7 @@ def test_the_noise_of_a_late_instant_is_its_own():
     from dsa_des.time.randomness import Streams
 
     context = Context(Streams(1), sections={"navigation": Navigation(position_noise_m=(0, 0, 9))})
-    believed = NavigationErrors().build(SimpleNamespace(context=context))
+    believed = NavigationErrors().build(SimpleNamespace(context=context, span_ticks=0))
     ticks = np.array([7, 7 + 2**48, 7 + 2**50, 7])
     zeros = np.zeros(4)
     names = ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad")

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("stonesoup", reason="needs the extra stonesoup")
 
 import crooked
-from wired import HEARS_ALL, chain, run
+from wired import HEARS_ALL, chain, rows, run
 
 from components.estimation.frame import place_in_frame
 from components.export import stone_soup
@@ -191,3 +191,33 @@ def test_range_rates_are_those_of_both_velocities():
             assert float(seen[3, 0]) == pytest.approx(rate, abs=0.05)
             apart.append(abs(float(detection.state_vector[3, 0]) - rate))
         assert min(apart) < 0.05
+
+
+def test_each_detection_of_turned_radars_has_its_own_instant_and_errors():
+    """Where a beam meets a target it is by then; errors turn with where in the field it is seen."""
+    turned = {**RADAR, "scan_rate_hz": 0.5, "azimuth_error_deg": 9e-5, "mount_azimuth_deg": -35.0,
+              "mount_elevation_deg": 21.0, "mount_roll_deg": -75.0}  # fmt: skip
+    radars = {"still": turned, "swept": {**turned, "beam_sweep": True}}
+    one = run(chain(radars, duration_s=2, fusion={"type": "fusion.pass_through"}))
+    told = {row["range_m"]: row for row in rows(one)}
+    soup = stone_soup(one)
+    looks = []
+    for when, found in soup.detector:
+        looks += [when] * bool(found)
+        for detection in found:
+            range_m = float(detection.state_vector[2, 0])
+            apart = []
+            for target in crooked.TARGETS:
+                state = np.zeros((6, 1))
+                state[[0, 2, 4], 0] = enu(target, (when - START).total_seconds(), soup.origin)
+                seen = detection.measurement_model.function(_State(state), noise=False)
+                apart.append(abs(float(seen[2, 0]) - range_m))
+            assert min(apart) < 0.1  # a hundredth of a second is a metre
+            row = told.pop(range_m)
+            names = ("elevation_variance_rad2", "azimuth_variance_rad2", "range_variance_m2")
+            spread = np.diag(detection.measurement_model.noise_covar)
+            assert spread == pytest.approx([row[name] for name in names], rel=1e-9)
+    # Both at once, and then one after the other.
+    assert not told and len(looks) == 3 and looks[0] == START < looks[1] < looks[2]
+    first, second = (row["azimuth_variance_rad2"] for row in rows(one, block="still"))
+    assert abs(first / second - 1.0) > 0.1

@@ -10,7 +10,8 @@ from wired import HEARS_ALL, chain, rows, run
 
 from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.estimated_flights import EstimatedFlights
-from components.alerting.track_slots import TrackSlots
+from components.alerting.memory import MemoryRule
+from components.alerting.track_memory import TrackMemory
 from components.messages.columns import COVARIANCE
 from components.messages.state_tracks import CONFIRMED, TENTATIVE, StateTracks
 
@@ -123,9 +124,12 @@ def test_an_estimate_is_carried_on_with_its_covariance():
     flights.add(np.array([41]), tracks(8, TENTATIVE))
     own = crooked.OWNSHIP
     place = np.array([*np.radians([own["lat_deg"], own["lon_deg"]]), own["alt_m"]])
-    numbers = np.array([7, 9])
-    known, state, wrong = flights.states(40, 5.0, numbers, place)
-    assert known.tolist() == [True, False]
+    # Before it came, when it did, and when a tentative one has come, which counts for nothing.
+    now = np.array([39, 40, 41])
+    instant, number, state, wrong = flights.states(
+        now, np.full(3, 5.0), np.zeros(3, dtype=int), np.stack([place] * 3, axis=1)
+    )
+    assert (instant.tolist(), number.tolist()) == ([1], [7])
     # 2 s later; the sphere's plane is up to half a percent off, and the frame's down 0.1 m.
     wanted = [-400.0 + 60.0, 1000.0 + 40.0, -50.0 + 4.0, 30.0, 20.0, 2.0]
     assert state[:, 0] == pytest.approx(wanted, rel=0.006, abs=0.11)
@@ -133,15 +137,46 @@ def test_an_estimate_is_carried_on_with_its_covariance():
     assert wrong.position_m[0] == pytest.approx(math.sqrt(max(variance)))
     assert wrong.height_m[0] == pytest.approx(math.sqrt(4.0 + 4 * 0.25))
     assert (wrong.velocity_mps[0], wrong.climb_mps[0]) == pytest.approx((1.5, 0.5))
-    later, _, _ = flights.states(41, 5.0, numbers, place)
-    assert not later.any()  # a tentative track counts for nothing
-    assert not flights.states(39, 5.0, numbers, place)[0].any()
 
 
-def test_places_of_tracks_that_are_gone_are_given_again():
-    slots = TrackSlots()
-    assert [part.tolist() for part in slots.of(np.array([3, 5]), [0.0], 4.0)] == [[3, 5], [0, 1]]
-    assert [part.tolist() for part in slots.of(np.array([5]), [1.0, 3.0], 4.0)] == [[3, 5], []]
-    assert slots.of(np.array([5, 8]), [4.0], 4.0)[0].tolist() == [3, 5, 8]
-    number, new = slots.of(np.array([8, 9]), [4.5], 4.0)
-    assert (number.tolist(), new.tolist()) == ([9, 5, 8], [0])
+def test_what_came_in_another_run_is_not_known():
+    flights = EstimatedFlights()
+    flights.add(np.array([2000, 2005]), two(tracks(3), tracks(4)))
+    both = two(tracks(9), tracks(2))
+    both.tick, both.offsets = both.tick[:1], np.array([0, 2])
+    flights.add(np.array([1001, 2003]), two(tracks(1), both))
+    begins = np.array([1000, 1000, 2000, 2000, 3000])
+    now = np.add(begins, [0, 7, 1, 4, 9])
+    instant, number, _, _ = flights.states(now, np.full(5, 4.0), begins, np.zeros((3, 5)))
+    assert (instant.tolist(), number.tolist()) == ([1, 2, 3, 3], [1, 3, 2, 9])
+    flights.keep(np.array([True, False, True, True]))
+    instant, number, _, _ = flights.states(now, np.full(5, 4.0), begins, np.zeros((3, 5)))
+    assert (instant.tolist(), number.tolist()) == ([1, 3, 3], [1, 2, 9])
+
+
+def two(one, other):
+    """Two messages of one track each as one of two rows."""
+    return StateTracks.concatenate([one, other])
+
+
+def test_tracks_are_remembered_by_run_and_number():
+    """Two levels, of which the second counts a while longer once it was on."""
+    memory = TrackMemory(MemoryRule(hysteresis_s=4.0, persistence_s=0.0, m=0, n=0))
+
+    def levels(runs, numbers, now_s, due, early):
+        due, early = (np.array(part, dtype=bool)[:, np.newaxis] for part in (due, early))
+        found = memory.levels(np.array(runs), np.array(numbers), np.array(now_s), due, early)
+        return found.tolist()
+
+    # Track 5 of the first run is on and stays so by its early time; a new one needs its own.
+    assert levels([0, 0, 0], [5, 6, 5], [0.0, 0.0, 1.0], [1, 0, 0], [1, 1, 1]) == [1, 0, 1]
+    assert levels([0, 1], [4, 5], [1.0, 1.0], [0, 0], [1, 1]) == [0, 0]
+    memory.forget(np.array([1]), np.array([9.0]))
+    assert len(memory) == 3
+    memory.forget(np.array([0, 1]), np.array([4.5, 4.5]))
+    assert len(memory) == 2
+    assert levels([0, 1], [5, 5], [5.0, 9.0], [0, 0], [1, 1]) == [1, 0]
+    assert levels([0], [5], [9.1], [0], [1]) == [0]  # it was gone for longer than anything lasts
+    assert levels([0], [5], [10.0], [1], [1]) == [1]
+    memory.forget_before(1)
+    assert levels([0], [5], [11.0], [0], [1]) == [0]

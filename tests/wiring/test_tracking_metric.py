@@ -97,6 +97,19 @@ def test_tracks_are_of_the_instant_that_their_states_speak_of():
     assert found["track_position_error_m"] < 5.0
 
 
+def test_targets_count_while_they_are_there():
+    """One that has gone and one that came later: at 5 s there is one, which has a track."""
+    gone = {**crooked.DIVING, "end_time_s": 1.4}
+    came = {**crooked.ROLLING, "start_time_s": 2.6}
+    both = scene((gone, came), duration_s=6)
+    late = measured(both, {"metric": "tracking", "from_s": 5.0})
+    assert late["track_completeness"] == 1.0
+    assert late["track_gospa_missed_m"] == 0.0
+    early = measured(both, {"metric": "tracking", "step_s": 0.25})
+    # There for 5 and 13 of what is told, and tracked from the third look on, of 0.5 and 3.25 s.
+    assert early["track_completeness"] == pytest.approx((4 + 11) / 18)
+
+
 def test_every_replica_has_its_own_tracks_and_first_detections():
     """A radar that misses: who is first detected, and how well tracked, differs by replica."""
     given = scene()

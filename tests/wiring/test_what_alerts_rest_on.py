@@ -290,7 +290,8 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     flights = EstimatedFlights()
     flights.add(np.array([1]), tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
                                       east_m_s=east, down_m_s=-up))  # fmt: skip
-    _, state, _ = flights.states(1, 3.0, np.array([4]), place)
+    now, begin = np.array([1]), np.array([0])
+    _, _, state, _ = flights.states(now, np.array([3.0]), begin, place[:, np.newaxis])
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)

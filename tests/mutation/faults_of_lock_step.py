@@ -1,0 +1,46 @@
+"""Faults of lock step: one replica's memory, instant or draw taken for another's."""
+
+from fault import in_file
+
+_GROUP = "lock step"
+_TOGETHER = "lockstep/test_what_runs_together.py"
+
+FAULTS = [
+    *in_file(
+        _GROUP,
+        "components/tracking/cues.py",
+        (_TOGETHER,),
+        ("replicas-share-their-silence", "of = replica[rows]", "of = 0 * replica[rows]"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/sensor/declaration_rule.py",
+        (_TOGETHER,),
+        (
+            "looks-of-another-replica",
+            "cells.replica * len(self._names) + cells.target",
+            "0 * cells.replica + cells.target",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/sensor/declaration_by_place.py",
+        (_TOGETHER,),
+        (
+            "places-of-one-replica-are-kept",
+            "known.scan > self._last_scans(detections, known) - self.n + 1",
+            "known.scan > int(detections.scan[-1]) - self.n + 1",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/navigation/effects.py",
+        (_TOGETHER,),
+        (
+            "noise-of-the-common-line",
+            "nanosecond_of(own, block",
+            "nanosecond_of(states.tick, block",
+        ),
+        ("noise-of-the-first-seed", "stream.of_rows(replica)", "stream.of_rows(0 * replica)"),
+    ),
+]
