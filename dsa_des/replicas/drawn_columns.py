@@ -117,7 +117,7 @@ def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
     fields = {name: old.__dict__[name] for name in type(old).model_fields}
     for name, mine in parts.items():
         fields[name] = mine[()] if () in mine else _with(fields[name], mine)
-    return _model_of(type(old), fields, old.model_fields_set | parts.keys())
+    return _model_of(type(old), fields, set(old.model_fields_set))
 
 
 def _model_of(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -> BaseModel:

@@ -301,10 +301,8 @@ class Replicas(Timeline):
         return ReplicaChannel(wire.source, delay_ticks, faults, self.time)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
-        """Return the window where replicas go side by side."""
-        if self.time.side_by_side:
-            return window.start, window.end
-        return super().stretch(ticks, window)
+        """Return the window: clocks are asked for one stretch only, and know it the second time."""
+        return window.start, window.end
 
     def final_before(self, tick: int) -> int:
         """Return 0 where replicas go side by side: rows are put in order at the end."""

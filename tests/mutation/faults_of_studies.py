@@ -13,7 +13,6 @@ FAULTS = [
         _GROUP, "dsa_des/replicas/drawn_columns.py", "studies/test_drawn_columns.py",
         ("values-next-to-zero-unchecked", "key=lambda value: (value == 0, abs(value))", "key=abs"),
         ("validators-unwatched", "                if read:\n", "                if not read:\n"),
-        ("fields-as-if-not-given", "fields, old.model_fields_set | parts.keys())", "fields, old.model_fields_set)"),
         ("any-offset-keeps-the-ticks", "NANOSECONDS % value.denominator", "0 % value.denominator"),
     ),
     *in_file(

@@ -89,8 +89,8 @@ def test_one_that_is_refused_is_refused_with_its_own_words(
     small: Path, key: str, wrong: Any
 ) -> None:
     base = load_scene("small.toml")
-    good = Fraction(1, 100) if key.endswith("_s") else -2.0
-    runs = replicas(**{key: lambda k: wrong if k == 5 else good})
+    good = [Fraction(1, 100)] if key.endswith("_s") else [-2.0, 0.0, 2.0]
+    runs = replicas(**{key: lambda k: wrong if k == 5 else good[k % len(good)]})
     found = run_replicas(base, runs)
     (alone,) = run_replicas(base, runs[5:6])
     assert found[5] == alone and isinstance(alone, Failed) and key in alone.error
