@@ -147,7 +147,7 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
         made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]
         return ReplicaScenes(made[0], seeds, _watched(made[0], list(columns.values())))
-    except (_OneByOne, SceneError):
+    except (_NoColumn, SceneError):
         return None
 
 
@@ -169,7 +169,7 @@ _PROBES: tuple[Callable[[Sequence[Any]], Any], ...] = (
 )  # fmt: skip
 
 
-class _OneByOne(Exception):
+class _NoColumn(Exception):
     """These values cannot be checked as columns."""
 
 
@@ -177,10 +177,10 @@ def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
     """Return the column of a key, its values as its field would hold them."""
     path = key_path(key)
     if len(path) < 3 or path[0] != "blocks" or path[1] not in scene.blocks:
-        raise _OneByOne
+        raise _NoColumn
     block = scene.blocks[str(path[1])]
     if path[2] in BlockOptions.model_fields and path[2] not in type(block.parameters).model_fields:
-        raise _OneByOne
+        raise _NoColumn
     found, model, name = _place(block.parameters, path[2:])
     return DrawnColumn(block.name, found, _as_held(model, name, values))
 
@@ -193,7 +193,7 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
         if isinstance(old, BaseModel):
             model, name = type(old), str(path[0])
             if name not in model.model_fields or not _allows_columns(model):
-                raise _OneByOne
+                raise _NoColumn
             old, path = getattr(old, name), path[1:]
             found.append(name)
             if not path:
@@ -202,12 +202,12 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
             try:
                 place, path = item_of(old, path)
             except ValueError:
-                raise _OneByOne from None
+                raise _NoColumn from None
             found.append(place)
             old = old[place]
         else:
             break
-    raise _OneByOne
+    raise _NoColumn
 
 
 def _allows_columns(model: type[BaseModel]) -> bool:
@@ -255,12 +255,12 @@ def _as_held(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[A
     validators = model.__pydantic_decorators__.field_validators.values()
     mine = [v for v in validators if name in v.info.fields or "*" in v.info.fields]
     if others or not all(_is_of_all(found.func) for found in mine):
-        raise _OneByOne
+        raise _NoColumn
     exact = kind is Fraction
     for check in field.metadata:
         read = isinstance(check, BeforeValidator) and check.func is parse_rational
         if not (isinstance(check, _BOUNDS) or (exact and (read or type(check) is PlainSerializer))):
-            raise _OneByOne
+            raise _NoColumn
     if kind is float and all(type(v) is float for v in values):
         held: list[Any] = list(values)
     elif kind is float and all(type(v) in (int, float) for v in values):
@@ -270,9 +270,9 @@ def _as_held(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[A
     elif exact and all(type(v) is Fraction for v in values):
         held = [parse_rational(v) for v in values]
     else:
-        raise _OneByOne
+        raise _NoColumn
     if kind is float and not all(map(math.isfinite, held)):
-        raise _OneByOne
+        raise _NoColumn
     return held
 
 
@@ -288,11 +288,11 @@ def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColu
             with reading() as read:
                 parameters = _validated(block.parameters, [column.path for column in mine])
                 if read:
-                    raise _OneByOne
+                    raise _NoColumn
                 block.cls.clock_of(parameters)
                 own_clock = bool(read)
         except Exception as error:  # a stranger's validator, in a class derived from its own
-            raise _OneByOne from error
+            raise _NoColumn from error
         for column in mine if own_clock else ():
             if (
                 "clock_of" in _written(block.cls, Component)
@@ -300,7 +300,7 @@ def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColu
                 or column.path == ("scan_rate_hz",)
                 or any(NANOSECONDS % value.denominator for value in _offsets(column))
             ):
-                raise _OneByOne
+                raise _NoColumn
     return columns
 
 
