@@ -24,6 +24,21 @@ Wanted = Mapping[str, Collection[str]] | None
 
 
 @dataclass(frozen=True)
+class Shared:
+    """What runs in lock step recorded together.
+
+    Parameters
+    ----------
+    tables : dict
+        Table name → column name → values, in order of the column ``replica``.
+    replicas : int
+    """
+
+    tables: dict[str, Columns]
+    replicas: int
+
+
+@dataclass(frozen=True)
 class Recorded:
     """What a run recorded.
 
@@ -35,12 +50,18 @@ class Recorded:
     duration_s : float
     report : callable
         Returns the sections that blocks add to the summary of the run.
+    shared : Shared, optional
+        The recording of which `tables` are a part.
+    number : int
+        Which replica's.
     """
 
     tables: dict[str, Columns]
     ticks_per_s: int
     duration_s: float
     report: Callable[[], dict[str, Any]]
+    shared: Shared | None = None
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -130,10 +151,16 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
-    parts = _by_replica(sink.tables(), len(scenes))
+    shared = Shared(sink.tables(), len(scenes))
+    parts = _by_replica(shared.tables, len(scenes))
     return [
         Recorded(
-            tables, simulation.ticks_per_s, outcome.duration_s, partial(_report, scenes, number)
+            tables,
+            simulation.ticks_per_s,
+            outcome.duration_s,
+            partial(_report, scenes, number),
+            shared,
+            number,
         )
         for number, tables in enumerate(parts)
     ]
