@@ -146,12 +146,14 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
     if len(scenes) < 2:
         return None
     sink = ColumnSink()
+    recorder = Recorder([sink], wanted=wanted)
     try:
-        simulation = lock_step(scenes, recorder=Recorder([sink], wanted=wanted))
+        simulation = lock_step(scenes, recorder=recorder)
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
     shared = Shared(sink.tables(), len(scenes))
+    recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _by_replica(shared.tables, len(scenes))
     return [
         Recorded(
