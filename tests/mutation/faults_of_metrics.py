@@ -80,6 +80,8 @@ FAULTS = [
         _GROUP, "components/metrics/steered.py", ("wiring/test_mitigated_metric.py",),
         ("told-is-flown-at-once", "came_s = time_s + self._delays_s[names[block]]",
          "came_s = time_s"),
+        ("manoeuvres-of-the-first-replica", "found.setdefault(replica, [])",
+         "found.setdefault(0, [])"),
     ),
     *in_file(
         _GROUP, "components/metrics/encounter.py", (_SEPARATION, _SEVERAL, _KEYS),
@@ -225,11 +227,6 @@ FAULTS = [
         ("classes-without-weights",
          'ratio=RatioOf(*flags, weight, cluster, (f"encounter_{by}", kind))',
          'ratio=RatioOf(*flags, None, cluster, (f"encounter_{by}", kind))'),
-    ),
-    *in_file(
-        _GROUP, "components/metrics/steered.py", ("encounters/test_risk_of_a_set.py",),
-        ("manoeuvres-of-the-first-replica", "found.setdefault(replica, [])",
-         "found.setdefault(0, [])"),
     ),
     *in_file(
         _GROUP, "dsa_des/studies/output.py", ("encounters/test_risk_of_a_set.py",),
