@@ -1,12 +1,14 @@
-"""Integer arrays that are in order: their union, and where one lies in another."""
+"""Arrays that are in order: their union, and where one lies in another."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
+_Array = TypeVar("_Array", IntArray, FloatArray)
 #: Places that were found, by the lengths of both arrays: guesses for the next that ask.
 _found: OrderedDict[tuple[int, int], IntArray] = OrderedDict()
 _MOST_FOUND = 8
@@ -14,7 +16,7 @@ _MOST_FOUND = 8
 _WORTH_A_GUESS = 512
 
 
-def sorted_union(arrays: Sequence[IntArray]) -> IntArray:
+def sorted_union(arrays: Sequence[_Array]) -> _Array:
     """Return every value once, ascending.
 
     A stable sort merges runs that are already in order; `numpy.unique` hashes integers, which
@@ -22,11 +24,11 @@ def sorted_union(arrays: Sequence[IntArray]) -> IntArray:
 
     Parameters
     ----------
-    arrays : sequence of ndarray of int64, shape (n,)
-        At least one.
+    arrays : sequence of ndarray, shape (n,)
+        At least one; whole numbers or doubles, no NaN.
     """
-    joined = np.concatenate(arrays)
-    values = joined if len(arrays) == 1 else np.sort(joined, kind="stable")
+    joined: Any = np.concatenate(arrays)
+    values: _Array = joined if len(arrays) == 1 else np.sort(joined, kind="stable")
     if len(values) == 0:
         return values
     new = np.empty(len(values), dtype=bool)
