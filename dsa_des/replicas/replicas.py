@@ -50,6 +50,8 @@ class Recorded:
     duration_s : float
     report : callable
         Returns the sections that blocks add to the summary of the run.
+    ended_early : bool
+        Whether a block ended it before its time.
     shared : Shared, optional
         The recording of which `tables` are a part.
     number : int
@@ -60,6 +62,7 @@ class Recorded:
     ticks_per_s: int
     duration_s: float
     report: Callable[[], dict[str, Any]]
+    ended_early: bool = False
     shared: Shared | None = None
     number: int = 0
 
@@ -155,16 +158,22 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
     shared = Shared(sink.tables(), len(scenes))
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _by_replica(shared.tables, len(scenes))
+    ended = simulation.ends.by
+    durations_s = [
+        int(tick) / simulation.ticks_per_s if n in ended else outcome.duration_s
+        for n, tick in enumerate(simulation.ends.ticks)
+    ]
     return [
         Recorded(
             tables,
             simulation.ticks_per_s,
-            outcome.duration_s,
-            partial(_report, scenes, number),
+            duration_s,
+            partial(_report, scenes, n),
+            n in ended,
             shared,
-            number,
+            n,
         )
-        for number, tables in enumerate(parts)
+        for n, (tables, duration_s) in enumerate(zip(parts, durations_s, strict=True))
     ]
 
 
@@ -191,5 +200,6 @@ def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
     except (SceneError, BlockFailure) as error:
         return Failed(str(error))
     return Recorded(
-        sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report
-    )
+        sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
+        simulation.ends.early,
+    )  # fmt: skip
