@@ -19,6 +19,14 @@ SCENES = {
         "blocks.eo.scan_rate_hz=4", "blocks.radar.false_alarm_probability=0.02",
         "blocks.traffic.intruders[0].north_m=6000", 'blocks.radar.declare_by="place"',
     ], "detections"),
+    "a sweeping beam": ("avoidance/crossing.toml", "10", [
+        "blocks.traffic.intruders[0].east_m=2200", "blocks.traffic.intruders[0].north_m=1700",
+        "blocks.radar.beam_sweep=true", "blocks.radar.measures_range_rate=true",
+        "blocks.avoidance.pause_s=2",
+    ], "manoeuvres"),
+    "a camera that weighs motion": ("first_light.toml", "5", [
+        "blocks.eo.dynamic_weight=20", "blocks.traffic.intruders[0].north_m=3000",
+    ], "detections"),
 }  # fmt: skip
 
 
