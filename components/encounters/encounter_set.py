@@ -5,13 +5,12 @@ an initial state and *events* (climb, turn and acceleration, held from an instan
 *track*. Lists of all rows lie end to end in flat arrays, cut by `starts`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from components.encounters.motion import fly_euler, fly_point_mass
-from components.geometry.enu import enu_to_geodetic
-from components.traffic.trajectory import SampledTrajectory
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import nearest
@@ -92,58 +91,63 @@ class EncounterSet:
             f"{self.numbers[0]} to {self.numbers[-1]}{hint}"
         )
 
-    def flights(self, place: int, dynamics: str = "euler") -> list[SampledTrajectory]:
-        """Return the flights of one encounter, the ownship's first.
-
-        Parameters
-        ----------
-        place : int
-            Of the encounter, from 0.
-        dynamics : {"euler", "point_mass"}
-            How events are flown.
-        """
-        rows = range(self.first_rows[place], self.first_rows[place + 1])
-        found = []
-        for row in rows:
-            time_s, north, east, altitude = self.path(row, dynamics)
-            lat, lon, _ = enu_to_geodetic(
-                east,
-                north,
-                0.0,
-                reference_lat_deg=self.reference_deg[0],
-                reference_lon_deg=self.reference_deg[1],
-                reference_alt_m=0.0,
-            )
-            found.append(SampledTrajectory(self.names[row], time_s, lat, lon, altitude))
-        return found
-
     def path(
         self, row: int, dynamics: str = "euler"
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return time (s), north, east and altitude (m) along the path of one aircraft."""
-        entries = slice(int(self.starts[row]), int(self.starts[row + 1]))
-        lists = {name: values[entries] for name, values in self.lists.items()}
         if self.kind == TRACKS:
+            lists = self._lists(row)
             return lists["time_s"], lists["north_m"], lists["east_m"], lists["altitude_m"]
-        one = {name: float(values[row]) for name, values in self.state.items()}
-        seconds = int(np.ceil(one["duration_s"]))
-        at = np.searchsorted(lists["time_s"], np.arange(seconds + 1.0), side="right") - 1
-        feet = {
-            "acceleration_ft_s2": lists["acceleration_mps2"][at, np.newaxis] / FOOT_M,
-            "climb_ft_s": lists["climb_mps"][at, np.newaxis] / FOOT_M,
-            "turn_rad_s": lists["turn_rad_s"][at, np.newaxis],
-        }
-        fly = {"euler": fly_euler, "point_mass": fly_point_mass}[dynamics]
-        flown = fly(
-            np.array([one["altitude_m"] / FOOT_M]),
-            np.array([one["speed_mps"] / FOOT_M]),
-            **feet,
-            start_heading_rad=one["heading_rad"],
-        )
-        time_s: FloatArray = np.arange(float(len(flown.up_ft))) * flown.step_s
-        return (
-            time_s,
-            one["north_m"] + flown.north_ft[:, 0] * FOOT_M,
-            one["east_m"] + flown.east_ft[:, 0] * FOOT_M,
-            flown.up_ft[:, 0] * FOOT_M,
-        )
+        time_s, *place = flown_events([(self, row)], dynamics)
+        return time_s, *(part[:, 0] for part in place)  # type: ignore[return-value]
+
+    def seconds(self, row: int) -> int:
+        """Return how many whole seconds an aircraft of a set of events flies."""
+        return int(np.ceil(self.state["duration_s"][row]))
+
+    def _lists(self, row: int) -> dict[str, FloatArray]:
+        entries = slice(int(self.starts[row]), int(self.starts[row + 1]))
+        return {name: values[entries] for name, values in self.lists.items()}
+
+
+def flown_events(
+    aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Fly initial states and events of several aircraft, as each would be flown alone.
+
+    Parameters
+    ----------
+    aircraft : sequence of (set of events, row)
+        All of as many `EncounterSet.seconds`.
+    dynamics : {"euler", "point_mass"}
+
+    Returns
+    -------
+    time_s : (instants,)
+    north_m, east_m, altitude_m : (instants, aircraft)
+    """
+    whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
+    state = {name: np.array([s.state[name][row] for s, row in aircraft]) for name in STATE}
+    commands = np.empty((3, len(whole), len(aircraft)))
+    for column, (found, row) in enumerate(aircraft):
+        start, end = found.starts[row], found.starts[row + 1]
+        at = start + np.searchsorted(found.lists["time_s"][start:end], whole, side="right") - 1
+        for k, name in enumerate(LISTS[EVENTS][1:]):
+            commands[k, :, column] = found.lists[name][at]
+    climb, turn, acceleration = commands
+    fly = {"euler": fly_euler, "point_mass": fly_point_mass}[dynamics]
+    flown = fly(
+        state["altitude_m"] / FOOT_M,
+        state["speed_mps"] / FOOT_M,
+        acceleration_ft_s2=acceleration / FOOT_M,
+        climb_ft_s=climb / FOOT_M,
+        turn_rad_s=turn,
+        start_heading_rad=state["heading_rad"],
+    )
+    time_s: FloatArray = np.arange(float(len(flown.up_ft))) * flown.step_s
+    return (
+        time_s,
+        state["north_m"] + flown.north_ft * FOOT_M,
+        state["east_m"] + flown.east_ft * FOOT_M,
+        flown.up_ft * FOOT_M,
+    )

@@ -6,6 +6,7 @@ function of its number: the same in every scene and condition.
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +15,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from components.encounters.encounter_flights import (
+    MOST_FLOWN,
+    encounter_flights,
+    prepare_flights,
+)
 from components.encounters.encounter_set import EncounterSet
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
@@ -25,7 +31,6 @@ from components.traffic.files import FileParameters, RecordedTraffic
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.traffic_file import TrafficFile
-from components.traffic.trajectory import SampledTrajectory
 from dsa_des.block.component import ScenePath
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
@@ -98,17 +103,25 @@ class _EncounterTraffic(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return the flights of the encounter."""
-        self.found, self.place = chosen_encounter(type(self), self.p)
-        given = self.p.lat_deg, self.p.lon_deg
-        if (given[0] is None) != (given[1] is None):
+        if (self.p.lat_deg is None) != (self.p.lon_deg is None):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
-        if given[0] is not None:
-            self.found = replace(self.found, reference_deg=given)
-        own, *others = _flights(self.found, self.place, self.p.dynamics)
+        self.found, self.place = _put(type(self), self.p)
+        own, *others = encounter_flights(self.found, self.place, self.p.dynamics)
         notes = [f"encounter {self.found.numbers[self.place]} of {len(self.found)}"]
         if self.found.skipped:
             notes.append(f"{self.found.skipped} damaged encounters of the set were skipped")
         return TrafficFile(own, others, 0.0, notes)
+
+    @classmethod
+    def prepare(cls, parameters: Sequence[Any]) -> None:
+        """Make the flights that many blocks will ask for, all at once."""
+        wanted: dict[str, list[tuple[EncounterSet, int]]] = {}
+        for p in parameters[:MOST_FLOWN]:
+            # What is wrong is said by the block that asks for it.
+            with suppress(ValueError):
+                wanted.setdefault(p.dynamics, []).append(_put(cls, p))
+        for dynamics, encounters in wanted.items():
+            prepare_flights(encounters, dynamics)
 
     def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
         at = self.found.reference_deg
@@ -144,7 +157,7 @@ class ModelTraffic(_EncounterTraffic):
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
-        """Make the encounters that many blocks will ask for, all at once."""
+        """Make the encounters and flights that many blocks will ask for, all at once."""
         wanted: dict[Any, set[int]] = {}
         for p in parameters:
             wanted.setdefault(_model_key(p), set()).add(p.encounter)
@@ -153,6 +166,7 @@ class ModelTraffic(_EncounterTraffic):
             for run in np.split(new, np.flatnonzero(np.diff(new) != 1) + 1):
                 if len(run) > 1:
                     _make(key, range(int(run[0]), int(run[-1]) + 1))
+        super().prepare(parameters)
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
@@ -169,19 +183,17 @@ def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     return found, found.place(parameters.encounter)
 
 
+def _put(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
+    """Return the set of an encounter where the scene puts it, and its place there."""
+    found, place = chosen_encounter(cls, parameters)
+    at = parameters.lat_deg, parameters.lon_deg
+    return (found if None in at else replace(found, reference_deg=at)), place
+
+
 #: Encounters of models that were made last, each a set of its own, by model and number.
 _MADE: OrderedDict[Any, EncounterSet] = OrderedDict()
-#: Flights that were flown last, with their sets.
-_FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = OrderedDict()
 # So many are kept: a study asks for each encounter of a chunk several times.
-_MOST_MADE, _MOST_FLOWN = 4096, 1200
-
-
-def _kept(cache: OrderedDict[Any, Any], most: int, key: Any, value: Any) -> Any:
-    cache[key] = value
-    while len(cache) > most:
-        cache.popitem(last=False)
-    return value
+_MOST_MADE = 4096
 
 
 def _model_key(parameters: Any) -> tuple[Path, Path, int]:
@@ -200,18 +212,9 @@ def _make(key: tuple[Path, Path, int], numbers: range) -> None:
     for place, number in enumerate(numbers):
         one = pairs if len(numbers) == 1 else pairs.some(np.array([place]))
         made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))
-        _kept(_MADE, _MOST_MADE, (*key, number), made)
-
-
-def _flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:
-    """Return the flights of an encounter; traffic and metrics ask for the same ones."""
-    # Of a set put elsewhere what was read is the same: the arrays stand for it.
-    key = id(found.starts), found.reference_deg, place, dynamics
-    if key in _FLOWN:
-        return _FLOWN[key][1]
-    made: list[SampledTrajectory] = found.flights(place, dynamics)
-    _kept(_FLOWN, _MOST_FLOWN, key, (found, made))
-    return made
+        _MADE[(*key, number)] = made
+    while len(_MADE) > _MOST_MADE:
+        _MADE.popitem(last=False)
 
 
 @lru_cache(maxsize=4)

@@ -6,7 +6,7 @@ class of its geometry. The ratios themselves are taken over all runs of a cell.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -15,8 +15,9 @@ from pydantic import Field
 from components.encounters.pair_sets import GEOMETRIES, geometry_class
 from components.encounters.weight_metric import EncounterWeight, has_weights
 from components.metrics.encounter import read_flights
+from components.metrics.flights_together import nearest_of, ways_of
 from components.metrics.mitigated import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight, closest
+from components.metrics.separation import RelativeFlight
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import CLASS, RATIO, Group, RatioOf, Result
@@ -78,7 +79,7 @@ class RiskRatios(Mitigated):
         if self._weight is not None:
             found |= self._weight.measure(group)
         if self.p.by:
-            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg, 2)
+            course_deg, bearing_deg = read_flights(group, self.p.step_s, None, meeting_deg)
             for by in self.p.by:
                 named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
                 column: AnyArray = named.astype(object)
@@ -94,26 +95,35 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return found
 
 
-def meeting_deg(flights: list[RelativeFlight]) -> tuple[float, float]:
+def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     """Return how the nearest intruder meets the ownship at the closest approach, degrees.
+
+    Parameters
+    ----------
+    runs : sequence of list of RelativeFlight
 
     Returns
     -------
-    course : float
-        The intruder's less the ownship's.
-    bearing : float
-        From where the intruder closes in, clockwise from the ownship's course: opposite to its
-        velocity relative to the ownship. NaN, both, where they never are there together.
+    (2, runs)
+        Course: the intruder's less the ownship's. Bearing from where the intruder closes in,
+        clockwise from the ownship's course: opposite to its velocity relative to the ownship. NaN,
+        both, where they never are there together.
     """
-    best = math.inf, math.nan
-    nearest: RelativeFlight | None = None
-    for flight in flights:
-        distance_m, time_s, _ = closest(flight)
-        if distance_m < best[0]:
-            best, nearest = (distance_m, time_s), flight
-    if nearest is None:
-        return math.nan, math.nan
-    own, other = nearest.ways_m(best[1], _BASE_S)
-    course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
-    closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-    return (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    flights = [flight for run in runs for flight in run]
+    distance_m, time_s = nearest_of(flights)
+    found = np.full((2, len(runs)), np.nan)
+    met: list[int] = []
+    nearest: list[int] = []
+    start = 0
+    for number, run in enumerate(runs):
+        place = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
+        if run and np.isfinite(distance_m[place]):
+            met.append(number)
+            nearest.append(place)
+        start += len(run)
+    ways = ways_of([flights[place] for place in nearest], time_s[nearest], _BASE_S)
+    for number, own, other in zip(met, *(way.T.tolist() for way in ways), strict=True):
+        course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
+        closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
+        found[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    return found

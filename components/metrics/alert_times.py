@@ -74,9 +74,8 @@ class AlertTimes(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         told = self._told.of(group) if self.p.steered else None
-        lost_s, nmac_s, _ = read_flights(
-            group, self.p.step_s, self.p.target, self.p.losses_s, 3, told
-        )
+        read = self.p.losses_s
+        lost_s, nmac_s, _ = read_flights(group, self.p.step_s, self.p.target, read, told)
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

@@ -5,7 +5,7 @@ Loss of well clear is by default that of ASTM F3442 for small unmanned aircraft,
 horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,17 +13,17 @@ import numpy as np
 from pydantic import Field
 
 from components.metrics.declaration import ANY, DECLARED, DeclarationParameters, declarations
+from components.metrics.flights_together import first_losses_s
 from components.metrics.relative_states import first_violation_s
 from components.metrics.rows import TargetMetric, sensors_of
 from components.metrics.run_ends import SCANS
 from components.metrics.separation import (
     RelativeFlight,
     closest,
-    first_inside,
     separations,
     traffic_block,
 )
-from components.metrics.steered import Told, ToldManoeuvres
+from components.metrics.steered import Told, ToldManoeuvres, flown_as_told
 from components.sensor.cut_off import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -100,9 +100,9 @@ class SizeParameters(Parameters):
             (self.nmac_horizontal_m, self.nmac_vertical_m),
         )
 
-    def losses_s(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
+    def losses_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
         """Return when well clear is first lost, when a collision first threatens, and 0, s."""
-        return losses_s(self.sizes_m, flights, self.tau_s)
+        return losses_s(self.sizes_m, runs, self.tau_s)
 
 
 class WellClearParameters(EncounterParameters, SizeParameters):
@@ -111,15 +111,23 @@ class WellClearParameters(EncounterParameters, SizeParameters):
     step_s: float | None = STEP  # type: ignore[assignment]
 
 
+#: What is read of runs, each a list of its flights: (values, runs).
+Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
+
+
+def each_alone(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
+    """Return what reads the flights of one run after the other."""
+    return lambda runs: np.array([read(flights) for flights in runs]).T
+
+
 def read_flights(
     group: Group,
     step_s: float | None,
     target: str | None,
-    read: Callable[[list[RelativeFlight]], tuple[float, ...]],
-    width: int,
+    read: Read,
     told: Mapping[int, Told] | None = None,
 ) -> FloatArray:
-    """Return what `read` makes of every replica's flights, shape (width, replicas).
+    """Return what `read` makes of every replica's flights, shape (values, replicas).
 
     Flights are computed once for all replicas that share them.
 
@@ -131,27 +139,32 @@ def read_flights(
     target : str or None
         Which one counts; None for all.
     read : callable
-    width : int
-        How many values it returns.
     told : mapping, optional
         What the ownship of a replica was told to fly; others fly on as they are.
     """
-    known: dict[tuple[Any, ...], tuple[float, ...]] = {}
-    values = np.empty((width, len(group)))
-    mine = (f"blocks.{traffic_block(group.scene).name}.", "duration_s")
-    moved = any(key.startswith(mine) for replica in group.replicas for key in replica.changes)
-    scenes = group.scenes if moved else [group.scene] * len(group)
-    for number, scene in enumerate(scenes):
-        if told and number in told:
-            found = separations(scene, step_s, told[number])
-            values[:, number] = read([s for s in found if target in (None, s.name)])
+    told = told or {}
+    block = f"blocks.{traffic_block(group.scene).name}."
+    runs: list[list[RelativeFlight]] = []
+    places: dict[Any, int] = {}
+    place, steered = np.empty(len(group), dtype=np.int64), []
+    for number, replica in enumerate(group.replicas):
+        mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
+        key = tuple(sorted((k, repr(v)) for k, v in mine.items()))
+        alone = number in told
+        place[number] = places.setdefault((key, number if alone else None), len(runs))
+        if place[number] < len(runs):
             continue
-        key = (repr(traffic_block(scene).parameters), scene.duration_s) if moved else ()
-        if key not in known:
-            found = group.once(("separations", step_s, *key), partial(separations, scene, step_s))
-            known[key] = read([s for s in found if target in (None, s.name)])
-        values[:, number] = known[key]
-    return values
+        scene = group.scenes[number] if mine else group.scene
+        flights = group.once(("separations", step_s, key), partial(separations, scene, step_s))
+        runs.append([flight for flight in flights if target in (None, flight.name)])
+        if alone and runs[-1]:
+            steered.append(number)
+    flown = flown_as_told(
+        [runs[place[number]][0].own for number in steered], [told[number] for number in steered]
+    )
+    for number, own in zip(steered, flown, strict=True):
+        runs[place[number]] = [flight.flown_by(own) for flight in runs[place[number]]]
+    return read(runs)[:, place]
 
 
 class _Encounter(TargetMetric):
@@ -165,12 +178,9 @@ class _Encounter(TargetMetric):
         self._told = ToldManoeuvres(scene)
         self.tables = {**self.tables, **self._told.tables}
 
-    def of_flights(
-        self, group: Group, read: Callable[[list[RelativeFlight]], tuple[float, ...]], width: int
-    ) -> FloatArray:
-        """Return what `read` makes of every replica's flights as flown, (width, replicas)."""
-        told = self._told.of(group)
-        return read_flights(group, self.p.step_s, self.p.target, read, width, told)
+    def of_flights(self, group: Group, read: Read) -> FloatArray:
+        """Return what `read` makes of every replica's flights as flown, (values, replicas)."""
+        return read_flights(group, self.p.step_s, self.p.target, read, self._told.of(group))
 
 
 class ClosestApproach(_Encounter):
@@ -200,7 +210,7 @@ class ClosestApproach(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        distance, time_s, code = self.of_flights(group, _closest, 3)
+        distance, time_s, code = self.of_flights(group, each_alone(_closest))
         at = np.array(_ENDS)[code.astype(int)]
         found: dict[str, AnyArray] = {
             "closest_approach_m": distance,
@@ -250,7 +260,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s, 3)
+        lost_s, collision_s, begun_s = self.of_flights(group, self.p.losses_s)
         lost_at_start = in_scan(lost_s, begun_s)
         found: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).astype(float),
@@ -275,22 +285,32 @@ def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
 
 
 def losses_s(
-    sizes_m: tuple[tuple[float, float], ...], flights: list[RelativeFlight], tau_s: float = 0.0
-) -> tuple[float, ...]:
+    sizes_m: tuple[tuple[float, float], ...],
+    runs: Sequence[list[RelativeFlight]],
+    tau_s: float = 0.0,
+) -> FloatArray:
     """Return when well clear is first lost, when a collision first threatens, and the start, s.
 
     Parameters
     ----------
     sizes_m : ((horizontal, vertical) of well clear, those of a collision)
-    flights : list of RelativeFlight
+    runs : sequence of list of RelativeFlight
     tau_s : float
         Modified tau of well clear; 0 for a cylinder.
+
+    Returns
+    -------
+    (3, runs)
+        NaN for what never happens; the first of several flights counts.
     """
-    if not flights:
-        return (float("nan"),) * 3
-    first = np.array([first_inside(flight, *sizes_m) for flight in flights])
+    flights = [flight for run in runs for flight in run]
+    of_run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+    first = first_losses_s(flights, *sizes_m)
     if tau_s > 0.0:
         volume = Volume(*sizes_m[0], horizontal_time_s=tau_s)
         first[:, 0] = [first_violation_s(flight, volume) for flight in flights]
-    lost_s, collision_s = np.fmin.reduce(first).tolist()
-    return lost_s, collision_s, 0.0
+    found = np.full((3, len(runs)), np.nan)
+    for value in (0, 1):
+        np.fmin.at(found[value], of_run, first[:, value])
+    found[2, of_run] = 0.0
+    return found

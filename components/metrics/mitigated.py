@@ -48,9 +48,9 @@ class Mitigated(Metric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         read = self.p.losses_s
-        nominal = read_flights(group, self.p.step_s, None, read, 3)[:2]
+        nominal = read_flights(group, self.p.step_s, None, read)[:2]
         told = self._told.of(group)
-        mitigated = read_flights(group, self.p.step_s, None, read, 3, told)[:2]
+        mitigated = read_flights(group, self.p.step_s, None, read, told)[:2]
         found: dict[str, AnyArray] = {}
         for k, name in enumerate(("well_clear_lost", "nmac")):
             found[f"{name}_nominal"] = (~np.isnan(nominal[k])).astype(float)

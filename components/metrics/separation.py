@@ -3,7 +3,8 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isnan
@@ -11,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
-from components.messages.steering import Manoeuvre
+from components.geometry.ellipsoid import line_of_sight
 from components.traffic.censored import end_of_look, present_together_s
 from components.traffic.sample_times import (
     SampleTimes,
@@ -21,8 +21,6 @@ from components.traffic.sample_times import (
     regular_times_s,
 )
 from components.traffic.source import TrafficSource
-from components.traffic.steered_flight import SteeredFlight
-from components.well_clear.curved_flights import cylinder_spans
 from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -81,9 +79,7 @@ STEP_S = 0.1
 _SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
 
 
-def separations(
-    scene: Scene, step_s: float | None, told: Sequence[tuple[float, Manoeuvre]] = ()
-) -> "list[RelativeFlight]":
+def separations(scene: Scene, step_s: float | None) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -91,9 +87,7 @@ def separations(
     scene : Scene
     step_s : float or None
         Spacing of the grid; the times at which the source itself has samples are added. None looks
-        between them for losses (`first_inside`), with a grid of `STEP_S` for all else.
-    told : sequence of (time in s, Manoeuvre)
-        What the ownship was told to fly, in order of time; by default it flies on.
+        between them for losses, with a grid of `STEP_S` for all else.
     """
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
@@ -102,10 +96,6 @@ def separations(
     context.duration_s = duration
     count = regular_count(step_s or STEP_S, float(duration))
     end_s = float(duration)
-    if told:
-        source.own = SteeredFlight(source.own)
-        for time_s, manoeuvre in told:
-            source.own = source.own.steered(time_s, manoeuvre)
     return [
         RelativeFlight(source, number, step_s, count, end_s)
         for number in range(len(source.targets))
@@ -132,54 +122,54 @@ class RelativeFlight:
         self, source: Any, number: int, step_s: float | None, count: int, end_s: float
     ) -> None:
         self._source, self._number = source, number
-        self._target = source.targets[number]
-        self.name: str = self._target.name
+        #: Flights of ownship and target.
+        self.own, self.target = source.own, source.targets[number]
+        self.name: str = self.target.name
         self.between_samples = step_s is None
-        self._step_s, self._count = step_s or STEP_S, count
+        self.step_s, self._count = step_s or STEP_S, count
         self.end_s = end_s
         self._known: list[Separation] | None = None
 
+    def flown_by(self, own: Any) -> "RelativeFlight":
+        """Return the same with another flight of the ownship."""
+        found = copy(self)
+        found.own, found._known = own, None
+        return found
+
+    @property
+    def is_short(self) -> bool:
+        """Whether all of its times can be laid out."""
+        return self._count <= _KEPT
+
+    @property
+    def grid_end_s(self) -> float:
+        """The last time of the grid, s."""
+        return float(regular_times_s(self.step_s, np.array([self._count - 1]))[0])
+
+    def sample_times_s(self) -> FloatArray:
+        """Return 0 and the times within the grid at which the source itself has samples, s."""
+        found = [np.zeros(1)]
+        for times in self._samples():
+            found.append(_between(times, self._number, 0.0, self.grid_end_s))
+        return np.unique(np.concatenate(found))
+
     def present_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and the last time (1,) at which both aircraft may be there, s."""
-        return present_together_s(self._source.own, [self._target], self.end_s)
-
-    def ways_m(self, time_s: float, base_s: float) -> list[tuple[float, float]]:
-        """Return how far north and east ownship and target move around a time, m.
-
-        Parameters
-        ----------
-        time_s : float
-            When both are there.
-        base_s : float
-            So long before and after it, as far as both are there; the frame is that of the
-            ownship's level plane then.
-        """
-        first, last = (float(limit[0]) for limit in self.present_s())
-        ends = np.clip([time_s - base_s, time_s + base_s], first, min(last, self.end_s))
-        here = self._source.own.at(np.array([time_s, time_s]))
-        found = []
-        for flight in (self._source.own, self._target):
-            at = flight.at(ends)
-            north, east, _ = line_of_sight_ned(
-                here.lat_deg, here.lon_deg, here.alt_m, at.lat_deg, at.lon_deg, at.alt_m,
-                validate=False,
-            )  # fmt: skip
-            found.append((float(north[1] - north[0]), float(east[1] - east[0])))
-        return found
+        return present_together_s(self.own, [self.target], self.end_s)
 
     @property
     def closing_mps(self) -> float:
         """No distance of the two changes faster, m/s."""
-        fastest = float(self._source.own.max_speed_mps + self._target.max_speed_mps)
+        fastest = float(self.own.max_speed_mps + self.target.max_speed_mps)
         return fastest * _SPEED_MARGIN + _TURN_MARGIN_MPS
 
     def at(self, time_s: FloatArray) -> Separation:
         """Return the distances at some times."""
-        return _separation(self._source, self._target, time_s)
+        return _separation(self.own, self.target, time_s)
 
     def states(self, time_s: FloatArray) -> tuple[Any, Any]:
         """Return the states of ownship and target at some times."""
-        return self._source.own.at(time_s), self._target.at(time_s)
+        return self.own.at(time_s), self.target.at(time_s)
 
     def pieces(self) -> Iterator[Separation]:
         """Give the distances, about `MOST_AT_ONCE` at a time; those of a short run are kept."""
@@ -195,18 +185,18 @@ class RelativeFlight:
         after_s = 0.0
         for start in range(0, self._count, MOST_AT_ONCE):
             number = np.arange(start, min(start + MOST_AT_ONCE, self._count))
-            time_s = regular_times_s(self._step_s, number)
+            time_s = regular_times_s(self.step_s, number)
             last_s = float(time_s[-1])
             for times in samples:
                 time_s = np.union1d(time_s, _between(times, self._number, after_s, last_s))
-            yield _separation(self._source, self._target, time_s)
+            yield _separation(self.own, self.target, time_s)
             after_s = float(np.nextafter(last_s, np.inf))
 
     def _samples(self) -> list[SampleTimes]:
         every: list[SampleTimes] = self._source.sample_times()
         if every:
             return every
-        times = SharedTimes(self._source.sample_times_s(self._target))
+        times = SharedTimes(self._source.sample_times_s(self.target))
         return [times]
 
 
@@ -218,16 +208,21 @@ def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> 
     return times.at(np.full(len(number), target), number)
 
 
-def _separation(source: Any, target: Any, time_s: FloatArray) -> Separation:
-    own, other = source.own.at(time_s), target.at(time_s)
+def _separation(ownship: Any, target: Any, time_s: FloatArray) -> Separation:
+    return Separation(target.name, time_s, *distances_m(ownship.at(time_s), target.at(time_s)))
+
+
+def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return slant range, horizontal distance and difference of altitudes between two states, m.
+
+    Infinite where either is absent.
+    """
     _, elevation_rad, range_m = line_of_sight(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
         validate=False,
     )  # fmt: skip
     there = np.asarray(own.present & other.present)
-    return Separation(
-        target.name,
-        time_s,
+    return (
         np.where(there, range_m, np.inf),
         np.where(there, range_m * np.cos(elevation_rad), np.inf),
         np.where(there, np.abs(np.asarray(other.alt_m) - np.asarray(own.alt_m)), np.inf),
@@ -255,8 +250,7 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
 def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """Return when a target first is within each pair of distances (exclusive), s; NaN if never.
 
-    A flight that looks between samples is asked by `components.well_clear.curved_flights`, with its
-    error bound; others at their times only.
+    Asked at the flight's times only; `components.metrics.flights_together` looks between them.
 
     Parameters
     ----------
@@ -264,13 +258,6 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     *limits_m : (horizontal, vertical)
     """
     found = [float("nan")] * len(limits_m)
-    if flight.between_samples:
-        for number, limits in enumerate(limits_m):
-            # Who never comes into a cylinder comes into none within it.
-            before = zip(limits_m[:number], found[:number], strict=True)
-            if not any(isnan(t) and a >= limits[0] and b >= limits[1] for (a, b), t in before):
-                found[number] = _first_between_samples(flight, *limits)
-        return found
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
             inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
@@ -279,18 +266,3 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
         if not any(map(isnan, found)):
             break
     return found
-
-
-def _first_between_samples(flight: RelativeFlight, horizontal_m: float, vertical_m: float) -> float:
-    """Return when a flight first is inside a cylinder, at any time at all, s; NaN if never."""
-
-    def apart(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        piece = flight.at(time_s)
-        return piece.horizontal_m, piece.vertical_m
-
-    first_s, last_s = (float(times[0]) for times in flight.present_s())
-    between_s = max(first_s, 0.0), min(last_s, flight.end_s)
-    spans = cylinder_spans(
-        apart, between_s, flight.closing_mps, horizontal_m, vertical_m, first_only=True
-    )
-    return float(spans[0, 0]) if len(spans) else float("nan")

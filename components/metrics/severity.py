@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.encounter import read_flights
+from components.metrics.encounter import each_alone, read_flights
 from components.metrics.relative_states import relative_states
 from components.metrics.rows import TargetMetric, TargetParameters
 from components.metrics.separation import RelativeFlight, traffic_block
@@ -84,7 +84,8 @@ class Severity(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
         told = self._told.of(group)
-        found = read_flights(group, self.p.step_s, self.p.target, self._severities, 2, told)
+        read = each_alone(self._severities)
+        found = read_flights(group, self.p.step_s, self.p.target, read, told)
         return {"slowc_percent": found[0], "pnmac": found[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:

@@ -3,8 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import traffic_block
+from components.traffic.many_flights import ManyFlights
+from components.traffic.own_flights import OwnFlights
+from components.traffic.steered_flight import SteeredFlight
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
 
@@ -12,6 +17,23 @@ _TOLD = Manoeuvre._fields
 
 #: Manoeuvres and when they came, s, in order.
 Told = Sequence[tuple[float, Manoeuvre]]
+
+
+def flown_as_told(own: Sequence[Any], told: Sequence[Told]) -> list[SteeredFlight]:
+    """Return what ownships fly that were told to.
+
+    Parameters
+    ----------
+    own : sequence of flights
+    told : sequence of Told
+        Of each of them; at least one manoeuvre.
+    """
+    flights = OwnFlights(ManyFlights(own), len(own))
+    for turn in range(max(map(len, told), default=0)):
+        now = [number for number, one in enumerate(told) if len(one) > turn]
+        times_s = np.array([told[number][turn][0] for number in now])
+        flights.steer(np.array(now), times_s, [told[number][turn][1] for number in now])
+    return [SteeredFlight(flight, flights.parts_of(number)) for number, flight in enumerate(own)]
 
 
 class ToldManoeuvres:

@@ -43,8 +43,10 @@ def fit_path(
 
     Parameters
     ----------
-    time_s, lat_deg, lon_deg, alt_m : ndarray, shape (n,)
-        The path; times strictly increasing.
+    time_s : ndarray, shape (n,)
+        Strictly increasing.
+    lat_deg, lon_deg, alt_m : ndarray, shape (n,) or (n, aircraft)
+        The path of one aircraft, or those of several that have the same times.
     window_s : float
         Whole width of the window. Samples within half of it, and always the two neighbours,
         enter the least-squares parabola with equal weight.
@@ -68,7 +70,7 @@ def fit_path(
         )
 
     # The reference sample is at the origin by definition, so only displacements are summed.
-    return _fit(time_s, displacement, degree=2, window_s=window_s)
+    return _fit(time_s, displacement, lat_deg.shape, degree=2, window_s=window_s)
 
 
 def attitude_from_path(
@@ -89,8 +91,10 @@ def attitude_from_path(
 
     Parameters
     ----------
-    time_s, lat_deg, lon_deg, alt_m : ndarray, shape (n,)
-        The path; times strictly increasing.
+    time_s : ndarray, shape (n,)
+        Strictly increasing.
+    lat_deg, lon_deg, alt_m : ndarray, shape (n,) or (n, aircraft)
+        The path of one aircraft, or those of several that have the same times.
     velocity_enu_mps : tuple of three ndarray, optional
         Measured velocity (east, north, up). Yaw and pitch then come from it at the sample
         itself, and the track rate from a straight line fitted to it over the window. Without it
@@ -143,12 +147,13 @@ def _slope_of_velocity(
             v_up[j] - v_up[i],
         )
 
-    return _fit(time_s, change, degree=1, window_s=window_s)[0]
+    return _fit(time_s, change, lat_deg.shape, degree=1, window_s=window_s)[0]
 
 
 def _fit(
     time_s: FloatArray,
     difference: Callable[[slice, slice], Vector],
+    shape: tuple[int, ...],
     degree: int,
     window_s: float,
 ) -> tuple[Vector, Vector]:
@@ -164,10 +169,11 @@ def _fit(
         reach += 1
     step = -(-reach // _MOST_OFFSETS)
     offsets = sorted({1, *range(step, reach + 1, step)})
+    time_s = time_s.reshape(n, *(1 for _ in shape[1:]))  # the same for all aircraft
     # Sums over the window of tau^0..tau^4, and of tau^0..tau^2 times each component.
-    moments = [np.zeros(n) for _ in range(5)]
+    moments = [np.zeros_like(time_s) for _ in range(5)]
     moments[0] += 1.0
-    sums = [[np.zeros(n) for _ in range(3)] for _ in range(3)]
+    sums = [[np.zeros(shape) for _ in range(3)] for _ in range(3)]
     for size in (k for k in offsets if k < n):
         ahead, behind = slice(0, n - size), slice(size, n)
         for i, j in ((ahead, behind), (behind, ahead)):
@@ -184,7 +190,7 @@ def _fit(
     m0, m1, m2, m3, m4 = moments
     spread = m0 * m2 - m1 * m1
     straight = [_ratio(m0 * s1 - m1 * s0, spread) for s0, s1 in zip(sums[0], sums[1], strict=True)]
-    zero = np.zeros(n)
+    zero = np.zeros(shape)
     if degree == 1:
         first, second = straight, [zero, zero, zero]
     else:
@@ -214,7 +220,9 @@ def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
 
 def _held(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
     """Carry the last yaw of a moving sample over those that stand still."""
-    if not moving.any():
-        return np.zeros_like(yaw)
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(yaw)), -1))
-    return yaw[np.where(last >= 0, last, int(np.argmax(moving)))]
+    if moving.all():
+        return yaw
+    place = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))
+    last = np.maximum.accumulate(np.where(moving, place, -1), axis=0)
+    held = np.where(last >= 0, last, np.argmax(moving, axis=0))
+    return np.where(moving.any(axis=0), np.take_along_axis(yaw, held, axis=0), 0.0)

@@ -45,7 +45,7 @@ class Approaches:
 
 
 def closest_approaches(
-    own_at: Callable[[FloatArray], Any],
+    own_at: Callable[[IntArray, FloatArray], Any],
     targets_at: Callable[[IntArray, FloatArray], Any],
     times: SampleTimes,
     *,
@@ -58,7 +58,7 @@ def closest_approaches(
     Parameters
     ----------
     own_at : callable
-        State of the ownship at times (n,).
+        States of the ownships of targets (n,) of int, each at a time (n,) of its own.
     targets_at : callable
         States of targets (n,) of int, each at a time (n,) of its own.
     times : SampleTimes
@@ -87,7 +87,7 @@ def closest_approaches(
             target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
         middle = (first + last) // 2
         time_s = times.at(target, middle)
-        range_m, there = _apart(own_at(time_s), targets_at(target, time_s))
+        range_m, there = _apart(own_at(target, time_s), targets_at(target, time_s))
         _improve(best, target[there], time_s[there], range_m[there])
         away_s = np.maximum(time_s - times.at(target, first), times.at(target, last) - time_s)
         nearest_m = range_m - closing[target] * away_s - _RANGE_MARGIN_M

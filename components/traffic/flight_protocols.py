@@ -19,14 +19,18 @@ class Trajectory(Protocol):
         """Return its state at some times."""
 
 
-class Fleet(Protocol):
+class EachFlight(Protocol):
+    """Flights that are asked each at times of its own."""
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of aircraft (n,), each at a time (n,) of its own."""
+
+
+class Fleet(EachFlight, Protocol):
     """The flights of many aircraft."""
 
     def at(self, time_s: Any) -> TrajectoryState:
         """Return their states, shape (times, aircraft)."""
-
-    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of aircraft (n,), each at a time (n,) of its own."""
 
     def subset(self, columns: IntArray) -> "Fleet":
         """Return the flights of some of them, given by their indices, ascending."""

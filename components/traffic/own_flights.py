@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
-from components.traffic.flight_protocols import Fleet
+from components.traffic.flight_protocols import EachFlight
 from components.traffic.leg_table import LegTable
-from components.traffic.steered_flight import AROUND_S, flown_from
+from components.traffic.legs import ScriptedTrajectory
+from components.traffic.steered_flight import AROUND_S, SteeredFlight, flown_from
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -22,12 +22,12 @@ class OwnFlights:
 
     Parameters
     ----------
-    flights : Fleet
+    flights : EachFlight
         What each of them flies until its first manoeuvre.
     count : int
     """
 
-    def __init__(self, flights: Fleet, count: int) -> None:
+    def __init__(self, flights: EachFlight, count: int) -> None:
         self._flights = flights
         #: Of each ownship: when its parts begin, in order, and which they are.
         self._start_s = np.full((count, 1), np.inf)
@@ -35,7 +35,37 @@ class OwnFlights:
         #: How many parts each of them has.
         self.count = np.zeros(count, dtype=np.int64)
         self._parts: LegTable | None = None
-        self._made = 0
+        self._flown: list[ScriptedTrajectory] = []
+
+    @classmethod
+    def of(cls, steered: Sequence[SteeredFlight], flights: EachFlight) -> OwnFlights:
+        """Return flights that were steered before.
+
+        Parameters
+        ----------
+        steered : sequence of SteeredFlight
+        flights : EachFlight
+            What each of them flew until its first manoeuvre.
+        """
+        made = cls(flights, len(steered))
+        parts = [flight.parts for flight in steered]
+        made.count[:] = [len(of_one) for of_one in parts]
+        made._flown = [flight for of_one in parts for _, flight in of_one]
+        if made._flown:
+            made._parts = LegTable(made._flown)
+        room = len(steered), int(made.count.max(initial=0)) + 1
+        made._start_s, made._part = np.full(room, np.inf), np.zeros(room, dtype=np.int64)
+        there = np.arange(room[1]) < made.count[:, np.newaxis]
+        made._start_s[there] = [start_s for of_one in parts for start_s, _ in of_one]
+        made._part[there] = np.arange(len(made._flown))
+        return made
+
+    def parts_of(self, ownship: int) -> tuple[tuple[float, ScriptedTrajectory], ...]:
+        """Return what an ownship flies after each of its manoeuvres, and from when on, s."""
+        columns = range(int(self.count[ownship]))
+        return tuple(
+            (float(self._start_s[ownship, k]), self._flown[self._part[ownship, k]]) for k in columns
+        )
 
     def each(
         self, ownship: IntArray, time_s: FloatArray, known: IntArray | None = None
@@ -83,10 +113,7 @@ class OwnFlights:
         around = self.each(
             np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
         ).reshaped((len(ownship), len(AROUND_S)))
-        new = [
-            flown_from("ownship", _row(around, row), at_s, manoeuvre)
-            for row, (at_s, manoeuvre) in enumerate(zip(time_s.tolist(), told, strict=True))
-        ]
+        new = flown_from("ownship", around, time_s, told)
         table = LegTable(new)
         self._parts = table if self._parts is None else LegTable.joined(self._parts, table)
         if int(self.count[ownship].max()) + 1 >= self._start_s.shape[1]:
@@ -95,10 +122,6 @@ class OwnFlights:
             self._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
         place = self.count[ownship]
         self._start_s[ownship, place] = time_s
-        self._part[ownship, place] = self._made + np.arange(len(new))
+        self._part[ownship, place] = len(self._flown) + np.arange(len(new))
         self.count[ownship] += 1
-        self._made += len(new)
-
-
-def _row(state: TrajectoryState, row: int) -> Any:
-    return TrajectoryState(*(values[row] for values in state.arrays()))
+        self._flown += new

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
@@ -68,3 +70,8 @@ def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, Flo
             f"{checked['time_s'][first - 1]}: times must strictly increase"
         )
     return checked
+
+
+def all_within_limits(columns: Mapping[str, FloatArray]) -> bool:
+    """Tell whether no value of any column, of any shape, is one that `checked_samples` refuses."""
+    return all(bool((np.abs(array) <= _LIMITS[name][0]).all()) for name, array in columns.items())

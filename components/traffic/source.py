@@ -285,7 +285,7 @@ class TrafficSource(SteeredOwnship):
         present_s = present_together_s(self.own, self.targets, end_s)
         for times in samples:
             closest_approaches(
-                self.own.at, self.fleet.each, times,
+                lambda _, time_s: self.own.at(time_s), self.fleet.each, times,
                 closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
             )  # fmt: skip
         return best

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,6 +13,7 @@ from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
 from components.traffic.legs import AnyLeg, Climb, ScriptedTrajectory, Straight, Turn
+from dsa_des.arrays.types import FloatArray
 
 # Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
 # place is right to 0.0625 m on the way, and exact at the end.
@@ -68,7 +71,8 @@ class SteeredFlight:
             the path's projection, and without acceleration upward. Speeds change steadily, each
             without the other.
         """
-        part = flown_from(self.name, self.at(time_s + AROUND_S), time_s, told)
+        around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
+        (part,) = flown_from(self.name, around, np.array([time_s]), [told])
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -92,34 +96,52 @@ class SteeredFlight:
 
 
 def flown_from(
-    name: str, around: TrajectoryState, time_s: float, told: Manoeuvre
-) -> ScriptedTrajectory:
-    """Return what is flown from a manoeuvre on.
+    name: str, around: TrajectoryState, time_s: FloatArray, told: Sequence[Manoeuvre]
+) -> list[ScriptedTrajectory]:
+    """Return what aircraft fly from a manoeuvre on.
 
     Parameters
     ----------
     name : str
+        Of all of them.
     around : TrajectoryState
-        Arrays (3,): where the aircraft would be without it, `AROUND_S` of the time.
-    time_s : float
-    told : Manoeuvre
+        Arrays (n, 3): where each would be without it, `AROUND_S` of its time.
+    time_s : (n,)
+    told : sequence of n Manoeuvre
     """
-    here = float(around.lat_deg[1]), float(around.lon_deg[1]), float(around.alt_m[1])
+    middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     # Ends of the chord seen from its middle, so that the track is the one there.
-    north, east, _ = line_of_sight_ned(
-        *here, around.lat_deg[[0, 2]], around.lon_deg[[0, 2]], around.alt_m[[0, 2]]
-    )
-    along_north, along_east = float(north[1] - north[0]), float(east[1] - east[0])
-    speed = math.hypot(along_north, along_east) / (2.0 * _BASE_S)
-    climb = 0.5 * float(around.alt_m[2] - around.alt_m[0]) / _BASE_S
+    ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
+    north, east, _ = line_of_sight_ned(*middle, *ends)
+    found = []
+    for row, (at_s, manoeuvre) in enumerate(zip(time_s.tolist(), told, strict=True)):
+        low, here, high = around.alt_m[row].tolist()
+        place = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
+        along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
+        climb_mps = 0.5 * (high - low) / _BASE_S
+        found.append(_flown_from(name, place, along, climb_mps, at_s, manoeuvre))
+    return found
+
+
+# A study's metrics fly again what its runs flew.
+@lru_cache(maxsize=4096)
+def _flown_from(
+    name: str,
+    place: tuple[float, float, float],
+    along_m: tuple[float, float],
+    climb_mps: float,
+    time_s: float,
+    told: Manoeuvre,
+) -> ScriptedTrajectory:
+    speed = math.hypot(*along_m) / (2.0 * _BASE_S)
     return ScriptedTrajectory(
         name,
-        lat_deg=here[0],
-        lon_deg=here[1],
-        alt_m=here[2],
-        heading_deg=math.degrees(math.atan2(along_east, along_north)),
+        lat_deg=place[0],
+        lon_deg=place[1],
+        alt_m=place[2],
+        heading_deg=math.degrees(math.atan2(along_m[1], along_m[0])),
         speed_mps=speed,
-        legs=_legs(told, here[2], speed, climb),
+        legs=_legs(told, place[2], speed, climb_mps),
         start_time_s=time_s,
     )
 

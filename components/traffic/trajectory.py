@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
+
 import numpy as np
 import numpy.typing as npt
 
-from components.geometry.ellipsoid import SEMI_MAJOR_AXIS_M, line_of_sight, radii_of_curvature
-from components.geometry.normals import FloatArray, Vector, local_axes, normal_to_degrees
+from components.geometry.ellipsoid import line_of_sight
+from components.geometry.normals import FloatArray, Vector
 from components.geometry.state import TrajectoryState
-from components.geometry.wrapping import wrap_difference_rad, wrap_heading_rad, wrap_longitude_deg
+from components.geometry.wrapping import wrap_heading_rad, wrap_longitude_deg
 from components.traffic.attitude_from_path import attitude_from_path, fit_path
-from components.traffic.sample_checks import checked_samples
+from components.traffic.sample_checks import all_within_limits, checked_samples
+from components.traffic.segments import evaluate_segments, fit_segments, locate
 
 __all__ = ["SampledTrajectory", "TrajectoryState", "evaluate_segments", "locate"]
-
-RAD_PER_DEG = np.pi / 180.0
-
-MOST_ACCELERATION_MPS2 = 20.0
-MISFIT_MPS = 0.5
-MISFIT_MPS2 = 1.0
-"""Measured velocities bend the path of a segment of duration dt only if the mean of the two lies
-within 0.5 m/s + 1 m/s²·dt of the segment's mean velocity (at constant acceleration they are
-equal) and the two differ by less than 20 m/s²·dt + 1 m/s. Real files hold worse, and a wrong
-velocity would bend a path that a straight line leaves good."""
-
-# Rows of the coefficient table: four cubics (normal x, y, z and altitude) and the attitude.
-_ALT, _LAT, _LON, _YAW, _YAW_RATE, _TURN_WITH_LON = 12, 16, 17, 18, 19, 20
-_PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 21, 22, 23, 24
-_ROWS = 25
-
 
 CELLS_AT_ONCE = 8192
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
@@ -124,8 +112,70 @@ class SampledTrajectory:
             for key, derived in zip(("yaw_rad", "pitch_rad", "roll_rad"), attitude, strict=True)
         )
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
-        self.coefficients = self._fit_segments()
+        self.coefficients = fit_segments(
+            self.sample_times_s,
+            (self.lat_deg, self.lon_deg, self.alt_m),
+            (self.yaw_rad, self.pitch_rad, self.roll_rad),
+            self.velocity_enu_mps,
+        )
         self.max_speed_mps = self._speed_bound()
+
+    @classmethod
+    def together(
+        cls,
+        names: Sequence[str],
+        time_s: FloatArray,
+        lat_deg: FloatArray,
+        lon_deg: FloatArray,
+        alt_m: FloatArray,
+    ) -> list[SampledTrajectory]:
+        """Return aircraft that are known at the same times, as each would be made alone.
+
+        Parameters
+        ----------
+        names : sequence of str
+        time_s : (n,)
+        lat_deg, lon_deg, alt_m : (n, aircraft)
+        """
+        found: list[SampledTrajectory] = []
+        width = max(1, CELLS_AT_ONCE // max(1, len(time_s)))
+        for first in range(0, len(names), width):
+            block = slice(first, first + width)
+            place = [np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)]
+            found += cls._alike(names[block], time_s, *place)
+        return found
+
+    @classmethod
+    def _alike(
+        cls,
+        names: Sequence[str],
+        time_s: FloatArray,
+        lat_deg: FloatArray,
+        lon_deg: FloatArray,
+        alt_m: FloatArray,
+    ) -> list[SampledTrajectory]:
+        one = cls(names[0], time_s, lat_deg[:, 0], lon_deg[:, 0], alt_m[:, 0])
+        columns = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m}
+        for number in range(1, len(names)) if not all_within_limits(columns) else ():
+            checked_samples(
+                names[number], time_s=time_s, **{k: v[:, number] for k, v in columns.items()}
+            )
+        place = (lat_deg, wrap_longitude_deg(lon_deg), alt_m)
+        yaw, pitch, roll = attitude_from_path(time_s, *place)
+        attitude = wrap_heading_rad(yaw), pitch, roll
+        tables = fit_segments(time_s, place, attitude)
+        rows = [np.ascontiguousarray(part.T) for part in (*place, *attitude)]
+        speeds = _mean_speed_bound(time_s, *place)
+        found = [one]
+        for number, name in enumerate(names[1:], start=1):
+            made = copy(one)
+            made.name = name
+            made.lat_deg, made.lon_deg, made.alt_m = (part[number] for part in rows[:3])
+            made.yaw_rad, made.pitch_rad, made.roll_rad = (part[number] for part in rows[3:])
+            made.coefficients = np.ascontiguousarray(tables[..., number])
+            made.max_speed_mps = float(speeds[number])
+            found.append(made)
+        return found
 
     def in_wind(self, east_mps: float, north_mps: float) -> SampledTrajectory:
         """Return the same flight with what was derived of its attitude derived with a wind."""
@@ -174,138 +224,28 @@ class SampledTrajectory:
         A cubic's velocity is a mix of its end velocities (weights adding up to 1 at most) and of
         1.5 times its mean velocity at most.
         """
-        if len(self.sample_times_s) < 2:
-            return 0.0
-        at = slice(None, -1), slice(1, None)
-        _, _, step_m = line_of_sight(
-            *(column[rows] for rows in at for column in (self.lat_deg, self.lon_deg, self.alt_m)),
-            validate=False,
-        )
-        # Chords are shorter than paths on the ground by far less than one per cent.
-        mean = 1.01 * float(np.max(step_m / np.diff(self.sample_times_s)))
-        if self.velocity_enu_mps is None:
+        place = self.lat_deg, self.lon_deg, self.alt_m
+        mean = float(_mean_speed_bound(self.sample_times_s, *place))
+        if self.velocity_enu_mps is None or len(self.sample_times_s) < 2:
             return mean
         east, north, up = self.velocity_enu_mps
         return 1.5 * mean + float(np.max(np.sqrt(east**2 + north**2 + up**2)))
 
-    def _fit_segments(self) -> FloatArray:
-        """Tabulate each segment's polynomials; the last sample is a segment of its own."""
-        n = len(self.sample_times_s)
-        table = np.zeros((_ROWS, n))
-        _, _, normal = local_axes(self.lat_deg, self.lon_deg)
-        start = (*normal, self.alt_m)
-        table[_LAT], table[_LON] = self.lat_deg, self.lon_deg
-        table[_YAW], table[_PITCH], table[_ROLL] = self.yaw_rad, self.pitch_rad, self.roll_rad
-        duration = np.diff(self.sample_times_s)
-        tangents = self._tangents(normal)
-        bent = None if tangents is None else self._bent_segments(start, tangents, duration)
-        for row, value in enumerate(start):
-            table[4 * row] = value
-            slope = np.diff(value) / duration
-            table[4 * row + 1, :-1] = slope
-            if tangents is not None and bent is not None:
-                m0, m1 = tangents[row][:-1], tangents[row][1:]
-                table[4 * row + 1, :-1] = np.where(bent, m0, slope)
-                second = (3.0 * slope - 2.0 * m0 - m1) / duration
-                third = (m0 + m1 - 2.0 * slope) / (duration * duration)
-                table[4 * row + 2, :-1] = np.where(bent, second, 0.0)
-                table[4 * row + 3, :-1] = np.where(bent, third, 0.0)
-        # Near a pole yaw turns with longitude, by a whole turn for a whole turn, so that it is
-        # yaw minus longitude (plus, in the south) that changes slowly and can be interpolated.
-        turn = np.where(np.abs(self.lat_deg) > 60.0, np.sign(self.lat_deg), 0.0)
-        lon_change = wrap_longitude_deg(np.diff(self.lon_deg)) * RAD_PER_DEG
-        yaw_change = wrap_difference_rad(np.diff(self.yaw_rad) - turn[:-1] * lon_change)
-        table[_YAW_RATE, :-1] = yaw_change / duration
-        table[_TURN_WITH_LON] = turn * RAD_PER_DEG
-        table[_PITCH_RATE, :-1] = np.diff(self.pitch_rad) / duration
-        table[_ROLL_RATE, :-1] = wrap_difference_rad(np.diff(self.roll_rad)) / duration
-        return table
 
-    def _tangents(self, normal: Vector) -> tuple[FloatArray, ...] | None:
-        """Rates of change of the normal's components and of altitude, from the velocity."""
-        if self.velocity_enu_mps is None:
-            return None
-        east, north, _ = local_axes(self.lat_deg, self.lon_deg)
-        meridian, prime_vertical = radii_of_curvature(self.lat_deg)
-        v_east, v_north, v_up = self.velocity_enu_mps
-        turn_east = v_east / (prime_vertical + self.alt_m)
-        turn_north = v_north / (meridian + self.alt_m)
-        rates = (turn_east * e + turn_north * n for e, n in zip(east, north, strict=True))
-        return (*rates, v_up)
-
-    @staticmethod
-    def _bent_segments(
-        start: tuple[FloatArray, ...], tangents: tuple[FloatArray, ...], duration: FloatArray
-    ) -> npt.NDArray[np.bool_]:
-        """Tell which segments' end velocities are plausible beside their mean velocity."""
-        misfit, change = np.zeros(len(duration)), np.zeros(len(duration))
-        for row, (value, tangent) in enumerate(zip(start, tangents, strict=True)):
-            to_metres = 1.0 if row == 3 else SEMI_MAJOR_AXIS_M
-            mean = 0.5 * (tangent[1:] + tangent[:-1])
-            misfit += (to_metres * (np.diff(value) / duration - mean)) ** 2
-            change += (to_metres * np.diff(tangent)) ** 2
-        fits = misfit <= (MISFIT_MPS + MISFIT_MPS2 * duration) ** 2
-        return fits & (change <= (MOST_ACCELERATION_MPS2 * duration + 1.0) ** 2)
-
-
-def locate(
-    sample_times: FloatArray, times: FloatArray
-) -> tuple[npt.NDArray[np.intp], FloatArray, npt.NDArray[np.bool_]]:
-    """Find each time's segment and the time elapsed in it.
-
-    Parameters
-    ----------
-    sample_times : ndarray, shape (n,)
-        Strictly increasing.
-    times : ndarray, shape (m,)
-        Any order.
-
-    Returns
-    -------
-    segment : ndarray of int
-        0 … n - 1; times outside are moved to the nearest sample.
-    elapsed_s : ndarray
-        Since the segment's sample.
-    present : ndarray of bool
-        Within the first and last samples, both included.
-    """
-    present = (times >= sample_times[0]) & (times <= sample_times[-1])
-    inside = np.where(times > sample_times[0], times, sample_times[0])
-    inside = np.where(inside < sample_times[-1], inside, sample_times[-1])
-    segment = np.searchsorted(sample_times, inside, side="right") - 1
-    return segment, inside - sample_times[segment], present
-
-
-def evaluate_segments(
-    table: FloatArray, elapsed: FloatArray, present: npt.NDArray[np.bool_]
-) -> TrajectoryState:
-    """Evaluate gathered segments, element by element.
-
-    Parameters
-    ----------
-    table : ndarray, shape (25, m)
-        Columns of `SampledTrajectory.coefficients`, one per element.
-    elapsed, present : ndarray, shape (m,)
-        From `locate`.
-
-    Returns
-    -------
-    TrajectoryState
-        Arrays of shape (m,).
-    """
-    x, y, z, alt = (
-        ((table[r + 3] * elapsed + table[r + 2]) * elapsed + table[r + 1]) * elapsed + table[r]
-        for r in (0, 4, 8, _ALT)
+def _mean_speed_bound(
+    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
+) -> FloatArray:
+    """Return what no mean speed between two samples exceeds, of one aircraft or of several."""
+    if len(time_s) < 2:
+        return np.zeros(lat_deg.shape[1:])
+    at = slice(None, -1), slice(1, None)
+    _, _, step_m = line_of_sight(
+        *(column[rows] for rows in at for column in (lat_deg, lon_deg, alt_m)), validate=False
     )
-    lat, lon = normal_to_degrees(x, y, z)
-    at_sample = elapsed == 0.0
-    lat = np.where(at_sample, table[_LAT], lat)
-    lon = np.where(at_sample, table[_LON], lon)
-    yaw = table[_YAW] + table[_YAW_RATE] * elapsed
-    yaw += table[_TURN_WITH_LON] * wrap_longitude_deg(lon - table[_LON])
-    pitch = table[_PITCH] + table[_PITCH_RATE] * elapsed
-    roll = table[_ROLL] + table[_ROLL_RATE] * elapsed
-    return TrajectoryState(lat, lon, alt, wrap_heading_rad(yaw), pitch, roll, present)
+    duration = np.diff(time_s).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
+    # Chords are shorter than paths on the ground by far less than one per cent.
+    bound: FloatArray = 1.01 * np.max(step_m / duration, axis=0)
+    return bound
 
 
 def _agrees_with_path(measured: Vector, fitted: Vector) -> bool:

@@ -11,7 +11,8 @@ from dsa_des.text.safe_text import printable
 _PACKAGE = "components.view"
 #: The program's parts, in the order in which they need each other.
 SCRIPTS = (
-    "data.js", "symbols.js", "plan.js", "altitude.js", "timeline.js", "table.js", "app.js",
+    "data.js", "symbols.js", "labels.js", "plan.js", "altitude.js", "timeline.js", "table.js",
+    "app.js",
 )  # fmt: skip
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
 from components.messages.guidance_bands import BAND_REGIONS
-from components.sensor.marks import EO, IR, RADAR
 from components.view.picture import RunPicture, TangentPlane
+from components.view.sensor_marks import sensor_marks
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.mark import NEUTRAL
+from dsa_des.block.mark import Mark
 from dsa_des.errors import UsageError
 
 _NO_TARGET = -1
@@ -53,7 +53,9 @@ def run_picture(folder: Path) -> RunPicture:
         targets=names,
     )
     sensors = sorted(set(_text(found["scans"]["block"])) | set(_text(detections["block"])))
-    picture.sensors = [_sensor(name, scene) for name in sensors]
+    blocks = {name: scene.get("blocks", {}).get(name, {}) for name in sensors}
+    marks = sensor_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
+    picture.sensors = [_sensor(name, blocks[name], marks[name]) for name in sensors]
     targets = {name: place for place, name in enumerate(names)}
     picture.tables["own"] = _own_columns(own, plane)
     if "truth" in found:
@@ -175,15 +177,8 @@ def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in facts.items() if value not in (None, "")}
 
 
-def _sensor(name: str, scene: dict[str, Any]) -> dict[str, Any]:
+def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     """Return how a sensor is shown, and its field of view as far as the scene says it."""
-    block = scene.get("blocks", {}).get(name, {})
-    kind = str(block.get("type", ""))
-    mark = NEUTRAL[0]
-    for start, own in (("radar", RADAR), ("optical.ir", IR), ("optical", EO)):
-        if kind.startswith(start):
-            mark = own
-            break
     found: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
     limits = block.get("azimuth_deg")
     if isinstance(limits, list) and len(limits) == 2:

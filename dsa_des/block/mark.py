@@ -43,16 +43,28 @@ def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
     classes : mapping
         Name → class, which may have a `Mark` as its ``mark``; None for a name that is no block.
     """
+    own = {name: getattr(cls, "mark", None) for name, cls in classes.items()}
+    return told_apart({n: mark if isinstance(mark, Mark) else None for n, mark in own.items()})
+
+
+def told_apart(kinds: Mapping[str, Mark | None]) -> dict[str, Mark]:
+    """Return name → mark, in order of the names: of one kind the same colour, other markers.
+
+    Parameters
+    ----------
+    kinds : mapping
+        Name → mark of its kind; None where it has none.
+    """
     found: dict[str, Mark] = {}
-    kinds: dict[Mark, int] = {}
+    before: dict[Mark, int] = {}
     unknown = 0
-    for name in sorted(classes):
-        own = getattr(classes[name], "mark", None)
-        if not isinstance(own, Mark):
+    for name in sorted(kinds):
+        own = kinds[name]
+        if own is None:
             found[name] = NEUTRAL[unknown % len(NEUTRAL)]
             unknown += 1
             continue
-        again = kinds.get(own, 0)
-        kinds[own] = again + 1
+        again = before.get(own, 0)
+        before[own] = again + 1
         found[name] = replace(own, marker=_FURTHER[(again - 1) % len(_FURTHER)]) if again else own
     return found

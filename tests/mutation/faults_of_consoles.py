@@ -183,4 +183,9 @@ FAULTS = [
         ("decision-at-the-scan-before-it", "self._ticks[first : self._next])]",
          'self._ticks[first : self._next], side="right") - 1]'),
     ),
+    *in_file(
+        _GROUP, "components/view/sensor_marks.py", "view/test_page.py",
+        ("sensors-of-a-kind-alike", "_SHADES[again % len(_SHADES)]", "_SHADES[0]"),
+        ("shades-that-fade-into-their-ground", "< _LIGHT else -1)", "< _LIGHT else 1)"),
+    ),
 ]  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from components.metrics.flights_together import first_losses_s, nearest_of, ways_of
 from components.metrics.separation import Separation, closest, first_inside, separations
 from components.metrics.track_quality import _ramp_quantiles
 from components.well_clear.volume import PRESETS
@@ -160,6 +161,28 @@ def test_encounter_head_on(small: Path) -> None:
     lost, collision = first_inside(flight, WELL_CLEAR_M, NMAC_M)
     assert lost == pytest.approx((5000 - np.sqrt(609.6**2 - 100**2)) / 110, abs=0.15)
     assert collision > lost
+
+
+def test_flights_together_are_as_each_alone(small: Path) -> None:
+    """Runs of other lengths and starts: the nearest of all times, and the begin of a loss."""
+    flights = []
+    for k, (north_m, until_s) in enumerate([(5000, 60), (4321.5, 48.37), (900, 20), (-3000, 35)]):
+        sets = (f"blocks.traffic.intruders[0].north_m={north_m}",)
+        scene = load_scene("small.toml", sets=sets, duration_s=until_s)
+        flights += separations(scene, None if k < 3 else 0.5)
+    range_m, time_s = nearest_of(flights)
+    alone = [closest(flight)[:2] for flight in flights]
+    assert list(zip(range_m.tolist(), time_s.tolist(), strict=True)) == alone
+    found = first_losses_s(flights, WELL_CLEAR_M, NMAC_M)
+    for flight, (lost_s, _) in zip(flights[:3], found.tolist(), strict=False):
+        times = np.arange(0.0, flight.end_s, 1e-3)
+        apart = flight.at(times)
+        inside = (apart.horizontal_m < WELL_CLEAR_M[0]) & (apart.vertical_m < WELL_CLEAR_M[1])
+        assert lost_s == pytest.approx(times[np.argmax(inside)], abs=2e-3)
+    assert np.isnan(found[3]).all()
+    own, target = ways_of(flights, np.minimum(time_s, 10.0), 0.5)
+    assert np.hypot(*own) == pytest.approx([50, 50, 50, 25], rel=1e-3)  # the last at time 0
+    assert np.hypot(*target) == pytest.approx([60, 60, 60, 30], rel=1e-3)
 
 
 def test_distances_of_f3442_are_exclusive() -> None:

@@ -34,7 +34,7 @@ def found(own, targets, fleet, samples, end_s):
     best = None
     for times in samples:
         best = closest_approaches(
-            own.at, fleet.each, times,
+            lambda _, time_s: own.at(time_s), fleet.each, times,
             closing_speed_mps=np.array([t.max_speed_mps + own.max_speed_mps for t in targets]),
             present_s=(np.maximum(there[:, 0], 0.0), np.minimum(there[:, 1], end_s)), best=best,
         )  # fmt: skip

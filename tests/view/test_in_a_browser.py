@@ -3,6 +3,7 @@
 Left out by name where Playwright's Python package or a Chromium is missing.
 """
 
+import itertools
 import shutil
 
 import numpy as np
@@ -13,7 +14,7 @@ from click.testing import CliRunner
 import dsa_des
 from components.examples import folder
 from components.view.command import view
-from tests.view.test_page import SCENE
+from tests.view.test_page import SCENE, luminance
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -170,12 +171,6 @@ def test_words_stand_out_from_their_ground(browser, recorded, scheme):
     context.close()
 
 
-def luminance(colour):
-    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
-    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
-
-
 def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
     scene = tmp_path / "scene.toml"
     swept = "scan_rate_hz = 2\nbeam_sweep = true\nazimuth_deg = [-100, 120]"
@@ -190,4 +185,31 @@ def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
         opened.evaluate("t => App.seek(t)", row["illuminated_s"])
         (beam,) = opened.evaluate("App.state().beams")
         assert beam["azimuth_deg"] == pytest.approx(np.degrees(row["azimuth_rad"]), abs=1.5)
+    opened.close()
+
+
+def test_names_of_a_swarm_do_not_cover_each_other(browser, tmp_path):
+    text = SCENE.format(title="t", name="swarm 0")
+    first = text[text.index("[[blocks.traffic.intruders]]") :]
+    for number in range(1, 8):
+        moved = first.replace("north_m = -3500", f"north_m = {-3500 + 15 * number}")
+        text += moved.replace("swarm 0", f"swarm {number}")
+    text += first.replace("swarm 0", "alone").replace("east_m = -2500", "east_m = 1500")
+    (tmp_path / "scene.toml").write_text(text)
+    dsa_des.run(dsa_des.load_scene(tmp_path / "scene.toml"), out=tmp_path / "run")
+    assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
+    opened = browser.new_page()
+    opened.goto(f"file://{tmp_path / 'run.html'}#t=3.1")
+    boxes = opened.evaluate("App.state().labels")
+    assert {f"swarm {k}" for k in range(8)} | {"alone"} == {box["words"] for box in boxes}
+    for one, other in itertools.combinations(boxes, 2):
+        beside = one["left"] >= other["right"] or other["left"] >= one["right"]
+        assert beside or one["top"] >= other["low"] or other["top"] >= one["low"], (one, other)
+    # Who has room keeps to its place: the track's name above, the target's below.
+    x, y = opened.evaluate(
+        "(() => { const at = Data.truths(3.1).find(one => Data.targets[one.target] === 'alone');"
+        " return Plan.place(at.east, at.north); })()"
+    )
+    (box,) = [box for box in boxes if box["words"] == "alone" and box["low"] > y]
+    assert (box["left"], box["low"]) == pytest.approx((x + 7.0, y + 15.0))
     opened.close()

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import itertools
 import json
 import math
 import re
@@ -13,7 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
+from components.sensor import marks
 from components.view.command import view
+from components.view.sensor_marks import sensor_marks
 
 HOSTILE = '</script><script>alert(1)</script>{{script}} & "q"'
 SCENE = """
@@ -117,6 +120,32 @@ def test_scans_fields_of_view_and_tracks_are_there(run):
     assert radar["range_m"] == 15000 and radar["colour"] == "#D55E00"
     assert len(radar["azimuth_deg"]) == 2 and sum(radar["azimuth_deg"]) == pytest.approx(20)
     assert (tables["tracks"]["target"] == 0).all()
+
+
+def test_sensors_of_one_kind_differ_in_marker_and_shade():
+    """The lines and scans of a sensor have no marker; three shades of a colour are told apart."""
+    types = {f"radar{k}": "radar.swerling" for k in range(3)}
+    types |= {"eo0": "optical.eo", "eo1": "optical.projection", "my": "a:B",
+              "ir0": "optical.ir", "ir1": "optical.ir"}  # fmt: skip
+    found = sensor_marks(types)
+    assert [found[name].colour for name in ("radar0", "eo0", "ir0")] == [
+        marks.RADAR.colour, marks.EO.colour, marks.IR.colour
+    ]  # fmt: skip
+    assert found["ir0"].marker == marks.IR.marker
+    for kind in (("radar0", "radar1", "radar2"), ("eo0", "eo1"), ("ir0", "ir1")):
+        assert len({found[name].marker for name in kind}) == len(kind)
+        levels = sorted(luminance(found[name].colour) for name in kind)
+        assert all((b + 0.05) / (a + 0.05) > 1.6 for a, b in itertools.pairwise(levels))
+    # All stand out from both grounds.
+    for mark in found.values():
+        assert 0.05 < luminance(mark.colour) < 0.45, mark
+
+
+def luminance(colour):
+    """Relative luminance of sRGB, by WCAG 2.2."""
+    parts = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    linear = np.where(parts > 0.04045, ((parts + 0.055) / 1.055) ** 2.4, parts / 12.92)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
 
 
 def test_text_of_the_run_carries_no_markup(run):

@@ -1,4 +1,4 @@
-"""Spans inside a cylinder of flights that are curved, against roots of their own equations."""
+"""Times at which curved flights come into a cylinder, against roots of their own equations."""
 
 import math
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from components.well_clear.curved_flights import FINEST_S, cylinder_spans
+from components.well_clear.curved_flights import FINEST_S, first_inside_cylinder
 
 D_M, Z_M = 610.0, 76.0
 
 
-def weaving(phase, tilt, seed=0):
+def weaving(phase, tilt):
     """Distances that go up and down, and a bound on how fast."""
 
     def apart(time_s):
@@ -22,33 +22,55 @@ def weaving(phase, tilt, seed=0):
     return apart, 700.0 * 0.11 + abs(tilt) + 120.0 * 0.07
 
 
-def roots(apart, end_s):
-    """Begins and ends by sign changes on a grid of 5 ms, each found to 1e-12."""
+def first_of(apart, begin_s, end_s, fastest, across_m=D_M):
+    """The one found for a single pair."""
+    between = np.array([begin_s]), np.array([end_s])
+    speeds = np.array([fastest])
+    return first_inside_cylinder(lambda _, t: apart(t), between, speeds, across_m, Z_M)[0]
+
+
+def root(apart, begin_s, end_s):
+    """By a change of sign on a grid of 5 ms, found to 1e-12; NaN without one."""
 
     def margin(t):
         across, high = apart(np.array([t]))
         return max(float(across[0]) - D_M, float(high[0]) - Z_M)
 
-    times = np.linspace(0.0, end_s, 1 + round(end_s / 0.005))
+    times = np.append(np.arange(begin_s, end_s, 0.005), end_s)
     across, high = apart(times)
-    inside = np.maximum(across - D_M, high - Z_M) < 0.0
-    edges = [0.0] if inside[0] else []
-    for k in np.flatnonzero(inside[1:] != inside[:-1]):
-        edges.append(brentq(margin, times[k], times[k + 1], xtol=1e-12))
-    edges += [end_s] if inside[-1] else []
-    return np.array(edges).reshape(-1, 2)
+    inside = np.flatnonzero(np.maximum(across - D_M, high - Z_M) < 0.0)
+    if not len(inside):
+        return math.nan
+    first = inside[0]
+    return brentq(margin, times[first - 1], times[first], xtol=1e-12) if first else begin_s
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.7, 2.9])
-@pytest.mark.parametrize("tilt", [-6.0, 0.0, 4.0])
-def test_begins_and_ends_are_within_the_bound(phase, tilt):
-    apart, fastest = weaving(phase, tilt)
-    wanted = roots(apart, 150.0)
-    found = cylinder_spans(apart, (0.0, 150.0), fastest, D_M, Z_M)
-    assert len(wanted) >= 1 and found.shape == wanted.shape
-    assert np.abs(found - wanted).max() <= FINEST_S
-    first = cylinder_spans(apart, (0.0, 150.0), fastest, D_M, Z_M, first_only=True)
-    assert first[0, 0] == pytest.approx(found[0, 0], abs=FINEST_S)
+def test_begins_of_many_pairs_are_within_the_bound():
+    """More pairs than are looked at together; some never come inside, some have no time."""
+    rng = np.random.default_rng(4)
+    each = [weaving(*some) for some in rng.uniform([0, -6], [3, 9], (140, 2))]
+    begin_s, end_s = rng.uniform(0.0, 40.0, 140), rng.uniform(42.0, 150.0, 140)
+    end_s[7] = begin_s[7] - 0.1
+
+    def apart(pair, time_s):
+        found = np.empty((2, len(pair)))
+        for number in set(pair.tolist()):
+            mine = pair == number
+            found[:, mine] = each[number][0](time_s[mine])
+        return found
+
+    fastest = np.array([speed for _, speed in each])
+    first = first_inside_cylinder(apart, (begin_s, end_s), fastest, D_M, Z_M)
+    assert np.isnan(first[7])
+    wanted = np.array([
+        root(alone, b, e) if e > b else math.nan
+        for (alone, _), b, e in zip(each, begin_s.tolist(), end_s.tolist(), strict=True)
+    ])  # fmt: skip
+    assert 5 < np.isnan(wanted).sum() < 100
+    assert (np.isnan(wanted) == np.isnan(first)).all()
+    assert np.nanmax(np.abs(first - wanted)) <= FINEST_S
+    (alone, speed) = each[139]
+    assert first[139] == first_of(alone, begin_s[139], end_s[139], speed)
 
 
 def test_a_pass_between_two_samples_is_found():
@@ -60,8 +82,7 @@ def test_a_pass_between_two_samples_is_found():
 
     times = np.arange(0.0, 100.0, 0.1)
     assert (apart(times)[0] >= D_M).all()
-    found = cylinder_spans(apart, (0.0, 100.0), speed, D_M, Z_M)
-    assert found == pytest.approx(np.array([[33.33, 33.37]]), abs=FINEST_S)
+    assert first_of(apart, 0.0, 100.0, speed) == pytest.approx(33.33, abs=FINEST_S)
 
 
 def test_who_stays_on_the_edge_is_outside_and_ends():
@@ -71,15 +92,13 @@ def test_who_stays_on_the_edge_is_outside_and_ends():
         calls.append(len(time_s))
         return np.full(len(time_s), D_M), np.zeros(len(time_s))
 
-    assert len(cylinder_spans(apart, (0.0, 3600.0), 150.0, D_M, Z_M)) == 0
+    assert math.isnan(first_of(apart, 0.0, 3600.0, 150.0))
     assert sum(calls) < 500_000
 
 
-def test_both_sizes_count_and_no_time_is_no_span():
+def test_both_sizes_count():
     def apart(time_s):
         return np.full(len(time_s), 100.0), np.abs(100.0 - time_s)
 
-    found = cylinder_spans(apart, (0.0, 300.0), 1.0, D_M, Z_M)
-    assert found == pytest.approx(np.array([[24.0, 176.0]]), abs=FINEST_S)
-    assert len(cylinder_spans(apart, (0.0, 300.0), 1.0, 99.0, Z_M)) == 0
-    assert len(cylinder_spans(apart, (5.0, 4.0), 1.0, D_M, Z_M)) == 0
+    assert first_of(apart, 0.0, 300.0, 1.0) == pytest.approx(24.0, abs=FINEST_S)
+    assert math.isnan(first_of(apart, 0.0, 300.0, 1.0, 99.0))

@@ -99,24 +99,29 @@ const App = (() => {
     if (parts.get("up") === "heading" && !options.headingUp) turnUp();
   }
 
-  function layer(text, on, change, colour) {
+  // A sensor's marker as it stands on the plan; its colour holds in both themes.
+  function swatch(sensor) {
+    const canvas = document.createElement("canvas");
+    canvas.className = "swatch";
+    canvas.width = canvas.height = 32;
+    const c = canvas.getContext("2d");
+    c.scale(2, 2);
+    Symbols.mark(c, sensor.marker, 8, 8, 6, sensor.colour, true);
+    return canvas;
+  }
+  function layer(text, on, change, sensor) {
     const label = document.createElement("label");
     const box = document.createElement("input");
     box.type = "checkbox";
     box.checked = on;
     box.addEventListener("change", () => { change(box.checked); state.dirty = true; });
     label.appendChild(box);
-    if (colour) {
-      const swatch = document.createElement("span");
-      swatch.className = "swatch";
-      swatch.style.background = colour;
-      label.appendChild(swatch);
-    }
+    if (sensor) label.appendChild(swatch(sensor));
     label.appendChild(document.createTextNode(text));
     get("layers").appendChild(label);
   }
   Data.sensors.forEach((sensor, number) => layer(sensor.name, true,
-    (on) => options.sensors[on ? "add" : "delete"](number), sensor.colour));
+    (on) => options.sensors[on ? "add" : "delete"](number), sensor));
   if (Data.tables.tracks) layer("tracks", true, (on) => { options.tracks = on; });
   if (Data.tables.truth) layer("truth", true, (on) => { options.truth = on; });
   if (Data.tables.bands) layer("bands", true, (on) => { options.bands = on; });

@@ -6,8 +6,11 @@ const Canvas = (() => {
     return Object.fromEntries(
       names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
-  function text(c, words, x, y, colour, align = "left", size = 12) {
+  function font(c, size = 12) {
     c.font = `${size}px system-ui, sans-serif`;
+  }
+  function text(c, words, x, y, colour, align = "left", size = 12) {
+    font(c, size);
     c.textAlign = align;
     c.fillStyle = colour;
     c.fillText(words, x, y);
@@ -26,5 +29,5 @@ const Canvas = (() => {
     c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
     return c;
   }
-  return { theme, text, ready };
+  return { theme, font, text, ready };
 })();

@@ -27,7 +27,7 @@ const Plan = (() => {
       c.arc(x, y, (i * step) / view.perPixel, 0, 2 * Math.PI);
       c.stroke();
       const km = (i * step) / 1000;
-      Canvas.text(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
+      Labels.keep(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
         y - (i * step) / view.perPixel - 3, Symbols.colours.faint);
     }
   }
@@ -113,7 +113,7 @@ const Plan = (() => {
         const [u, v] = place(one.east + 10 * one.rate[0], one.north + 10 * one.rate[1]);
         c.moveTo(x, y); c.lineTo(u, v);
       }
-      if (few) Canvas.text(c, Data.targets[one.target], x + 7, y + 12, Symbols.colours.faint);
+      if (few) Labels.add(Data.targets[one.target], x, y, 7, 12, Symbols.colours.faint);
     }
     c.stroke();
   }
@@ -173,7 +173,7 @@ const Plan = (() => {
     c.setLineDash([8, 4]);
     c.beginPath(); c.moveTo(x, y); c.lineTo(u, v); c.stroke();
     c.setLineDash([]);
-    Canvas.text(c, label, p + 6, q, Symbols.colours.track);
+    Labels.add(label, p, q, 6, 0, Symbols.colours.track);
   }
 
   function tracks(c, t, drawn) {
@@ -206,7 +206,7 @@ const Plan = (() => {
         path.moveTo(x, y);
         path.lineTo(u, v);
       }
-      if (few) Canvas.text(c, label, x + 10, y - 6, Symbols.colours.track);
+      if (few) Labels.add(label, x, y, 10, -6, Symbols.colours.track);
     }
     c.stroke(sure);
     c.setLineDash([3, 3]);
@@ -228,7 +228,7 @@ const Plan = (() => {
       c.strokeStyle = Symbols.level(a.level[i]);
       c.lineWidth = 1 + a.level[i];
       c.beginPath(); c.arc(x, y, 14, 0, 2 * Math.PI); c.stroke();
-      Canvas.text(c, `alert ${a.level[i]}`, x + 17, y - 7, Symbols.level(a.level[i]));
+      Labels.add(`alert ${a.level[i]}`, x, y, 17, -7, Symbols.level(a.level[i]));
     }
   }
   function lastSeen(target, t) {
@@ -259,6 +259,7 @@ const Plan = (() => {
     detections(c, t, options, drawn);
     if (options.tracks) tracks(c, t, drawn);
     alerts(c, t, drawn);
+    drawn.labels = Labels.draw(c);
     const [x, y] = place(own.east, own.north);
     Symbols.aircraft(c, x, y, own.heading - view.turn, 11, Symbols.colours.own);
     drawn.own = own;

@@ -12,7 +12,6 @@ const Symbols = (() => {
     return colours[`level${Math.min(Math.max(number, 1), 3)}`];
   }
 
-  // Markers are added to the path at a place; many of one kind are drawn at once.
   // Regions of guidance, by their number: colour and words.
   const REGIONS = ["none", "far", "mid", "near", "recovery", "unknown"];
   function region(number) {
@@ -21,6 +20,7 @@ const Symbols = (() => {
     return { name, colour: level(number), dash: [] };
   }
 
+  // Markers are added to the path at a place; many of one kind are drawn at once.
   const paths = {
     o: (c, x, y, r) => { c.moveTo(x + r, y); c.arc(x, y, r, 0, 2 * Math.PI); },
     s: (c, x, y, r) => c.rect(x - 0.85 * r, y - 0.85 * r, 1.7 * r, 1.7 * r),
@@ -33,11 +33,21 @@ const Symbols = (() => {
     p: (c, x, y, r) => polygon(c, x, y, r, 5, 0),
     h: (c, x, y, r) => polygon(c, x, y, r, 6, 0),
     8: (c, x, y, r) => polygon(c, x, y, r, 8, Math.PI / 8),
+    "*": (c, x, y, r) => star(c, x, y, r, 5, 0.4, 0),
+    P: (c, x, y, r) => star(c, x, y, r, 4, 0.35, 0),
+    X: (c, x, y, r) => star(c, x, y, r, 4, 0.35, Math.PI / 4),
   };
   function polygon(c, x, y, r, corners, turn) {
     for (let i = 0; i < corners; i++) {
       const angle = turn + (2 * Math.PI * i) / corners;
       c[i ? "lineTo" : "moveTo"](x + r * Math.sin(angle), y - r * Math.cos(angle));
+    }
+    c.closePath();
+  }
+  function star(c, x, y, r, points, inner, turn) {
+    for (let i = 0; i < 2 * points; i++) {
+      const angle = turn + (Math.PI * i) / points, far = i % 2 ? inner * r : r;
+      c[i ? "lineTo" : "moveTo"](x + far * Math.sin(angle), y - far * Math.cos(angle));
     }
     c.closePath();
   }
