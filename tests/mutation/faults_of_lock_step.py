@@ -14,6 +14,22 @@ FAULTS = [
     ),
     *in_file(
         _GROUP,
+        "components/track_fusion/covariance_intersection.py",
+        (_TOGETHER,),
+        (
+            "newest-of-any-replica",
+            "newest[replica])",
+            "newest.max())",
+        ),
+        (
+            "tracks-of-others-are-let-go",
+            "LocalTracks.joined([self._local.take(others), local])",
+            "local",
+        ),
+    ),
+    ),
+    *in_file(
+        _GROUP,
         "components/sensor/declaration_rule.py",
         (_TOGETHER,),
         (

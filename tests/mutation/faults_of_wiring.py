@@ -635,7 +635,7 @@ FAULTS = [
          "late = new.time_s[order] < np.inf"),
         ("bearing-rate-in-degrees", "math.radians(self.p.bearing_rate_deg_s)",
          "self.p.bearing_rate_deg_s"),
-        ("frame-of-any-track", "if row[entry] < first[place]:", "if True:"),
+        ("frame-of-any-track", "sooner = row[entries] < first[of]", "sooner = row[entries] >= 0"),
     ),
     *in_file(
         _GROUP, "components/track_fusion/matching.py", _FUSED,
