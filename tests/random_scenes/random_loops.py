@@ -3,6 +3,7 @@
 from typing import Any
 
 from dice import Dice
+from random_blocks import closest_approach_passed
 
 from dsa_des.replicas.replicas import Replica
 
@@ -57,6 +58,10 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
     _what_remembers(dice, blocks)
     if blocks.get("fusion"):
         wires = _more_of_tracks(dice, blocks, wires)
+    if dice.chance(0.4, "ends early"):
+        blocks["over"] = closest_approach_passed(dice)
+        wires.append({"from": "traffic", "to": "over", **dice.pick({}, {}, {"delay_s": 0.3})})
+        dice.features |= {f"{name} of ending" for name in wires[-1] if name == "delay_s"}
     return {
         **_sections(dice),
         "extends": f"{root}/configs/detect_and_sense.toml", "duration_s": dice.pick(15, 22),
