@@ -27,7 +27,6 @@ FAULTS = [
             "local",
         ),
     ),
-    ),
     *in_file(
         _GROUP,
         "components/sensor/declaration_rule.py",
