@@ -35,6 +35,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.randomness import Streams
+from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
 __all__ = ["NotInLockStep", "Replicas", "lock_step"]
@@ -125,6 +126,7 @@ class Replicas(Timeline):
                 f"{len(self._scenes)} runs of {float(duration_s):g} s do not fit on one line "
                 f"of 64-bit ticks at {self.scene.ticks_per_s} per second"
             )
+        self.ends = RunEnds(self.time)
         self._faces = components
         for name, component in components.items():
             if not self._shared(name, component):
@@ -233,6 +235,9 @@ class Replicas(Timeline):
 
     def _finished(self, number: int, component: Component) -> None:
         if self._report is not None:
+            if number in self.ends.by:
+                ended = Fraction(int(self.ends.ticks[number]), self.scene.ticks_per_s)
+                component.context.duration_s = ended
             self._report(number, component.report())
 
     def clock(self, name: str, component: Component) -> ScanClock | None:
@@ -292,7 +297,7 @@ class Replicas(Timeline):
         if may_be_late(wire, everything=False):
             arguments = self._fault_arguments(wire)
             faults = ReplicaWireFaults(*arguments, span_ticks=self.time.span_ticks)
-        return ReplicaChannel(wire.source, delay_ticks, faults, self.time)
+        return ReplicaChannel(wire.source, delay_ticks, faults, self.time, self.ends)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
         """Return the window where replicas go side by side."""

@@ -61,12 +61,15 @@ class Recorded:
     duration_s : float
     report : callable
         Returns the sections that blocks add to the summary of the run.
+    ended_early : bool
+        Whether a block ended it before its time.
     """
 
     tables: dict[str, Columns]
     ticks_per_s: int
     duration_s: float
     report: Callable[[], dict[str, Any]]
+    ended_early: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,9 +149,14 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
     except (NotInLockStep, SceneError, BlockFailure):
         return None
     parts = _by_replica(sink.tables(), len(scenes))
+    ended = simulation.ends.by
+    durations_s = [
+        int(tick) / simulation.ticks_per_s if n in ended else outcome.duration_s
+        for n, tick in enumerate(simulation.ends.ticks)
+    ]
     return [
-        Recorded(tables, simulation.ticks_per_s, outcome.duration_s, partial(_report, one))
-        for tables, one in zip(parts, scenes, strict=True)
+        Recorded(tables, simulation.ticks_per_s, duration_s, partial(_report, one), n in ended)
+        for n, (tables, duration_s, one) in enumerate(zip(parts, durations_s, scenes, strict=True))
     ]
 
 
@@ -175,8 +183,9 @@ def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
     except (SceneError, BlockFailure) as error:
         return Failed(str(error))
     return Recorded(
-        sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report
-    )
+        sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
+        simulation.ends.early,
+    )  # fmt: skip
 
 
 def scene_of(scene: Scene, replica: Replica) -> Scene:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
@@ -142,6 +142,8 @@ class Group:
         self.scene = scene
         self.replicas = replicas
         self.duration_s: FloatArray = np.array([run.duration_s for run in recorded])
+        #: Which of them a block ended before their time.
+        self.ended_early: BoolArray = np.array([run.ended_early for run in recorded], dtype=bool)
         #: Table name → columns, with ``replica``; rows are in order of replica and time.
         self.tables: dict[str, Columns] = {
             table: _together(table, wanted[table], recorded) for table in sorted(wanted)

@@ -3,6 +3,7 @@
 from typing import Any
 
 from dice import Dice
+from random_blocks import closest_approach_passed
 
 from dsa_des.replicas.replicas import Replica
 
@@ -54,6 +55,10 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
         {**_wire(dice, "actor", "traffic"), "delay_s": dice.pick(0.25, 1, 4)},
     ]  # fmt: skip
     dice.features |= {f"loop of {acts}"}
+    if dice.chance(0.4, "ends early"):
+        blocks["over"] = closest_approach_passed(dice)
+        wires.append({"from": "traffic", "to": "over", **dice.pick({}, {}, {"delay_s": 0.3})})
+        dice.features |= {f"{name} of ending" for name in wires[-1] if name == "delay_s"}
     return {
         "extends": f"{root}/configs/detect_and_sense.toml", "duration_s": dice.pick(15, 22),
         "seed": dice.randrange(1000), "wires": wires,
