@@ -185,7 +185,7 @@ def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> lis
                 f"{dotted(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
                 f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
             )
-        elif mine and (meanings := _other_meaning(scene, old, cls, parameter)):
+        elif mine and (meanings := _other_meaning(scene, old, cls, str(parameter))):
             notes.append(
                 f"{dotted(key)} of {scene.source_of(key)} is kept, though it means another thing: "
                 f"{meanings[0]!r} of {old}, {meanings[1]!r} of {block['type']}, which "
