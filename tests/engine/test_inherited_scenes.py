@@ -4,7 +4,7 @@ import pytest
 
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.study_file import read_study

@@ -9,8 +9,9 @@ import pyarrow.compute as pc
 import pytest
 
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas, scene_of
+from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.replicas.streams import ReplicaStreams
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

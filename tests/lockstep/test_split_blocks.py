@@ -9,8 +9,9 @@ from components.alerting.daidalus import DaidalusAlerting
 from dsa_des.block.component import ClockedParameters, Component
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.replicas.replicas import Recorded, Replica, run_replicas, scene_of, why_apart
+from dsa_des.replicas.replicas import Recorded, run_replicas, why_apart
 from dsa_des.replicas.split_block import SplitBlock, _part
 from dsa_des.replicas.watched_parameters import WatchedParameters
 from dsa_des.running.simulation import Simulation

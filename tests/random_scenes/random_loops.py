@@ -5,7 +5,7 @@ from typing import Any
 from dice import Dice
 from random_blocks import closest_approach_passed
 
-from dsa_des.replicas.replicas import Replica
+from dsa_des.replicas.changed_scene import Replica
 
 
 def loop_of(dice: Dice, root: str) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from wired import HEARS_ALL, chain, rows, run
 
 import dsa_des
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 
 TRACKERS = ("tracking.ekf", "tracking.ukf", "tracking.imm")
