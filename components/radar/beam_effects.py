@@ -32,7 +32,7 @@ class BeamSweep(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``beam_sweep``."""
-        return Verdict(block.p.beam_sweep, f"beam_sweep is {str(block.p.beam_sweep).lower()}")
+        return Verdict.of_flag(block.p, "beam_sweep")
 
     def build(self, block: Any) -> "Sweep":
         """Return the sweep of this radar's beam."""

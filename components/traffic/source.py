@@ -211,20 +211,10 @@ class TrafficSource(SteeredOwnship):
         if near is not None:
             present &= near
             culled = len(self._all_columns) - near.sum(axis=1)
-        return TrafficStates(
-            tick=wake.ticks,
-            own_lat_deg=own.lat_deg,
-            own_lon_deg=own.lon_deg,
-            own_alt_m=own.alt_m,
-            own_yaw_rad=own.yaw_rad,
-            own_pitch_rad=own.pitch_rad,
-            own_roll_rad=own.roll_rad,
-            lat_deg=states.lat_deg,
-            lon_deg=states.lon_deg,
-            alt_m=states.alt_m,
-            yaw_rad=states.yaw_rad,
-            pitch_rad=states.pitch_rad,
-            roll_rad=states.roll_rad,
+        return TrafficStates.of(
+            wake.ticks,
+            own,
+            states,
             present=present,
             roster=self.roster,
             columns=columns,

@@ -502,9 +502,13 @@ FAULTS = [
         (_FLIGHT, "wiring/test_random_traffic_keys.py", "wiring/test_aspect_tables.py"),
         ("published-at-every-scan",
          "return None if rate is None else ClockSpec(rate, Fraction(0))", "return None"),
+    ),
+    *in_file(
+        _GROUP, "components/messages/targets.py",
+        (_FLIGHT, "wiring/test_random_traffic_keys.py", "wiring/test_aspect_tables.py"),
         ("ownship-pitch-is-roll", "own_pitch_rad=own.pitch_rad,", "own_pitch_rad=own.roll_rad,"),
-        ("targets-pitch-is-roll", "            pitch_rad=states.pitch_rad,",
-         "            pitch_rad=states.roll_rad,"),
+        ("targets-pitch-is-roll", "            pitch_rad=others.pitch_rad,",
+         "            pitch_rad=others.roll_rad,"),
     ),
     *in_file(
         _GROUP, "components/embedding/states.py", (_HOST, "embedding/test_same_as_whole_run.py"),
