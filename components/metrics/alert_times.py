@@ -50,7 +50,9 @@ class AlertTimes(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        traffic_block(scene)
+        traffic = traffic_block(scene).name
+        #: Whether losses are of what was flown, so that a run that ended early has no later ones.
+        self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = recorded_by(scene, "alerts")
         if parameters.steered:
             self._told = ToldManoeuvres(scene)
@@ -75,7 +77,10 @@ class AlertTimes(TargetMetric):
         """Return all of it for every replica."""
         told = self._told.of(group) if self.p.steered else None
         read = self.p.losses_s
-        lost_s, nmac_s, _ = read_flights(group, self.p.step_s, self.p.target, read, told)
+        lost_s, nmac_s, _ = read_flights(
+            group, self.p.step_s, self.p.target, read, told,
+            to_the_end=self._as_flown,
+        )  # fmt: skip
         columns = group.tables["alerts"]
         counts = of_target(columns, self.p.target)
         found: dict[str, AnyArray] = {}

@@ -72,15 +72,18 @@ class Coverage:
             found |= reach.decide(*angles, distance, there) == EVALUATE
         return found
 
-    def entered_s(self, step_s: float) -> dict[str, float]:
+    def entered_s(self, step_s: float, until_s: float = math.inf) -> dict[str, float]:
         """Return when each target that ever is covered is so for the first time.
 
         Parameters
         ----------
         step_s : float
             A stay that is shorter may be missed; entries are found to a millisecond.
+        until_s : float
+            When the run ended, where that was before its time.
         """
-        grid = np.append(np.arange(0.0, self.duration_s, step_s), self.duration_s)
+        end_s = min(self.duration_s, until_s)
+        grid = np.append(np.arange(0.0, end_s, step_s), end_s)
         found = {}
         for target in self._source.targets:
             inside = self.holds(target, grid)

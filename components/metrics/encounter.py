@@ -5,6 +5,7 @@ Loss of well clear is by default that of ASTM F3442 for small unmanned aircraft,
 horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -33,6 +34,8 @@ from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
 #: Where a closest approach may be cut off, see `components.traffic.censored.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
+#: The end of a run that a block ended before its time.
+_EARLY_END = "the early end of the run"
 _NOWHERE = (float("inf"), float("nan"), "")
 _BEFORE = ("detection", "declaration")
 _CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
@@ -126,6 +129,8 @@ def read_flights(
     target: str | None,
     read: Read,
     told: Mapping[int, Told] | None = None,
+    *,
+    to_the_end: bool = False,
 ) -> FloatArray:
     """Return what `read` makes of every replica's flights, shape (values, replicas).
 
@@ -141,6 +146,9 @@ def read_flights(
     read : callable
     told : mapping, optional
         What the ownship of a replica was told to fly; others fly on as they are.
+    to_the_end : bool
+        Look at each no longer than its run, which may have ended early; else as long as it was
+        meant to last.
     """
     told = told or {}
     block = f"blocks.{traffic_block(group.scene).name}."
@@ -149,13 +157,17 @@ def read_flights(
     place, steered = np.empty(len(group), dtype=np.int64), []
     for number, replica in enumerate(group.replicas):
         mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
-        key = tuple(sorted((k, repr(v)) for k, v in mine.items()))
+        until_s = math.inf
+        if to_the_end and group.ended_early[number]:
+            until_s = float(group.duration_s[number])
+        key = (until_s, *sorted((k, repr(v)) for k, v in mine.items()))
         alone = number in told
         place[number] = places.setdefault((key, number if alone else None), len(runs))
         if place[number] < len(runs):
             continue
         scene = group.scenes[number] if mine else group.scene
-        flights = group.once(("separations", step_s, key), partial(separations, scene, step_s))
+        make = partial(separations, scene, step_s, until_s)
+        flights = group.once(("separations", step_s, key), make)
         runs.append([flight for flight in flights if target in (None, flight.name)])
         if alone and runs[-1]:
             steered.append(number)
@@ -180,7 +192,10 @@ class _Encounter(TargetMetric):
 
     def of_flights(self, group: Group, read: Read) -> FloatArray:
         """Return what `read` makes of every replica's flights as flown, (values, replicas)."""
-        return read_flights(group, self.p.step_s, self.p.target, read, self._told.of(group))
+        return read_flights(
+            group, self.p.step_s, self.p.target, read, self._told.of(group),
+            to_the_end=True,
+        )  # fmt: skip
 
 
 class ClosestApproach(_Encounter):
@@ -211,7 +226,8 @@ class ClosestApproach(_Encounter):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
         distance, time_s, code = self.of_flights(group, each_alone(_closest))
-        at = np.array(_ENDS)[code.astype(int)]
+        at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
+        at[(at == END) & group.ended_early] = _EARLY_END
         found: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,

@@ -3,6 +3,7 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
+import math
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
@@ -79,7 +80,9 @@ STEP_S = 0.1
 _SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
 
 
-def separations(scene: Scene, step_s: float | None) -> "list[RelativeFlight]":
+def separations(
+    scene: Scene, step_s: float | None, until_s: float = math.inf
+) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, on a regular grid and at the samples.
 
     Parameters
@@ -88,14 +91,16 @@ def separations(scene: Scene, step_s: float | None) -> "list[RelativeFlight]":
     step_s : float or None
         Spacing of the grid; the times at which the source itself has samples are added. None looks
         between them for losses, with a grid of `STEP_S` for all else.
+    until_s : float
+        When the run ended, where that was before its time.
     """
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
-    count = regular_count(step_s or STEP_S, float(duration))
-    end_s = float(duration)
+    end_s = min(float(duration), until_s)
+    count = regular_count(step_s or STEP_S, end_s)
     return [
         RelativeFlight(source, number, step_s, count, end_s)
         for number in range(len(source.targets))

@@ -85,7 +85,7 @@ class Severity(TargetMetric):
         """Return both for every replica; NaN where no target is ever there with the ownship."""
         told = self._told.of(group)
         read = each_alone(self._severities)
-        found = read_flights(group, self.p.step_s, self.p.target, read, told)
+        found = read_flights(group, self.p.step_s, self.p.target, read, told, to_the_end=True)
         return {"slowc_percent": found[0], "pnmac": found[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:

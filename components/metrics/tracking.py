@@ -149,7 +149,7 @@ class Tracking(Metric):
             mine = np.flatnonzero((replica == number) & told)
             tally, names = self._tally(columns, mine, held, scene, float(group.duration_s[number]))
             first = _first_detections(group.tables["detections"], number)
-            entered = Coverage(scene).entered_s(self.p.step_s)
+            entered = Coverage(scene).entered_s(self.p.step_s, float(group.duration_s[number]))
             values = tally.results(names, first, entered, float(group.duration_s[number]))
             values |= innovation_results(*self._innovations(columns, mine[held[mine]]))
             for name, value in values.items():

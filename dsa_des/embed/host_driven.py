@@ -21,6 +21,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.block.message import Message
 from dsa_des.block.ports import Input
+from dsa_des.block.run_end import ends_its_run
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, Problem, SceneError
 from dsa_des.running.inputs import Inputs
@@ -334,6 +335,8 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
             found.append((f"blocks.{name}", message))
         if block.cls.process is not None:
             found.append((f"blocks.{name}", "it has a process of its own"))
+        if ends_its_run(block.cls):
+            found.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
         fed = any(port.required for port in block.cls.inputs.values())
         if not fed and name != source:
             found.append((f"blocks.{name}", f"it is a second source beside {source!r}"))

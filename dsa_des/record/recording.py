@@ -15,6 +15,7 @@ from dsa_des.block.message import Message, rows_of
 from dsa_des.block.recorded_columns import Columns, Instants, Schema, Text, is_empty, nothing_in
 from dsa_des.record.attempts import attempt
 from dsa_des.record.declared_columns import DeclaredColumns
+from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import own_scans
 
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
@@ -57,14 +58,21 @@ class Recorder:
         self._texts: dict[tuple[str, str], _TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
+        self._ends: RunEnds | None = None
 
     def open(
-        self, messages: Iterable[type[Message]], ticks_per_s: int, span_ticks: int = 0
+        self,
+        messages: Iterable[type[Message]],
+        ticks_per_s: int,
+        span_ticks: int = 0,
+        ends: RunEnds | None = None,
     ) -> None:
         """Learn what the run's messages record; called once, before the run.
 
-        With replicas in lock step, `span_ticks` apart, every table begins with their number.
+        With replicas in lock step, `span_ticks` apart, every table begins with their number. Rows
+        of when a run has ended, as `ends` knows when they are handed on, are left out.
         """
+        self._ends = ends
         self._ticks_per_s = ticks_per_s
         self._span_ticks = span_ticks
         leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
@@ -147,10 +155,16 @@ class Recorder:
         order = None
         if bool(np.any(ticks[1:] < ticks[:-1])):
             order = np.argsort(ticks, kind="stable")
+        if self._ends is not None and self._ends.early:
+            kept = self._ends.before(ticks)
+            order = np.flatnonzero(kept) if order is None else order[kept[order]]
+        count = len(ticks) if order is None else len(order)
+        if count == 0:
+            return
         ordered: Columns = {}
         for name, kind in self._schemas[table].items():
             ordered[name] = self._column(table, name, kind, pieces, order, ticks)
-        self.rows[table] += len(ticks)
+        self.rows[table] += count
         for sink in self.sinks:
             sink.write(table, ordered)
 
@@ -171,7 +185,7 @@ class Recorder:
             codes = np.concatenate([text.codes(block, columns) for block, columns in pieces])
             return Text(codes if order is None else codes[order], text.names)
         if kind == "float64" and all(_is_missing(columns.get(name)) for _, columns in pieces):
-            return nothing_in(len(ticks))
+            return nothing_in(len(ticks) if order is None else len(order))
         parts = [
             _values(self._in_seconds(columns.get(name), columns), kind, len(columns["tick"]))
             for _, columns in pieces

@@ -17,6 +17,7 @@ from dsa_des.running.channel import Channel, joined
 from dsa_des.running.wire_faults import WireFaults
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream
+from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime, first_scan
 
 # So many messages are kept before the last row of each replica is sought in them.
@@ -49,13 +50,20 @@ class ReplicaChannel(Channel):
     source, delay_ticks, faults
         As for `Channel`.
     time : ReplicaTime
+    ends : RunEnds
+        What arrives at the end of its run, or later, does not.
     """
 
     def __init__(
-        self, source: str, delay_ticks: int, faults: WireFaults | None, time: ReplicaTime
+        self,
+        source: str,
+        delay_ticks: int,
+        faults: WireFaults | None,
+        time: ReplicaTime,
+        ends: RunEnds,
     ) -> None:
         super().__init__(source, delay_ticks, faults)
-        self._time, self._span = time, time.span_ticks
+        self._time, self._span, self._ends = time, time.span_ticks, ends
         #: What was sampled since `_last` was made.
         self._passed: list[tuple[IntArray, Message]] = []
 
@@ -126,7 +134,17 @@ class ReplicaChannel(Channel):
                 taken.append((arrivals[rows], message.take(rows)))
             left.append((arrivals[others], message.take(others)))
         self._waiting = left
-        return _in_order(taken)
+        return self._in_time(_in_order(taken))
+
+    def _in_time(self, found: tuple[IntArray, Message] | None) -> tuple[IntArray, Message] | None:
+        """Return the rows that arrive before their run has ended."""
+        if found is None or not self._ends.early:
+            return found
+        kept = self._ends.before(found[0])
+        if kept.all():
+            return found
+        rows = np.flatnonzero(kept)
+        return (found[0][rows], found[1].take(rows)) if len(rows) else None
 
     def sample(self, ticks: IntArray, end: int) -> tuple[Message, IntArray] | None:
         """Return what the input holds in each replica at each of `ticks`; see `Channel.sample`."""
@@ -177,15 +195,18 @@ class ReplicaChannel(Channel):
     def _held_rows(self, arrivals: IntArray, ticks: IntArray) -> IntArray:
         """Return the row that is held at each tick; -1 where its replica holds nothing yet."""
         rows = last_at_or_before(arrivals, ticks)
-        if arrivals is not ticks:
+        if not np.array_equal(arrivals[rows], ticks):
             rows[arrivals[rows] // self._span != ticks // self._span] = -1
         return rows
 
     def _of_all(self, arrivals: IntArray) -> bool:
-        """Whether there is a row of every replica, of rows in order of replica."""
-        if len(arrivals) < self._time.replicas:
+        """Whether there is a row of every replica that goes on, of rows in order of replica."""
+        if len(arrivals) < self._time.replicas and not self._ends.early:
             return False
         replica = arrivals // self._span
+        if self._ends.early:
+            every = np.arange(self._time.replicas)
+            return self._ends.running(np.unique(replica)) == self._ends.running(every)
         return 1 + int(np.count_nonzero(replica[1:] != replica[:-1])) == self._time.replicas
 
     def _remember(self) -> None:

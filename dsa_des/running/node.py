@@ -16,6 +16,7 @@ from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message, by_output
+from dsa_des.block.run_end import RunEnd
 from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.block.wake import Wake
 from dsa_des.errors import RunRefused
@@ -176,6 +177,9 @@ class Node:
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
+        ends = self.simulation.ends
+        if ends.early and ends.passed(tick, tick + 1):
+            return
         if self.processor is not None and self.processor.refuses(self.name):
             return
         scan = self._scan_at.get(tick, -1)
@@ -205,6 +209,10 @@ class Node:
                 scans = np.full(len(ticks), -1, dtype=np.int64)
         if self.processor is not None:
             ticks, scans = self.processor.let_in(self.name, ticks, scans)
+        ends = self.simulation.ends
+        if ends.early:
+            kept = ends.before(ticks)
+            ticks, scans, end = ticks[kept], scans[kept], ends.cut(end)
         if len(ticks):
             self._run(ticks, scans, end)
 
@@ -270,6 +278,8 @@ class Node:
             if len(message) == 0:
                 continue
             _check_ticks(port, message.tick, ticks)
+            if isinstance(message, RunEnd):
+                self.simulation.ends.note(message.tick, self.name)
             if self.simulation.recorder is not None:
                 self.simulation.recorder.record(self.name, message)
             if self.processor is None:

@@ -7,6 +7,7 @@ import simpy
 
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
+from dsa_des.block.run_end import ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.running.grain import Grain
 from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Node
@@ -47,7 +48,9 @@ def build_nodes(
     depth, order = depths(scene.graph), grain.order(scene)
     shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
     nodes = {}
-    for number, (name, component) in enumerate(sorted(components.items())):
+    # Who ends runs comes first in its depth: who comes later need not run beyond the end.
+    ordered = sorted(components.items(), key=lambda i: (not ends_its_run(type(i[1])), i[0]))
+    for number, (name, component) in enumerate(ordered):
         windowed = name in grain.windowed
         base = WINDOW_PRIORITY + order[name] if windowed else DEPTH_PRIORITY + depth[name]
         by_name = base + number / (len(components) + 1)

@@ -178,6 +178,7 @@ def info_of(
         "title": simulation.scene.title,
         "seed": simulation.scene.seed,
         "duration_s": outcome.duration_s,
+        **({"ended_by": simulation.ends.by[0]} if simulation.ends.early else {}),
         "ticks_per_s": simulation.ticks_per_s,
         "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
         "versions": {

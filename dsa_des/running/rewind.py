@@ -17,6 +17,7 @@ import numpy as np
 from dsa_des.record.recording import Recorder
 from dsa_des.running.run_state import RunningBlock
 from dsa_des.running.windows import EqualWindows, Failure, Window
+from dsa_des.time.run_ends import RunEnds
 
 # At the start, and after something came back, a window has this part of its full length.
 _RESTART = 32
@@ -33,6 +34,8 @@ class Rewinder:
         Over the wires between these blocks messages come back.
     recorder : Recorder or None
     trace : list or None
+    ends : RunEnds
+        What is known of when runs end.
     """
 
     def __init__(
@@ -41,14 +44,16 @@ class Rewinder:
         cut_edges: Collection[tuple[str, str]],
         recorder: Recorder | None,
         trace: list[tuple[int, str]] | None,
+        ends: RunEnds,
     ) -> None:
         self._recorder, self._trace = recorder, trace
-        self._things = [
+        self._things: list[Any] = [
             thing
             for node in nodes
             for thing in (node.component, *node.component.context.effects.values())
             if hasattr(thing, "__dict__")
         ]
+        self._things.append(ends)
         into = [(n.name, c) for n in nodes for wires in n.channels.values() for c in wires]
         self._channels = [channel for _, channel in into]
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]

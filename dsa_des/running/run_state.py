@@ -10,6 +10,7 @@ from dsa_des.block.component import Component
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
 from dsa_des.running.windows import Window
+from dsa_des.time.run_ends import RunEnds
 
 
 class RunningBlock(Protocol):
@@ -42,6 +43,7 @@ class RunState(Protocol):
     trace: list[tuple[int, str]] | None
     recorder: Recorder | None
     window: Window
+    ends: RunEnds
 
     @property
     def span_ticks(self) -> int:

@@ -18,6 +18,7 @@ import simpy
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
+from dsa_des.block.run_end import ends_its_run
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
@@ -48,7 +49,7 @@ class Outcome:
     Parameters
     ----------
     duration_s : float
-        Simulated time.
+        Simulated time; of runs that share a timeline, the longest it may be.
     cpu_s : float
         Processor time of the simulation itself.
     windowed : list of str
@@ -152,6 +153,9 @@ class Simulation:
         self.timeline.lay(self.components, self.duration_s)
         #: How the runs lie in time.
         self.time = self.timeline.time
+        #: When runs end, as far as that is known.
+        self.ends = self.timeline.ends
+        self._check_ends()
         processors = start_processors(scene, grain, self.time.end_tick, self.env, self._record)
         self.nodes = build_nodes(
             self, self.timeline, self.components, grain, processors, shuffle_ties
@@ -163,14 +167,14 @@ class Simulation:
         refuse_endless_work(scene, self.scans, float(self.duration_s))
         rewinder = None
         if grain.rewinds:
-            rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace)
+            rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, trace, self.ends)
         longest = longest_window(self.nodes, self.time, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(longest, self._cuts, rewinder)
         for lines in processors.values():
             if isinstance(lines, RehearsedLines) and not isinstance(self.windows, RehearsedWindows):
                 lines.cast(self.nodes, depths(scene.graph))
-                rewinder = Rewinder(self.nodes.values(), set(), recorder, trace)
+                rewinder = Rewinder(self.nodes.values(), set(), recorder, trace, self.ends)
                 self.windows = RehearsedWindows(self.end_tick, longest, self._cuts, rewinder, lines)
         if check_rewinding and rewinder is not None:
             self.windows = WindowsRunTwice(self.windows, rewinder, self.nodes, self.ticks_per_s)
@@ -218,6 +222,11 @@ class Simulation:
         for node in self.nodes.values():
             node.start()
         while (window := self.windows.next()) is not None:
+            if self.ends.passed(window.start, window.end):
+                if self.ends.passed(window.start, self.end_tick):
+                    break
+                self.windows.heard(window, None)  # nothing is left to run in it
+                continue
             failure = self.run_window(window)
             final = self.windows.heard(window, failure)
             if final is None:
@@ -230,6 +239,10 @@ class Simulation:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
             self.recorder.close()
+        if self.ends.early and self.time.replicas == 1:
+            self.duration_s = Fraction(int(self.ends.ticks[0]), self.ticks_per_s)
+            for component in self.components.values():
+                component.context.duration_s = self.duration_s  # what it reports is up to there
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,
@@ -240,6 +253,16 @@ class Simulation:
     def stretch(self, ticks: IntArray) -> tuple[int, int]:
         """Return a start and an end between which the rows of a wake lie, as clocks count."""
         return self.timeline.stretch(ticks, self.window)
+
+    def _check_ends(self) -> None:
+        """Refuse what ends its run where messages wait for a processor: they would be lost."""
+        if self.scene.processors:
+            ending = [n for n, cls in sorted(self.scene.classes.items()) if ends_its_run(cls)]
+            said = "it ends its run early, which a scene with shared processors does not allow"
+            if ending:
+                raise SceneError(
+                    [self.scene.problem(f"blocks.{name}.type", said) for name in ending]
+                )
 
     def _check_ready(self) -> None:
         """Refuse to run what waits for a host, or has run."""
@@ -265,7 +288,9 @@ class Simulation:
 
     def _open_recorder(self) -> None:
         if self.recorder is not None:
-            self.recorder.open(self.recorded_messages(), self.ticks_per_s, self.span_ticks)
+            self.recorder.open(
+                self.recorded_messages(), self.ticks_per_s, self.span_ticks, self.ends
+            )
 
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:

@@ -20,6 +20,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import ScanClock
 from dsa_des.time.randomness import Stream, Streams
+from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import ReplicaTime
 
 
@@ -38,9 +39,12 @@ class Timeline:
         The keyed random numbers of blocks.
     time : ReplicaTime
         How the runs lie in time; known once `lay` was called.
+    ends : RunEnds
+        When each of them ends; from then on.
     """
 
     time: ReplicaTime
+    ends: RunEnds
 
     def __init__(self, scene: Scene, *, everything: bool = False) -> None:
         self.scene = scene
@@ -54,6 +58,7 @@ class Timeline:
     def lay(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
         """Learn the blocks, which are set up, and how long a run lasts."""
         self.time = ReplicaTime(1, self._run_ticks(duration_s))
+        self.ends = RunEnds(self.time)
 
     def _run_ticks(self, duration_s: Fraction) -> int:
         ticks = duration_s * self.scene.ticks_per_s

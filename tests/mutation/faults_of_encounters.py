@@ -6,6 +6,7 @@ _GROUP = "encounters"
 _SAMPLING = "encounters/test_sampling.py"
 _PAIRING = "encounters/test_pairing.py"
 _RISK = "encounters/test_risk.py"
+_ENDING = ("wiring/test_runs_that_end_early.py", "lockstep/test_runs_that_end_early.py")
 
 FAULTS = [
     *in_file(
@@ -14,6 +15,26 @@ FAULTS = [
         ("bin-1-where-nothing-was-counted", "np.where(empty, 0.0, np.where(chance",
          "np.where(empty, 2.0, np.where(chance"),
         ("new-value-from-the-whole-draw", "(left[anew] / self._rate)", "left[anew]"),
+    ),
+    *in_file(
+        _GROUP, "components/encounters/ending.py", _ENDING,
+        ("one-that-has-passed-is-enough", "over = passed.all(axis=1)", "over = passed.any(axis=1)"),
+        ("growing-anew-in-every-window", "np.maximum(since[starts], self._since[numbers])",
+         "since[starts]"),
+        ("gone-is-not-passed", "(now_m > last_m) | (~states.present & seen)", "now_m > last_m"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/running/node.py", _ENDING,
+        ("rows-after-the-end", "kept = ends.before(ticks)", "kept = ends.before(ticks) | True"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/running/rewind.py", _ENDING,
+        ("an-end-is-not-undone", "self._things.append(ends)", "self._ends = ends"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/record/recording.py", _ENDING,
+        ("what-was-looked-ahead-is-recorded", "kept = self._ends.before(ticks)",
+         "kept = self._ends.before(ticks) | True"),
     ),
     *in_file(
         _GROUP, "components/encounters/bayes_network.py", _SAMPLING,

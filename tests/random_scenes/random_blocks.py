@@ -324,3 +324,12 @@ def sections(dice: Dice) -> dict[str, Any]:
         dice.maybe(accuracy, "detection_probability", 0.7, 1e-5, 0.01)
         found["accuracy"] = accuracy
     return found
+
+
+def closest_approach_passed(dice: Dice) -> dict[str, Any]:
+    """Return a block that ends the run when all aircraft have passed."""
+    return {
+        "type": "encounters.closest_approach_passed", "after_s": dice.pick(0, 0.5, 2, "7/3"),
+        "beyond_m": dice.pick(0, 0, 0, 900), "scan_rate_hz": dice.pick(1, 2, "10/3"),
+        "offset_s": dice.pick(0, 0, 0.4), "jitter_s": dice.pick(0, 0, 0.05),
+    }  # fmt: skip

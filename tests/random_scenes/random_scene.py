@@ -133,6 +133,8 @@ class _Maker:
         apart = Dice(7 * seed + 1)
         if apart.chance(0.3):
             self._estimating(apart)
+        if apart.chance(0.2):
+            self._ending(apart)
         tables = {
             "title": f"random {seed}",
             "duration_s": self._short_enough(duration),
@@ -162,6 +164,17 @@ class _Maker:
                     table.setdefault(key, 1.0)
             if table["type"].startswith("radar."):
                 table.setdefault("range_resolution_m", 30)
+
+    def _ending(self, dice: Dice) -> None:
+        """Let the run end when the aircraft of one source have passed."""
+        if self.processors:
+            return
+        self.dice.features.add("ends early")
+        sources = [name for name, t in self.blocks.items() if t["type"].startswith("traffic.")]
+        self.blocks["over"] = random_blocks.closest_approach_passed(dice)
+        self.dice.features |= dice.features
+        wire = {"from": dice.choice(sources), "to": "over"}
+        self.wires.append({**wire, **dice.pick({}, {}, {"delay_s": 0.2}, {"jitter_s": 0.1})})
 
     # -- blocks and wires ----------------------------------------------------------------------
 

@@ -1,0 +1,71 @@
+"""When the runs of a timeline end: when they are meant to, or earlier where a block says so."""
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.time.timeline import ReplicaTime
+
+
+class RunEnds:
+    """Up to when each run of a timeline lasts, as far as that is known.
+
+    Parameters
+    ----------
+    time : ReplicaTime
+
+    Attributes
+    ----------
+    ticks : (replicas,) of int64
+        First tick that is no longer part of each run, counted from its start.
+    early : bool
+        Whether any run ends before its time.
+    by : dict of str
+        Which block ended a replica's run.
+    """
+
+    def __init__(self, time: ReplicaTime) -> None:
+        self._time = time
+        self.ticks: IntArray = np.full(time.replicas, time.run_ticks, dtype=np.int64)
+        self.early = False
+        self.by: dict[int, str] = {}
+
+    def note(self, ticks: IntArray, block: str) -> None:
+        """Take note that a block ends runs at some instants of the timeline; the first counts."""
+        replicas, own = self._split(ticks)
+        for replica, tick in zip(replicas.tolist(), own.tolist(), strict=True):
+            if tick < self.ticks[replica]:
+                self.ticks[replica] = tick
+                self.by[replica] = block
+                self.early = True
+
+    def before(self, ticks: IntArray) -> BoolArray:
+        """Return which instants of the timeline lie before the ends of their runs."""
+        replicas, own = self._split(ticks)
+        return np.less(own, self.ticks[replicas])
+
+    def running(self, replicas: IntArray) -> int:
+        """Return how many of some replicas are not known to end early."""
+        return int(np.count_nonzero(self.ticks[replicas] == self._time.run_ticks))
+
+    def passed(self, start: int, end: int) -> bool:
+        """Return whether all runs that a window from `start` to `end` holds are over before it."""
+        if not self.early:
+            return False
+        span = self._time.span_ticks
+        if self._time.side_by_side or not span:
+            return bool((self.ticks <= start).all())
+        first, last = start // span, -(-end // span)
+        begin = np.arange(first, last) * span
+        return bool((self.ticks[first:last] <= start - begin).all())
+
+    def cut(self, end: int) -> int:
+        """Return the end of a window, or that of a run by itself if it comes first."""
+        return min(end, int(self.ticks[0])) if self.early and not self._time.span_ticks else end
+
+    def _split(self, ticks: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the replica of each instant, and the tick within it."""
+        span = self._time.span_ticks
+        if not span:
+            return np.zeros(len(ticks), dtype=np.int64), ticks
+        replicas = ticks // span
+        return replicas, ticks - replicas * span

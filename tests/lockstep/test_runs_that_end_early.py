@@ -1,0 +1,140 @@
+"""Replicas that end early record the same together and alone, and cost nothing after their end."""
+
+from pathlib import Path
+
+import pytest
+
+from components.encounters.ending import ClosestApproachPassed
+from dsa_des.errors import SceneError
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Replica, run_replicas, scene_of
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+
+CONFIGS = Path("configs").resolve()
+SPEED = "blocks.traffic.intruders[0].speed_mps"
+CROSSING = """
+extends = "{configs}/avoidance/crossing.toml"
+duration_s = 45
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "gate -> ir",
+  "radar -> fusion", "eo -> fusion", "ir -> fusion", "fusion -> tracker -> alerting",
+  "traffic -> alerting -> avoidance",
+  {{ from = "avoidance", to = "traffic", delay_s = 0.5, holds = "nothing" }},
+  "traffic -> over",
+]
+[blocks.over]
+type = "{kind}"
+after_s = 2
+"""
+HEAD_ON = """
+extends = "{configs}/benchmark/monte_carlo.toml"
+duration_s = 40
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "gate -> ir",
+  "radar -> fusion", "eo -> fusion", "ir -> fusion", "fusion -> tracker", "traffic -> over",
+]
+[blocks.over]
+type = "{kind}"
+after_s = 3
+"""
+SLOW = ("eo.scan_rate_hz=2", "radar.scan_rate_hz=1", "ir.scan_rate_hz=1")
+OURS = "encounters.closest_approach_passed"
+NEAR = {
+    CROSSING: (*SLOW, "traffic.intruders[0].east_m=1300", "traffic.intruders[0].north_m=1000"),
+    HEAD_ON: (*SLOW, "traffic.intruders[0].north_m=1300"),
+}
+
+
+class OfAStranger(ClosestApproachPassed):
+    """Knows nothing of replicas."""
+
+
+def loaded(tmp_path, text, kind=OURS):
+    path = tmp_path / "scene.toml"
+    path.write_text(text.format(configs=CONFIGS, kind=kind), encoding="utf-8")
+    return load_scene(path, sets=[f"blocks.{key}" for key in NEAR[text]])
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "window"),
+    [(text, kind, window) for text, window in ((CROSSING, None), (HEAD_ON, None), (HEAD_ON, 9))
+     for kind in (OURS, f"{__name__}:OfAStranger")],
+)  # fmt: skip
+def test_replicas_end_by_themselves(lock, tmp_path, text, kind, window):
+    scene = loaded(tmp_path, text, kind)
+    scenes = lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}, {SPEED: 0.0})
+    simulation = lock.same_as_alone(scenes, window=window)
+    assert simulation.side_by_side == (text is CROSSING)
+    assert ("over" in simulation.timeline.split) == (kind != OURS)
+    assert len(set(simulation.ends.ticks.tolist())) == 3
+    assert simulation.ends.by.keys() >= {0, 1}
+
+
+def test_a_replica_s_record_says_how_long_it_was(tmp_path):
+    scene = loaded(tmp_path, CROSSING)
+    replicas = [Replica(k, {SPEED: speed}) for k, speed in enumerate((40.0, 90.0))]
+    together = run_replicas(scene, replicas)
+    for replica, found in zip(replicas, together, strict=True):
+        alone = Simulation(scene_of(scene, replica))
+        assert found.duration_s == alone.run().duration_s == float(alone.duration_s) < 45
+        assert found.ended_early
+        assert max(found.tables["scans"]["time_s"]) < found.duration_s
+        assert found.report() == run_replicas(scene, [replica])[0].report()
+
+
+def test_what_has_ended_runs_no_more(tmp_path):
+    """Rows of replicas that have ended come to no block, and a batch ends with its last."""
+    scene = loaded(tmp_path, CROSSING)
+    scenes = [scene_of(scene, Replica(k, {SPEED: v})) for k, v in enumerate((40.0, 90.0))]
+    simulation = lock_step(scenes)
+    seen = []
+    node = simulation.nodes["tracker"]
+    runner = node.runner
+
+    class Watching:
+        @staticmethod
+        def run(wake):
+            seen.extend(zip(wake.replica.tolist(), wake.time_s.tolist(), strict=True))
+            return runner.run(wake)
+
+    node.runner = Watching
+    windows = []
+    simulation.run(windows.append)
+    ends_s = simulation.ends.ticks / simulation.ticks_per_s
+    for number in (0, 1):
+        # What is behind the end in the window in which it came is not run either.
+        assert max(t for r, t in seen if r == number) < ends_s[number]
+    assert windows[-1] - 0.5 <= max(ends_s) <= windows[-1] < 45
+
+
+@pytest.mark.parametrize("options", [{"window": 2, "shuffle_ties": 3}, {"cuts": (9_000_000_007,)}])
+@pytest.mark.parametrize("text", [CROSSING, HEAD_ON], ids=["closed", "open"])
+def test_a_single_run_ends_at_the_same_tick_in_any_window(lock, tmp_path, text, options):
+    scene = loaded(tmp_path, text)
+    one, first = lock.tables_of(Simulation, scene)
+    other, second = lock.tables_of(Simulation, scene, **options)
+    assert one.ends.ticks.tolist() == other.ends.ticks.tolist() < [one.time.run_ticks]
+    assert first == second
+
+
+def test_an_end_found_in_a_window_that_is_undone_does_not_count(tmp_path):
+    """Every window runs twice; the second time nothing is known of the end that was found."""
+    text = HEAD_ON.replace(
+        '"fusion -> tracker"',
+        '"fusion -> tracker -> avoidance", '
+        '{{from = "avoidance", to = "traffic", delay_s = 1, holds = "nothing"}}',
+    )
+    text = text + '\n[blocks.avoidance]\ntype = "avoidance.turn_away"\nrange_km = 1\n'
+    NEAR[text] = NEAR[HEAD_ON]
+    scene = loaded(tmp_path, text)
+    plain, twice = Simulation(scene), Simulation(scene, check_rewinding=True)
+    assert plain.run().duration_s == twice.run().duration_s < 40
+    assert plain.ends.by == {0: "over"}
+
+
+def test_a_host_is_told_that_it_ends_its_runs_itself(tmp_path):
+    from dsa_des.embed.host_driven import HostDriven
+
+    with pytest.raises(SceneError, match=r"blocks\.over: it ends its run"):
+        HostDriven(loaded(tmp_path, HEAD_ON), "traffic")
