@@ -144,6 +144,8 @@ def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
 
     def results(some):
         ran = replicas.run_replicas(base, some, wanted=wanted_by(metrics))
+        rules = [one.changes["blocks.over.after_s"] for one in some]
+        assert [run.ended_early for run in ran] == [rule < MEANT_S for rule in rules]
         group = Group(base, some, ran, wanted_by(metrics))
         return {k: v for metric in metrics for k, v in metric.measure(group).items()}
 
