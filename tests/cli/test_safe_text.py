@@ -91,6 +91,7 @@ def test_a_stream_that_knows_few_letters_gets_escapes(capfd: pytest.CaptureFixtu
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [r"\xb5 \xe9 \u6f22", r"\xb5 \u6f22"]
 
+
 def test_help_for_want_of_a_command_keeps_its_lines(capsys: pytest.CaptureFixture[str]) -> None:
     from dsa_des.cli import main
 
