@@ -107,7 +107,8 @@ def test_simulating_everything_gives_the_same_bytes(name: str, tmp_path: Path) -
 def test_simulating_everything_for_many_aircraft_gives_the_same_bytes(
     name: str, tmp_path: Path
 ) -> None:
-    assert_nothing_changed(recorded_both_ways(load_scene(CONFIGS / name), tmp_path))
+    scene = load_scene(CONFIGS / name, duration_s="45")
+    assert_nothing_changed(recorded_both_ways(scene, tmp_path))
 
 
 @pytest.mark.parametrize(

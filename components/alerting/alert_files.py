@@ -18,7 +18,7 @@ from components.traffic.traffic_file import TrafficFileError
 from components.traffic.units import SPEED_MPS
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
-from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.tables import print_table
@@ -65,6 +65,8 @@ def alert_files(
         if several:
             OutputFolder(place).check()
         else:
+            if option == "--figure":
+                check_ending(place, PICTURES, option)
             check_file(place, option)
     configuration = _read(Path(conf))
     if no_hysteresis:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from components.display.change import share_that_differs
+from components.display.outcomes import outcome_observers
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.recording import Observer
@@ -29,11 +30,13 @@ class DetectAndSenseReport:
     )
 
     def observers(self, simulation: "Simulation") -> list[Observer]:
-        """Return running summaries with the sections ``sensors`` and ``fused``.
+        """Return running summaries with the sections ``sensors`` and ``fused``, and of outcomes.
 
         Every block that sends `Detections` is a sensor, ours or not.
         """
-        return [SensorSummary(sensor_names(simulation)), FusedSummary()]
+        sensors = sensor_names(simulation)
+        off = [name for name in sensors if is_off(simulation.components[name])]
+        return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation)]
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
         """Print a run's summary.
@@ -42,8 +45,8 @@ class DetectAndSenseReport:
         ----------
         console : rich.console.Console
         summary : dict
-            Sections ``sensors``, ``fused`` and ``targets`` with ``simulated_s``, ``cpu_s`` and
-            ``out``; whatever is missing is left out.
+            Sections ``sensors``, ``fused``, ``targets`` and those of `outcome_observers`, with
+            ``simulated_s``, ``cpu_s`` and ``out``; whatever is missing is left out.
         """
         from components.display.terminal import show
 
@@ -89,3 +92,8 @@ def sensor_names(simulation: "Simulation") -> list[str]:
         for name, component in simulation.components.items()
         if any(issubclass(output.message, Detections) for output in component.outputs.values())
     )
+
+
+def is_off(sensor: Any) -> bool:
+    """Whether a sensor has a parameter ``enabled`` that is false."""
+    return getattr(sensor.p, "enabled", True) is False

@@ -5,7 +5,7 @@ of the run.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,16 +29,19 @@ class SensorSummary:
     ----------
     sensors : iterable of str
         Names of all sensor blocks; each gets an entry, also when it never scans.
+    off : collection of str
+        Those of them that are switched off.
     """
 
     tables: ClassVar[frozenset[str]] = frozenset({"scans", "detections"})
 
-    def __init__(self, sensors: Iterable[str]) -> None:
+    def __init__(self, sensors: Iterable[str], off: Collection[str] = ()) -> None:
         self._entries = {name: _Sensor() for name in sorted(sensors)}
+        self._off = frozenset(off)
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``scans`` or ``detections``, in order of time."""
-        for name, rows in _rows_by_name(columns["block"]):
+        for name, rows in rows_by_name(columns["block"]):
             entry = self._entries.setdefault(name, _Sensor())
             if table == "scans":
                 entry.add_scans(columns, rows)
@@ -52,7 +55,8 @@ class SensorSummary:
         -------
         dict
             ``{"sensors": {block: {"scans", "evaluated", "detections", "false_alarms", "skipped",
-            "first_detection", "last_detection"}}}``. ``detections`` are those of targets,
+            "first_detection", "last_detection"}}}``, and ``"enabled": False`` for a block that is
+            switched off. ``detections`` are those of targets,
             ``false_alarms`` all others. ``evaluated`` counts target evaluations over all scans,
             ``skipped`` targets not evaluated, by reason. A detection is
             ``{"time_s", "range_m", "target"}`` or None, with ``at`` where it is in the sensor's
@@ -60,7 +64,12 @@ class SensorSummary:
             slant range at that instant, for every sensor, also those that measure none; of
             several targets detected in one instant it is the nearest.
         """
-        return {"sensors": {name: entry.result() for name, entry in self._entries.items()}}
+        return {
+            "sensors": {
+                name: entry.result() | ({"enabled": False} if name in self._off else {})
+                for name, entry in self._entries.items()
+            }
+        }
 
 
 class FusedSummary:
@@ -73,7 +82,7 @@ class FusedSummary:
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``fused``."""
-        for name, rows in _rows_by_name(columns["sensors"]):
+        for name, rows in rows_by_name(columns["sensors"]):
             self._counts[name] = self._counts.get(name, 0) + len(rows)
 
     def result(self) -> dict[str, Any]:
@@ -99,24 +108,24 @@ class _Sensor:
         self.span: tuple[int, int] | None = None
 
     def add_scans(self, columns: Columns, rows: IntArray) -> None:
-        tick = _numbers(columns, "tick")
+        tick = numbers(columns, "tick")
         begin = int(tick[rows[0]]) if self.span is None else self.span[0]
         self.span = begin, int(tick[rows[-1]])
         self.scans += len(rows)
-        self.evaluated += int(_numbers(columns, "evaluated")[rows].sum())
+        self.evaluated += int(numbers(columns, "evaluated")[rows].sum())
         for name in self.skipped:
             if name in columns:
-                self.skipped[name] += int(_numbers(columns, name)[rows].sum())
+                self.skipped[name] += int(numbers(columns, name)[rows].sum())
 
     def add_detections(self, columns: Columns, rows: IntArray) -> None:
-        true = rows[_codes(columns["target"])[rows] >= 0]
+        true = rows[codes(columns["target"])[rows] >= 0]
         self.false_alarms += len(rows) - len(true)
         if len(true):
             self._add_true(columns, true)
 
     def _add_true(self, columns: Columns, rows: IntArray) -> None:
         self.detections += len(rows)
-        tick = _numbers(columns, "tick")
+        tick = numbers(columns, "tick")
         if self.first is None or self.first.tick == tick[rows[0]]:
             together = rows[: np.searchsorted(tick[rows], tick[rows[0]], side="right")]
             self.first = _nearer(self.first, _Sighting.nearest(columns, together))
@@ -162,15 +171,15 @@ class _Sighting:
     @classmethod
     def nearest(cls, columns: Columns, rows: IntArray) -> "_Sighting":
         """Return the nearest of some rows of one instant."""
-        range_m = _numbers(columns, "true_range_m")[rows]
+        range_m = numbers(columns, "true_range_m")[rows]
         # A block that knows no true range records NaN, which is never the nearest.
         row = rows[np.argmin(np.where(np.isnan(range_m), np.inf, range_m))]
         target = columns["target"]
         assert isinstance(target, Text)
         return cls(
-            int(_numbers(columns, "tick")[row]),
-            float(_numbers(columns, "time_s")[row]),
-            float(_numbers(columns, "true_range_m")[row]),
+            int(numbers(columns, "tick")[row]),
+            float(numbers(columns, "time_s")[row]),
+            float(numbers(columns, "true_range_m")[row]),
             target.names[target.codes[row]],
         )
 
@@ -185,16 +194,16 @@ def _nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
     return other if other.range_m < one.range_m else one
 
 
-def _codes(column: Any) -> IntArray:
+def codes(column: Any) -> IntArray:
     assert isinstance(column, Text)
     return np.asarray(column.codes)
 
 
-def _numbers(columns: Columns, name: str) -> Any:
+def numbers(columns: Columns, name: str) -> Any:
     return columns[name]
 
 
-def _rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
+def rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
     """Return each name that occurs in a text column and its rows, ascending."""
     counts = np.bincount(column.codes + 1)[1:]  # code -1 is null
     return [

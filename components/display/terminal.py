@@ -9,7 +9,7 @@ MOST_TARGETS = 10
 
 
 def show(console: Any, summary: dict[str, Any]) -> None:
-    """Print a run's summary: sensors, fused combinations, closest approaches, speed.
+    """Print a run's summary: sensors, fusion, closest approaches, what came of them, speed.
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         )
     if summary.get("targets"):
         _show_closest(console, summary["targets"])
+    for line in outcome_lines(summary):
+        _print_line(console, line)
     for line in attitude_lines(summary.get("traffic") or {}):
         _print_line(console, line)
     speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
@@ -128,7 +130,9 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
         evaluated = entry.get("evaluated", 0)
         skipped = {why: count for why, count in entry.get("skipped", {}).items() if count}
         every = evaluated + sum(skipped.values())
-        if not entry["scans"]:
+        if entry.get("enabled") is False:
+            lines.append(f"{name} saw nothing: it is switched off (enabled = false)")
+        elif not entry["scans"]:
             lines.append(f"{name} saw nothing: it never scanned")
         elif every:
             unit = "scans" if every == entry["scans"] else "looks (one per scan and target)"
@@ -140,6 +144,41 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
                 reasons.append(f"in reach but not detected in {evaluated:,}")
             lines.append(f"{name} saw nothing: target {', '.join(reasons)} of {every:,} {unit}")
     return lines
+
+
+def outcome_lines(summary: dict[str, Any]) -> list[str]:
+    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do.
+
+    Parameters
+    ----------
+    summary : dict
+        With the sections of `components.display.outcomes.outcome_observers`.
+    """
+    lines = [f"{name}: {_tracks_text(told)}" for name, told in summary.get("tracks", {}).items()]
+    for name, first_s in summary.get("alerts", {}).items():
+        times = ", ".join(f"level {level} from {when:.1f} s" for level, when in first_s.items())
+        lines.append(f"{name}: {'alerts of ' + times if times else 'no alert'}")
+    for name, told in summary.get("manoeuvres", {}).items():
+        text = "no manoeuvre"
+        if told["count"] == 1:
+            text = f"1 manoeuvre, at {told['first_s']:.1f} s"
+        elif told["count"]:
+            text = f"{told['count']:,} manoeuvres, from {told['first_s']:.1f} s to "
+            text += f"{told['last_s']:.1f} s"
+        lines.append(f"{name}: {text}")
+    return lines
+
+
+def _tracks_text(told: dict[str, Any]) -> str:
+    count = told["confirmed"]
+    if not count:
+        return "no confirmed track"
+    text = f"{count:,} confirmed track{'s' if count > 1 else ''}"
+    if told.get("false") is not None:
+        text += f", {format(told['false'], ',') if told['false'] else 'none'} of them false"
+    if told.get("position_error_m") is not None:
+        text += f"; position error {distance_text(told['position_error_m'])} rms"
+    return text
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:

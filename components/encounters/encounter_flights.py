@@ -19,7 +19,7 @@ _Paths = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 #: Flights that were flown last, with their sets.
 _FLOWN: OrderedDict[Any, tuple[EncounterSet, list[SampledTrajectory]]] = OrderedDict()
 #: So many encounters' flights are kept: a study asks for each of a chunk several times.
-MOST_FLOWN = 1200
+MOST_FLOWN = 600
 
 
 def encounter_flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:

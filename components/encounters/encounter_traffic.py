@@ -193,7 +193,7 @@ def _put(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
 #: Encounters of models that were made last, each a set of its own, by model and number.
 _MADE: OrderedDict[Any, EncounterSet] = OrderedDict()
 # So many are kept: a study asks for each encounter of a chunk several times.
-_MOST_MADE = 4096
+_MOST_MADE = 1200
 
 
 def _model_key(parameters: Any) -> tuple[Path, Path, int]:

@@ -15,7 +15,7 @@ from components.encounters.set_file import EncounterSetError
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, resolve_home
-from dsa_des.files.output_file import check_file
+from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
@@ -94,13 +94,14 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
     OutputError
         If the figure cannot be written.
     """
+    path = None if figure is None else named(figure, "--figure")
+    if path is not None:
+        check_ending(path, PICTURES, "--figure")
+        check_file(path, "--figure")
     try:
         found = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
-    path = None if figure is None else named(figure, "--figure")
-    if path is not None:
-        check_file(path, "--figure")
     places = np.unique(np.linspace(0, len(found) - 1, min(most, len(found))).astype(int)).tolist()
     closest = closest_approaches(found, places)
     total, squares = math.fsum(found.weights), math.fsum(found.weights**2)

@@ -34,6 +34,11 @@ def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     return total
 
 
+def selected(values: FloatArray, which: IntArray) -> FloatArray:
+    """Return some tracks' values (…, n), contiguous in memory as indexing would not leave them."""
+    return values.take(which, axis=-1)
+
+
 def is_everything(which: IntArray, count: int) -> bool:
     """Return whether an index array takes all of `count` in their order: nothing need be copied."""
     return len(which) == count and bool((which == np.arange(count)).all())
@@ -57,18 +62,18 @@ def cholesky(matrix: FloatArray) -> FloatArray:
         NaN from the first pivot on that is not positive.
     """
     size = len(matrix)
-    root = np.zeros_like(matrix)
+    root = np.zeros(matrix.shape)
     with np.errstate(invalid="ignore", divide="ignore"):
         for j in range(size):
-            pivot = matrix[j, j].copy()
+            pivot = matrix[j, j]
             for k in range(j):
-                pivot -= root[j, k] * root[j, k]
-            root[j, j] = np.sqrt(np.where(pivot > 0.0, pivot, np.nan))
+                pivot = pivot - root[j, k] * root[j, k]
+            np.sqrt(np.where(pivot > 0.0, pivot, np.nan), out=root[j, j])
             for i in range(j + 1, size):
-                value = matrix[i, j].copy()
+                value = matrix[i, j]
                 for k in range(j):
-                    value -= root[i, k] * root[j, k]
-                root[i, j] = value / root[j, j]
+                    value = value - root[i, k] * root[j, k]
+                np.divide(value, root[j, j], out=root[i, j])
     return root
 
 
@@ -79,7 +84,7 @@ def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
         value = right[i]
         for k in range(i):
             value = value - root[i, k] * found[k]
-        found[i] = value / root[i, i]
+        np.divide(value, root[i, i], out=found[i])
     return found
 
 
@@ -91,7 +96,7 @@ def solve_upper(root: FloatArray, right: FloatArray) -> FloatArray:
         value = right[i]
         for k in range(i + 1, size):
             value = value - root[k, i] * found[k]
-        found[i] = value / root[i, i]
+        np.divide(value, root[i, i], out=found[i])
     return found
 
 

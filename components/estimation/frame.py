@@ -35,8 +35,11 @@ class Place:
 
     def take(self, which: IntArray) -> "Place":
         """Return some of the places."""
-        velocity = None if self.velocity_m_s is None else self.velocity_m_s[:, which]
-        return Place(self.position_m[:, which], self.to_body[:, :, which], velocity)
+        moves = self.velocity_m_s
+        return Place(
+            self.position_m.take(which, axis=-1), self.to_body.take(which, axis=-1),
+            None if moves is None else moves.take(which, axis=-1),
+        )  # fmt: skip
 
 
 def place_in_frame(

@@ -14,9 +14,11 @@ from components.estimation.batched import (
     log_determinant,
     product,
     product_transposed,
+    selected,
     solve_lower,
     solve_upper,
     squared_length,
+    symmetric,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -50,10 +52,10 @@ class Innovation:
 
     def take(self, which: IntArray | slice) -> "Innovation":
         """Return those of some tracks."""
-        return Innovation(
-            self.expected[..., which], self.root[..., which], self.cross[..., which],
-            self.jacobian[..., which], self.spread[..., which],
-        )  # fmt: skip
+        parts = (self.expected, self.root, self.cross, self.jacobian, self.spread)
+        if isinstance(which, slice):
+            return Innovation(*(values[..., which] for values in parts))
+        return Innovation(*(selected(values, which) for values in parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +84,9 @@ class Moments:
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
         spread = self.left_over
         if which is not None and not is_everything(which, expected.shape[1]):
-            expected, total = expected[..., which], total[..., which]
-            cross, jacobian = cross[..., which], jacobian[..., which]
-            spread = None if spread is None else spread[..., which]
+            expected, total = selected(expected, which), selected(total, which)
+            cross, jacobian = selected(cross, which), selected(jacobian, which)
+            spread = None if spread is None else selected(spread, which)
         else:
             total = total.copy()
             spread = None if spread is None else spread.copy()
@@ -151,53 +153,62 @@ def updated(
 def _updated(
     state: FloatArray, covariance: FloatArray, found: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    gain = gain_of(found)
-    moved = state.copy()
-    for k in range(len(residual)):
-        moved += gain[:, k] * residual[k]
-    return moved, joseph(covariance, gain, found)
+    # With S = root · rootᵀ: K r = (root⁻¹ (P Hᵀ)ᵀ)ᵀ (root⁻¹ r).
+    weighted = solve_lower(found.root, found.cross.swapaxes(0, 1))
+    apart = solve_lower(found.root, residual)
+    moved = state + weighted[0] * apart[0]
+    for k in range(1, len(apart)):
+        moved += weighted[k] * apart[k]
+    return moved, joseph(covariance, weighted, found)
 
 
-def gain_of(found: Innovation) -> FloatArray:
-    """Return the gain, (d, m, n)."""
-    weighted = solve_upper(found.root, solve_lower(found.root, found.cross.swapaxes(0, 1)))
-    return weighted.swapaxes(0, 1)
+def joseph(covariance: FloatArray, weighted: FloatArray, found: Innovation) -> FloatArray:
+    """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n), symmetric to the bit.
 
+    For the components that are measured (the first of `found.jacobian`) it is worked out as
+    D - (D Hᵀ - K R) Kᵀ with D = P - K S Kᵀ, which is the same whatever the gain's rounding. What
+    is left over, of and with the others, is P - K S Kᵀ in either form: H has no columns there.
 
-def joseph(covariance: FloatArray, gain: FloatArray, found: Innovation) -> FloatArray:
-    """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n).
-
-    Its upper triangle is worked out and mirrored, so that it is symmetric to the bit. The product
-    on the left is P - K (P Hᵀ)ᵀ, with what the innovation knows of P Hᵀ.
+    Parameters
+    ----------
+    covariance : (d, d, n)
+    weighted : (m, d, n)
+        root⁻¹ (P Hᵀ)ᵀ; its square over m is K S Kᵀ.
+    found : Innovation
     """
-    size, known, many = len(gain), found.jacobian.shape[1], gain.shape[1]
-    shrunk = covariance[:, :known] - product_transposed(gain, found.cross[:known])
-    right = -product(gain, found.jacobian)  # of (I - K H), what is not of the identity
-    for i in range(known):
-        right[i, i] += 1.0
+    known, size = found.jacobian.shape[1], len(covariance)
+    whole = np.empty(covariance.shape)
+    if known < size:
+        _less_squares(covariance, weighted, slice(known, size), slice(0, size), whole)
+        whole[:known, known:] = whole[known:, :known].swapaxes(0, 1)
+    measured = slice(0, known)
+    block = whole[measured, measured]
+    _less_squares(covariance, weighted, measured, measured, whole)
+    gain = solve_upper(found.root, weighted[:, measured])
     if found.spread.ndim == 2:
-        weighted = gain * np.sqrt(found.spread)
-        other = weighted
+        own = gain * found.spread[:, np.newaxis]
     else:
-        weighted, other = product(gain, found.spread), gain
-    whole = np.empty_like(covariance)
-    term = np.empty((size, covariance.shape[2]))
-    for j in range(size):
-        column, part = whole[: j + 1, j], term[: j + 1]
-        np.multiply(weighted[: j + 1, 0], other[j, 0], out=column)
-        for k in range(1, many):
-            np.multiply(weighted[: j + 1, k], other[j, k], out=part)
-            column += part
-        for k in range(known):
-            np.multiply(shrunk[: j + 1, k], right[j, k], out=part)
-            column += part
-        if j >= known:
-            column += covariance[: j + 1, j]
-            for k in range(many):
-                np.multiply(gain[: j + 1, k], found.cross[j, k], out=part)
-                column -= part
-        whole[j, :j] = whole[:j, j]
+        own = product(found.spread, gain)
+    error = product(found.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
+    term = np.empty_like(block)
+    for k in range(len(gain)):
+        np.multiply(error[k, :, np.newaxis], gain[k, np.newaxis], out=term)
+        block -= term
+    whole[measured, measured] = symmetric(block)
     return whole
+
+
+def _less_squares(
+    covariance: FloatArray, weighted: FloatArray, rows: slice, columns: slice, out: FloatArray
+) -> None:
+    """Write some rows and columns of P - K S Kᵀ; mirrored elements are the same to the bit."""
+    part = out[rows, columns]
+    term = np.empty_like(part)
+    np.multiply(weighted[0, rows, np.newaxis], weighted[0, np.newaxis, columns], out=term)
+    np.subtract(covariance[rows, columns], term, out=part)
+    for one in weighted[1:]:
+        np.multiply(one[rows, np.newaxis], one[np.newaxis, columns], out=term)
+        part -= term
 
 
 def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ Azimuth is clockwise from the nose, elevation upward, both in the ownship's body
 rate is positive when the range grows. Which of them a sensor measures is its `Kind`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,13 +52,17 @@ def expected(kind: Kind, state: FloatArray, place: Place) -> FloatArray:
     """
     away = state[:3] - place.position_m
     x, y, z = times(place.to_body, away)
-    found = [np.arctan2(y, x), np.arctan2(-z, np.hypot(x, y))]
+    found = np.empty((kind.size, state.shape[-1]))
+    np.arctan2(y, x, out=found[0])
+    np.arctan2(-z, np.hypot(x, y), out=found[1])
+    if kind.size == 2:
+        return found
     distance = np.sqrt(squared_length(away))
     if kind.has_range:
-        found.append(distance)
+        found[2] = distance
     if kind.has_range_rate:
-        found.append(_along(away, _closing(state, place)) / np.maximum(distance, _NEAREST_M))
-    return np.stack(found)
+        found[-1] = _along(away, _closing(state, place)) / np.maximum(distance, _NEAREST_M)
+    return found
 
 
 def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
@@ -76,29 +81,39 @@ def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray,
     square = distance * distance
     level = np.hypot(x, y)
     safe = np.maximum(level, _ZENITH * distance)
-    found = [np.arctan2(y, x), np.arctan2(-z, level)]
+    found = np.empty((kind.size, state.shape[-1]))
+    np.arctan2(y, x, out=found[0])
+    np.arctan2(-z, level, out=found[1])
     jacobian = np.zeros((kind.size, 6 if kind.has_range_rate else 3, state.shape[-1]))
     level_square = safe * safe
-    jacobian[0, :3] = (-y / level_square) * turned[0] + (x / level_square) * turned[1]
     steep = z / (safe * square)
-    jacobian[1, :3] = (
-        (x * steep) * turned[0] + (y * steep) * turned[1] - (safe / square) * turned[2]
-    )
+    term = np.empty_like(away)
+    for row, parts in (
+        (0, (-y / level_square, x / level_square)),
+        (1, (x * steep, y * steep, -safe / square)),
+    ):
+        slope = jacobian[row, :3]
+        np.multiply(parts[0], turned[0], out=slope)
+        for part, axis in zip(parts[1:], turned[1:], strict=False):
+            np.multiply(part, axis, out=term)
+            slope += term
+    if kind.size == 2:
+        return found, jacobian
     unit = away / distance
     if kind.has_range:
-        found.append(distance)
+        found[2] = distance
         jacobian[2, :3] = unit
     if kind.has_range_rate:
         closing = _closing(state, place)
         rate = _along(away, closing) / distance
-        found.append(rate)
+        found[-1] = rate
         jacobian[-1, :3] = (closing - rate * unit) / distance
         jacobian[-1, 3:6] = unit
-    return np.stack(found), jacobian
+    return found, jacobian
 
 
 def direction(
-    away: FloatArray, covariance: FloatArray
+    away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances.
 
@@ -106,7 +121,7 @@ def direction(
     ----------
     away : (3, n)
         North, east, down or nose, right, floor.
-    covariance : (3, 3, n)
+    covariance : (3, 3, n), or its elements (n,) by row and column
         Its upper triangle is read.
 
     Returns

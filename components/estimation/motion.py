@@ -104,20 +104,21 @@ class ConstantVelocity:
     ) -> tuple[FloatArray, FloatArray]:
         """Return state and covariance after a time; exact, as the model is linear."""
         moved = self.move(state, dt_s)
-        spread = np.empty_like(covariance)
-        velocity = covariance[3:, 3:]
+        spread = np.empty(covariance.shape)
+        velocity, both_ways = covariance[3:, 3:], covariance[:3, 3:]
         gained = dt_s * velocity
-        across = covariance[:3, 3:] + gained
-        half = dt_s * covariance[3:, :3]
-        spread[:3, :3] = covariance[:3, :3] + half + dt_s * across
-        spread[:3, 3:] = across
+        np.add(both_ways, gained, out=spread[:3, 3:])
+        # A + t (B + Bᵀ + t C), symmetric to the bit as A and C are.
+        gained += both_ways + both_ways.swapaxes(0, 1)
+        gained *= dt_s
+        np.add(covariance[:3, :3], gained, out=spread[:3, :3])
         spread[3:, 3:] = velocity
         q, t = self.intensity_m2_s3, dt_s
         position, both, speed = q * (t * t * t / 3.0), q * (t * t / 2.0), q * t
-        for i in range(3):
-            spread[i, i] += position
-            spread[i, i + 3] += both
-            spread[i + 3, i + 3] += speed
+        elements = spread.reshape(36, len(dt_s))  # every seventh lies along a diagonal
+        elements[0:15:7] += position
+        elements[3:18:7] += both
+        elements[21:36:7] += speed
         spread[3:, :3] = spread[:3, 3:].swapaxes(0, 1)
         return moved, spread
 

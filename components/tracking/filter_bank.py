@@ -10,6 +10,7 @@ from components.estimation.batched import (
     cholesky,
     is_everything,
     product_transposed,
+    selected,
     solve_lower,
     squared_length,
     symmetric,
@@ -124,11 +125,13 @@ class FilterBank:
         innovations = [found.innovation(variance, track) for found in moments]
         residuals = [residual(measured, found.expected) for found in innovations]
         distances = [distance_squared(i, r) for i, r in zip(innovations, residuals, strict=True)]
-        likelihoods = [log_likelihood(i, d) for i, d in zip(innovations, distances, strict=True)]
+        likelihoods = np.empty((len(innovations), len(track)))
+        for i, (found, apart) in enumerate(zip(innovations, distances, strict=True)):
+            likelihoods[i] = log_likelihood(found, apart)
         distance = distances[0]
         for other in distances[1:]:
             distance = np.minimum(distance, other)
-        return PairMeasurement(innovations, residuals, distance, np.stack(likelihoods))
+        return PairMeasurement(innovations, residuals, distance, likelihoods)
 
     def update(
         self,
@@ -154,19 +157,19 @@ class FilterBank:
         whole = is_everything(which, pairs.residuals[0].shape[1])
         moved = [
             updated(
-                x if every else x[:, track],
-                p if every else p[:, :, track],
+                x if every else selected(x, track),
+                p if every else selected(p, track),
                 found if whole else found.take(which),
-                apart if whole else apart[:, which],
+                apart if whole else selected(apart, which),
             )
             for x, p, found, apart in zip(
                 states, covariances, pairs.innovations, pairs.residuals, strict=True
             )
         ]
         if len(self.models) == 1:
-            new = weights[:, track]
+            new = weights if every else selected(weights, track)
         else:
-            new = modes.reweighted(weights[:, track], pairs.log_likelihoods[:, which])
+            new = modes.reweighted(selected(weights, track), selected(pairs.log_likelihoods, which))
         return [x for x, _ in moved], [p for _, p in moved], new
 
 
@@ -182,13 +185,13 @@ def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntAr
     """
     if len(weights) == 1:
         return pairs.distance[which]
-    residuals = [apart[:, which] for apart in pairs.residuals]
+    residuals = [selected(apart, which) for apart in pairs.residuals]
     mean = residuals[0] * weights[0]
     for weight, apart in zip(weights[1:], residuals[1:], strict=True):
         mean = mean + weight * apart
     spread = np.zeros((len(mean), *mean.shape))
     for weight, apart, found in zip(weights, residuals, pairs.innovations, strict=True):
-        root, off = found.root[:, :, which], apart - mean
+        root, off = selected(found.root, which), apart - mean
         spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
     return squared_length(solve_lower(cholesky(spread), mean))
 
@@ -224,7 +227,7 @@ def mixture_by_track(
 
     size = len(states)
     mean = np.stack([summed(share * states[i]) for i in range(size)])
-    apart = states - mean[:, track]
+    apart = states - selected(mean, track)
     spread = np.empty((size, size, count))
     for i in range(size):
         for j in range(i, size):

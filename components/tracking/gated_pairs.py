@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.association.gates import gate_threshold
-from components.estimation.batched import is_everything
+from components.estimation.batched import is_everything, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind
@@ -19,6 +19,8 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 # So many pairs are looked at together.
 _MOST_PAIRS = 1 << 20
+# The square of a box's width by that of the gate in it: who is in the gate must not depend on it.
+_WIDER = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,8 @@ def gated_pairs(
             said = rules.bank.measure(
                 moments,
                 track,
-                np.stack([scans.measured[row][cells] for row in rows]),
-                np.stack([scans.variance[row][cells] for row in rows]),
+                _picked(scans.measured, rows, cells),
+                _picked(scans.variance, rows, cells),
             )
             inside = (said.distance <= gate_threshold(rules.gate_probability, kind.size)).nonzero()[
                 0
@@ -124,44 +126,74 @@ def _near(
     first = np.cumsum(counts) - counts
     many = counts[of_detection[mine]]
     threshold = gate_threshold(rules.gate_probability, kind.size)
+    cells = detection[mine]
+    measured = _picked(scans.measured, rows[:3], cells)
+    variance = _picked(scans.variance, rows[:3], cells)
+    boxes = [_box(found, variance, threshold) for found in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
     part = np.cumsum(many) // _MOST_PAIRS
     for begin, end in _parts(part):
-        some, size = mine[begin:end], many[begin:end]
-        entry = np.repeat(some, size)
+        size = many[begin:end]
+        entry = np.repeat(np.arange(begin, end), size)
         start = np.cumsum(size) - size
-        track = np.arange(len(entry)) - np.repeat(start - first[of_detection[some]], size)
-        cells = detection[entry]
-        kept = [_inside(found, scans, rows, cells, track, threshold) for found in moments]
+        track = np.arange(len(entry)) - np.repeat(
+            start - first[of_detection[mine[begin:end]]], size
+        )
+        kept = [_inside(*box, measured, entry, track) for box in boxes]
         near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
         tracks.append(track[near])
-        entries.append(entry[near])
+        entries.append(mine[entry[near]])
+    if len(tracks) == 1:
+        return tracks[0], entries[0]
     return np.concatenate(tracks), np.concatenate(entries)
 
 
+def _box(found: Moments, variance: FloatArray, threshold: float) -> tuple[FloatArray, FloatArray]:
+    """Return where one model expects angles and range, and half the widths of boxes about gates.
+
+    They are wide enough for the worst detection of all, and for rounding.
+    """
+    expected = found.expected[: len(variance)]
+    half = np.empty_like(expected)
+    for i, worst in enumerate(variance.max(axis=1).tolist()):
+        half[i] = np.sqrt((threshold * _WIDER) * (found.total[i, i] + worst))
+    return expected, half
+
+
 def _inside(
-    found: Moments,
-    scans: Scans,
-    rows: list[int],
-    cells: IntArray,
-    track: IntArray,
-    threshold: float,
+    expected: FloatArray, half: FloatArray, measured: FloatArray, entry: IntArray, track: IntArray
 ) -> IntArray:
-    """Return which pairs lie in the box about the gate of one model."""
-    left = np.arange(len(cells))
-    for i, row in enumerate(rows[:3]):
-        apart = np.abs(scans.measured[row][cells] - found.expected[i][track])
-        if i < 2:
-            apart = np.minimum(apart, np.abs(2.0 * np.pi - apart))
-        spread = found.total[i, i][track] + scans.variance[row][cells]
-        inside = (apart * apart <= threshold * spread).nonzero()[0]
-        left, cells, track = left[inside], cells[inside], track[inside]
+    """Return which pairs lie in the boxes about the gates of one model."""
+    left: IntArray | None = None
+    for i in range(len(expected)):
+        apart = measured[i].take(entry)
+        apart -= expected[i].take(track)
+        np.abs(apart, out=apart)
+        width = half[i].take(track)
+        inside = apart <= width
+        if i == 0:  # azimuths may be a turn apart
+            apart += width
+            inside |= apart >= 2.0 * np.pi
+        (some,) = inside.nonzero()
+        left = some if left is None else left[some]
+        entry, track = entry[some], track[some]
+    assert left is not None
     return left
 
 
+def _picked(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
+    """Return some rows of values at some detections."""
+    found = np.empty((len(rows), len(cells)))
+    for i, row in enumerate(rows):
+        values[row].take(cells, out=found[i], mode="clip")
+    return found
+
+
 def _parts(part: IntArray) -> list[tuple[int, int]]:
-    """Return where runs of equal numbers begin and end."""
+    """Return where runs of equal numbers, ascending from 0, begin and end."""
+    if len(part) == 0 or part[-1] == 0:
+        return [(0, len(part))]
     cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(part)]
     return list(pairwise(cuts))
 
@@ -171,18 +203,19 @@ def taken_pairs(said: PairMeasurement, which: IntArray) -> PairMeasurement:
         return said
     return PairMeasurement(
         [found.take(which) for found in said.innovations],
-        [apart[:, which] for apart in said.residuals],
+        [selected(apart, which) for apart in said.residuals],
         said.distance[which],
-        said.log_likelihoods[:, which],
+        selected(said.log_likelihoods, which),
     )
 
 
 def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
     """Return the logarithm of the density of false alarms at every pair's detection."""
-    lowest = sensors[one.detection] & -sensors[one.detection]
-    sensor = np.log2(lowest.astype(float)).astype(np.int64)
+    mine = sensors[one.detection]
+    lowest = mine & -mine
+    sensor = np.frexp(lowest.astype(float))[1] - 1
     code = one.kind.has_range + 2 * one.kind.has_range_rate
-    return np.asarray(rules.log_density[code, sensor])
+    return np.asarray(rules.log_density[code].take(sensor))
 
 
 def log_gain(
@@ -190,7 +223,7 @@ def log_gain(
 ) -> FloatArray:
     """Return ln(Pd N(z) / λ) of every pair."""
     density = log_density(rules, one, sensors)
-    mixed = log_mixture(part.weights[:, one.track], one.said.log_likelihoods)
+    mixed = log_mixture(selected(part.weights, one.track), one.said.log_likelihoods)
     return np.asarray(np.log(rules.detection_probability) + mixed - density)
 
 

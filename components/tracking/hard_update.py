@@ -1,11 +1,13 @@
 """The update of one detection for one track: nearest, or globally nearest."""
 
+from typing import Any
+
 import numpy as np
 
 from components.association.assignment import global_nearest, nearest
 from components.association.clusters import alone
 from components.association.gates import gate_threshold
-from components.estimation.batched import log_determinant
+from components.estimation.batched import is_everything, log_determinant, selected
 from components.estimation.frame import Place
 from components.tracking.filter_bank import innovation_squared
 from components.tracking.gated_pairs import GatedPairs, log_density, log_gain, named, put
@@ -28,13 +30,12 @@ def updated_by_one(
     hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
     if not kinds:
         return part, hit, gain
-    track = np.concatenate([one.track for one in kinds])
-    entry = np.concatenate([one.detection for one in kinds])
-    distance = np.concatenate([one.said.distance for one in kinds])
+    track = joined([one.track for one in kinds])
+    entry = joined([one.detection for one in kinds])
     if bool(alone(track, entry).all()):
         taken = np.arange(len(track))
     elif rules.association == "nearest":
-        taken = nearest(track, entry, distance)
+        taken = nearest(track, entry, joined([one.said.distance for one in kinds]))
     else:
         # Kinds measure different things: what all compare with are false alarms of their kind.
         volume = np.concatenate(
@@ -48,16 +49,19 @@ def updated_by_one(
             limits[many] = gate_threshold(rules.gate_probability, many)
         price = np.full(len(part), -np.inf)
         np.maximum.at(price, track, limits[sizes] + volume)
+        distance = joined([one.said.distance for one in kinds])
         taken = global_nearest(track, entry, distance + volume, price[track])
     first = 0
     for one in kinds:
         last = first + len(one.track)
-        mine = taken[(taken >= first) & (taken < last)] - first
+        mine = taken if len(kinds) == 1 else taken[(taken >= first) & (taken < last)] - first
         first = last
         if len(mine) == 0:
             continue
-        mine = mine[np.argsort(one.track[mine])]
         which = one.track[mine]
+        if not bool((which[1:] > which[:-1]).all()):
+            mine = mine[np.argsort(which)]
+            which = one.track[mine]
         states, covariances, weights = rules.bank.update(
             part.states(), part.covariances(), part.weights, which, one.said, mine
         )
@@ -67,17 +71,26 @@ def updated_by_one(
         hit[which] = True
         size = len(one.said.residuals[0])
         ranged = one.kind.has_range or one.ranges is not None
+        before: dict[str, Any] = part.columns if is_everything(which, len(part)) else {
+            name: selected(part.columns[name], which)
+            for name in ("contributors", "ranged", "nis", "freedom", "weights")
+        }  # fmt: skip
         new = {
             **named(states, covariances),
             "weights": weights,
-            "contributors": part.contributors[which] | mask,
+            "contributors": before["contributors"] | mask,
             "updated_by": mask,
-            "ranged": part.ranged[which] | ranged,
-            "nis": part.nis[which] + innovation_squared(one.said, part.weights[:, which], mine),
-            "freedom": part.freedom[which] + size,
+            "ranged": before["ranged"] | ranged,
+            "nis": before["nis"] + innovation_squared(one.said, before["weights"], mine),
+            "freedom": before["freedom"] + size,
         }
         part = put(part, which, new)
     return part, hit, gain
+
+
+def joined(parts: list[Any]) -> Any:
+    """Return arrays end to end; a single one as it is."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _log_volume(one: GatedPairs) -> FloatArray:

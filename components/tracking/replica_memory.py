@@ -57,7 +57,10 @@ class Heads:
     def take(self, which: Any) -> "Heads":
         """Return some of them."""
         return Heads(
-            self.replica[which], self.next_number[which], self.tick[which], self.origin[:, which]
+            self.replica[which],
+            self.next_number[which],
+            self.tick[which],
+            np.ascontiguousarray(self.origin[:, which]),
         )
 
     def kept_with(self, newer: "Heads") -> "Heads":

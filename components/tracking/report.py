@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.estimation import modes
+from components.estimation.batched import selected
 from components.estimation.frame import Place
 from components.estimation.measurement import direction
 from components.messages.columns import COVARIANCE
@@ -89,11 +90,8 @@ def state_tracks(
     store = _Columns(reported, order)
     models = len(reported[0].store.weights)
     state, covariance = store.state(models)
-    position = np.empty((3, 3, len(look)))
-    for i in range(3):
-        for j in range(i, 3):
-            position[i, j] = covariance[i, j]
-    seen = direction(state[:3] - places.position_m[:, look], position)
+    own, origin = selected(places.position_m, look), selected(origin, look)
+    seen = direction(state[:3] - own, covariance)
     unknown = ~store.plain("ranged")
     hidden = bool(unknown.any())
 
@@ -120,12 +118,12 @@ def state_tracks(
         updated_s=(store.plain("updated_tick") - begin) / per_s,
         contributors=store.plain("contributors"),
         updated_by=store.plain("updated_by"),
-        own_north_m=places.position_m[0, look],
-        own_east_m=places.position_m[1, look],
-        own_down_m=places.position_m[2, look],
-        origin_lat_deg=origin[0, look],
-        origin_lon_deg=origin[1, look],
-        origin_alt_m=origin[2, look],
+        own_north_m=own[0],
+        own_east_m=own[1],
+        own_down_m=own[2],
+        origin_lat_deg=origin[0],
+        origin_lon_deg=origin[1],
+        origin_alt_m=origin[2],
         covariance={name: known(covariance[place]) for place, name in COVARIANCE.items()},
         extras={} if models == 1 else store.extras(models, known),
         sensors=sensors,
@@ -144,17 +142,20 @@ class _Columns:
 
     def plain(self, name: str) -> Any:
         """Return a column."""
-        return np.concatenate([part[name] for part in self._parts])[self._order]
+        return np.concatenate([part[name] for part in self._parts]).take(self._order)
 
     def element(self, name: str, *place: int) -> FloatArray:
         """Return one component of a vector, or one element of a matrix."""
-        return np.concatenate([part[name][place] for part in self._parts])[self._order]
+        return np.concatenate([part[name][place] for part in self._parts]).take(self._order)
 
     def state(self, models: int) -> tuple[FloatArray, dict[tuple[int, int], FloatArray]]:
         """Return position and velocity, and their covariance by its elements, over all models."""
         states, covariances = [], []
         for m in range(models):
-            states.append(np.stack([self.element(f"state{m}", i) for i in range(6)]))
+            state = np.empty((6, len(self._order)))
+            for i in range(6):
+                state[i] = self.element(f"state{m}", i)
+            states.append(state)
             covariances.append({k: self.element(f"covariance{m}", *k) for k in COVARIANCE})
         if models == 1:
             return states[0], covariances[0]

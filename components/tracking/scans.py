@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from components.estimation.batched import selected
 from components.estimation.measurement import Kind
 from components.messages.detections import POSE
 from components.messages.fused import FusedDetections
@@ -82,8 +83,9 @@ class Scans:
         which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
         return type(self)(
             self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
-            self.pose[:, looks], self.velocity[:, looks], offsets, self.measured[:, which],
-            self.variance[:, which], self.contributors[which],
+            selected(self.pose, looks), selected(self.velocity, looks), offsets,
+            selected(self.measured, which), selected(self.variance, which),
+            self.contributors[which],
         )  # fmt: skip
 
     @classmethod
@@ -154,17 +156,18 @@ def scans_of(fused: FusedDetections) -> Scans:
     entries = np.argsort(of_entry, kind="stable")
     measured = np.stack([getattr(fused, name) for name in _MEASURED])
     variance = np.stack([getattr(fused, name) for name in _VARIANCES])
-    _refuse(fused, measured, variance, place[:, begins])
+    seen_from = selected(place, begins)
+    _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
         tick=key[1][begins],
         sensors=union,
         tells_misses=whole,
-        pose=place[:, begins],
+        pose=seen_from,
         velocity=_velocities(fused, of_entry, count),
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
-        measured=measured[:, entries],
-        variance=variance[:, entries],
+        measured=selected(measured, entries),
+        variance=selected(variance, entries),
         contributors=mask[entries],
     )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed
+from components.estimation.batched import product, product_transposed, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import linearised, position_of
@@ -29,9 +29,10 @@ def started(
     """Return a track for every one of some detections, in their order."""
     count = len(detection)
     sizes = rules.bank.sizes
-    if count == 0:
-        return TrackStore.empty(sizes, len(rules.fields)), next_number
-    measured, variance = scans.measured[:3, detection], scans.variance[:3, detection]
+    measured, variance = (
+        selected(scans.measured[:3], detection),
+        selected(scans.variance[:3], detection),
+    )
     ranged = codes[detection] % 2 == 1
     mean, deviation = rules.start_range_m
     measured[2] = np.where(ranged, measured[2], mean)
@@ -100,11 +101,12 @@ def _tell_rates(
     if len(which) == 0:
         return
     kind, _ = kind_of(2)
-    known, slope = linearised(kind, state[:, which], place.take(which))
-    rate, variance = scans.measured[3:, detection[which]], scans.variance[3:, detection[which]]
-    found = innovation(known[2:], slope[2:], covariance[:, :, which], variance)
+    known, slope = linearised(kind, selected(state, which), place.take(which))
+    cells = detection[which]
+    rate, variance = selected(scans.measured[3:], cells), selected(scans.variance[3:], cells)
+    found = innovation(known[2:], slope[2:], selected(covariance, which), variance)
     state[:, which], covariance[:, :, which] = updated(
-        state[:, which], covariance[:, :, which], found, rate - known[2:]
+        selected(state, which), selected(covariance, which), found, rate - known[2:]
     )
 
 

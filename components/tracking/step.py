@@ -49,9 +49,11 @@ def step(
     """
     of = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
     here = replica[of] == store.replica
-    rest = store.take(~here)
+    parts = [] if here.all() else [store.take(~here)]
     alive = here & (store.status != DELETED)
-    part, of = store.take(alive), of[alive]
+    part = store.take(alive)
+    if len(part) < len(store):
+        of = of[alive]
     tick = scans.tick[looks]
     detection, of_detection = detections_of(scans, looks)
     part = _predicted(rules, part, tick[of])
@@ -60,11 +62,14 @@ def step(
                                of_detection)  # fmt: skip
     else:
         gated = np.zeros(len(detection), dtype=bool)
-    born, next_number = started(
-        rules, scans, places, codes, looks, replica, next_number,
-        detection[~gated], of_detection[~gated],
-    )  # fmt: skip
-    return TrackStore.joined([rest, part, born]), next_number
+    parts.append(part)
+    if not gated.all():
+        born, next_number = started(
+            rules, scans, places, codes, looks, replica, next_number,
+            detection[~gated], of_detection[~gated],
+        )  # fmt: skip
+        parts.append(born)
+    return TrackStore.joined(parts), next_number
 
 
 def detections_of(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
@@ -114,18 +119,15 @@ def looked_at(
     sensors = scans.contributors[detection]
     update = updated_by_all if rules.association == "jpda" else updated_by_one
     changed, hit, gain = update(rules, part, kinds, sensors, place)
-    missed = looked.any(axis=0) & ~hit
-    by = np.where(hit, changed.updated_by, 0) >> np.arange(len(rules.fields))[:, np.newaxis] & 1
-    vain = np.where(by == 1, 0, part.vain + (looked & (by == 0)))
-    gain = np.where(
-        hit,
-        gain,
-        np.where(missed, np.log1p(-rules.detection_probability * rules.gate_probability), 0.0),
-    )
+    missed = ~hit
+    missed &= looked.any(axis=0)
+    vain = _looks_in_vain(part.vain, np.where(hit, changed.updated_by, 0), looked)
+    gain[~hit] = 0.0
+    gain[missed] = np.log1p(-rules.detection_probability * rules.gate_probability)
     history, count, misses = after_hits_and_misses(
         part.history, part.looks, part.misses, hit, missed
     )
-    score = np.clip(part.score + gain, -LARGEST_SCORE, LARGEST_SCORE)
+    score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = rules.life.judge(part.status, history, count, misses, score, rules.start_score)
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
@@ -135,6 +137,17 @@ def looked_at(
     ended = changed.ranged & (spread > rules.delete_above_m**2)
     ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
     return changed.with_columns(status=np.where(ended, DELETED, status)), gated
+
+
+def _looks_in_vain(vain: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
+    """Return each sensor's looks in vain after a look; `by` is the mask of who updated a track."""
+    new = vain.copy()
+    hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
+    for i, mine in enumerate(looked):
+        new[i] += mine
+        if hitting >> i & 1:
+            new[i][(by >> i & 1).astype(bool)] = 0
+    return new
 
 
 def position_variance(part: TrackStore) -> FloatArray:
@@ -173,18 +186,20 @@ def _expected_looks(
     found = np.zeros((len(rules.fields), len(part)), dtype=bool)
     if used == 0:
         return found
-    azimuth, elevation = (
-        expected(Kind(False), part.state0, place) if direction is None else direction
-    )
-    away = np.sqrt(squared_length(part.state0[:3] - place.position_m))
-    distance = np.where(part.ranged, away, 0.0)
-    there = np.ones(len(part), dtype=bool)
     mine = sensors[of]
     sees = seeing(part.vain)
+    where: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for i, field in enumerate(rules.fields):
         if not used >> i & 1:
             continue
         found[i] = (mine >> i & 1).astype(bool) & sees[i]
-        if field is not None:
-            found[i] &= field.decide(azimuth, elevation, distance, there) == EVALUATE
+        if field is None:
+            continue
+        if where is None:
+            if direction is None:
+                direction = expected(Kind(False), part.state0, place)
+            away = np.sqrt(squared_length(part.state0[:3] - place.position_m))
+            where = (*direction, np.where(part.ranged, away, 0.0))
+        there = np.ones(len(part), dtype=bool)
+        found[i] &= field.decide(*where, there) == EVALUATE
     return found

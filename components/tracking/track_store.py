@@ -71,7 +71,13 @@ class TrackStore:
             if which.all():
                 return self
             which = which.nonzero()[0]
+        if len(which) == 0:
+            return self.none()
         return type(self)({name: v.take(which, axis=-1) for name, v in self.columns.items()})
+
+    def none(self) -> Self:
+        """Return no tracks of the same columns."""
+        return type(self)({name: v[..., :0] for name, v in self.columns.items()})
 
     def with_columns(self, **columns: Any) -> Self:
         """Return the same tracks with other values."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from components.estimation.batched import selected
 from components.estimation.frame import place_in_frame
 from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer
@@ -206,12 +207,15 @@ class Tracker(Component):
             plan, left_out = planned(scans, of, begin, memory, self._lag_ticks)
         self._late += left_out
         moves = scans.velocity if self.rules.rates_of else None
-        places = place_in_frame(tuple(heads.origin[:, of]), *_pose(scans.pose), moves)
+        origin = selected(heads.origin, of)
+        places = place_in_frame(tuple(origin), *_pose(scans.pose), moves)
         codes = scans.kinds(self.rules.rates_of)
         reported: list[Reported] = []
         for works in _turns(plan.of):
-            late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
-            if len(late):
+            works_now = works
+            if self.p.late == "one_step":
+                late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
+            if self.p.late == "one_step" and len(late):
                 replicas = heads.replica[plan.of[late]]
                 old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
                 store = late_step(
@@ -245,7 +249,7 @@ class Tracker(Component):
         if len(plan.look) == 0:
             return None
         rows = np.unique(plan.row)
-        return state_tracks(reported, places, heads.origin[:, of], rows, wake, self._sensors)
+        return state_tracks(reported, places, origin, rows, wake, self._sensors)
 
     def _remember(
         self,

@@ -1,5 +1,6 @@
 """Tracks without a range: what a direction tells of them, and the first range."""
 
+from components.estimation.batched import selected
 from components.estimation.frame import Place
 from components.estimation.modified_polar import moved_in_polar, ranged_in_polar
 from components.tracking.filter_bank import States
@@ -37,9 +38,11 @@ def told_without_range(
     if one.kind.has_range or len(blind) == 0:
         return
     which = track[blind]
-    sensor_m = place.position_m[:, which]
+    sensor_m = selected(place.position_m, which)
     for before, after, covariance in zip(part.states(), states, covariances, strict=True):
-        moved = moved_in_polar(before[:, which], after[:, blind], covariance[:, :, blind], sensor_m)
+        moved = moved_in_polar(
+            selected(before, which), selected(after, blind), selected(covariance, blind), sensor_m
+        )
         if one.ranges is not None:
             range_m, variance_m2 = (values[pair[blind]] for values in one.ranges)
             moved = ranged_in_polar(*moved, range_m, variance_m2, sensor_m)

@@ -8,7 +8,7 @@ import networkx as nx
 
 from dsa_des.commands.loading import load
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file
+from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import named
 from dsa_des.record.drawing import drawing, figure_text
 from dsa_des.scene.graph import depths
@@ -36,6 +36,7 @@ def show_graph(
         say_lines(to_dot(loaded))
     elif png:
         path = Path(f"{loaded.path.stem}-graph.png") if out is None else named(out)
+        check_ending(path, PICTURES)
         check_file(path)
         draw_graph(loaded, path)
         say(f"wrote {path}")

@@ -2,6 +2,7 @@
 
 import os
 import stat
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_names import reason_of, why_no_name
 from dsa_des.files.unfinished import remove_left_over, temporary_beside
 
+#: Endings of the pictures that are drawn.
+PICTURES = (".png",)
 #: Folders of the system, in which names stand for something else: ``/dev/stdout`` is a link that
 #: may well lead to an ordinary file, and must not be replaced all the same.
 _SYSTEM = ("/dev", "/proc", "/sys")
@@ -68,6 +71,24 @@ def check_file(path: Path, option: str = "--out") -> None:
         trial.unlink()
     except OSError as error:
         raise UsageError(f"{option} {path}: cannot be written: {reason_of(error)}") from error
+
+
+def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> None:
+    """Raise UsageError unless a file's name ends as one of its kind does.
+
+    Parameters
+    ----------
+    path : Path
+    endings : sequence of str
+        With their dots, in small letters; capitals will do as well.
+    option : str
+        That named it.
+    """
+    if path.suffix.lower() not in endings:
+        meant = "" if path.suffix else f"; {path.name}{endings[0]} would do"
+        raise UsageError(
+            f"{option} {path}: a name that ends in {' or '.join(endings)} is needed{meant}"
+        )
 
 
 def _why_no_file(path: Path) -> str | None:

@@ -4,6 +4,7 @@ It is a pure function of the study and the chunk; whichever worker runs it, and 
 the same.
 """
 
+import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,9 @@ from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import CLASS, RATIO, SHARE, TRIALS, Group, Metric, Result, wanted_by
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.study import Chunk, Study, set_text
+
+#: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
+_MANY_RUNS = 64
 
 #: What became of a run: it has results; it failed, and will again; its process died.
 DONE, FAILED, CRASHED = "done", "failed", "crashed"
@@ -89,7 +93,11 @@ def run_chunk(study: Study, chunk: Chunk) -> Done:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     schema = schema_of(study)
     tables = [_run_cell(study, schema, *part) for part in chunk.runs]
-    return done_of(chunk.name, pa.concat_tables(tables))
+    done = done_of(chunk.name, pa.concat_tables(tables))
+    del tables
+    if len(chunk) >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
+        gc.collect()
+    return done
 
 
 def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:

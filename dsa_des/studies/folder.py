@@ -3,6 +3,7 @@
 import io
 import os
 import re
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -190,8 +191,15 @@ class StudyFolder:
                 raise UsageError(f"{self.parts / file}: is no part of a study; move it away")
         return [file.removesuffix(".parquet") for file in files if not file.startswith(".")]
 
-    def part(self, name: str) -> "pa.Table | None":
-        """Return the rows of a part; None if it is not there, damaged, or of another study."""
+    def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
+        """Return the rows of a part; None if it is not there, damaged, or of another study.
+
+        Parameters
+        ----------
+        name : str
+        columns : sequence of str, optional
+            Only these, of a part that was found good before.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -199,10 +207,11 @@ class StudyFolder:
             content = read_regular(self.parts / f"{name}.parquet")
             if not is_sealed(content, self._owner(name)):
                 return None
-            table = pq.read_table(io.BytesIO(content)).replace_schema_metadata(None)
+            table = pq.read_table(io.BytesIO(content), columns=columns)
         except (OSError, MemoryError, pa.ArrowException):
             return None
-        return table if _fits(table, self.record) else None
+        table = table.replace_schema_metadata(None)
+        return table if columns is not None or _fits(table, self.record) else None
 
     def write_part(self, name: str, content: bytes) -> None:
         """Write a part as a whole, sealed as one of this study.
@@ -222,13 +231,10 @@ class StudyFolder:
     def _owner(self, name: str) -> str:
         return f"{self.record.study_sha256} {name}"
 
-    def results(self, before_round: int | None = None) -> "pa.Table":
+    def results(self) -> "pa.Table":
         """Return the rows of all parts, in order of cell and replica.
 
-        Parameters
-        ----------
-        before_round : int, optional
-            Only those of earlier rounds.
+        All of them are in memory then; `dsa_des.studies.stored_rows` reads them part by part.
 
         Raises
         ------
@@ -237,13 +243,38 @@ class StudyFolder:
         """
         import pyarrow as pa
 
+        table = pa.concat_tables(list(self.each_part()))
+        return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
+
+    def each_part(
+        self, before_round: int | None = None, columns: Sequence[str] | None = None
+    ) -> Iterator["pa.Table"]:
+        """Give the rows of each part, in order of their names.
+
+        Parameters
+        ----------
+        before_round : int, optional
+            Only those of earlier rounds.
+        columns : sequence of str, optional
+            Only these, of parts that were found good before.
+
+        Raises
+        ------
+        UsageError
+            At the end, if there are none, or if one is damaged or of another study.
+        """
         names = self.part_names()
         if before_round is not None:
             names = [name for name in names if int(name.split("-")[1]) < before_round]
         if not names:
             raise UsageError(f"{self.path}: holds no results yet")
-        tables = {name: self.part(name) for name in names}
-        damaged = [f"{name}.parquet" for name, table in tables.items() if table is None]
+        damaged = []
+        for name in names:
+            table = self.part(name, columns)
+            if table is None:
+                damaged.append(f"{name}.parquet")
+            else:
+                yield table
         if damaged:
             shown = ", ".join(damaged[:_MOST_NAMED])
             if len(damaged) > _MOST_NAMED:
@@ -252,8 +283,6 @@ class StudyFolder:
                 f"{self.parts}: cannot be read: {shown}; --resume writes damaged parts anew, "
                 "those of another study must be moved away"
             )
-        table = pa.concat_tables([table for table in tables.values() if table is not None])
-        return table.sort_by([("cell", "ascending"), ("replica", "ascending")]).combine_chunks()
 
     # -- other files -----------------------------------------------------------------------
 

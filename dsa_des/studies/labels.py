@@ -15,6 +15,8 @@ _UNITS = {
 _PER = re.compile(r"_([a-z]+2?)_per_([a-z]+)$")
 #: Words of two letters that are none but words.
 _WORDS = {"at", "by", "in", "is", "no", "of", "on", "or", "to", "up"}
+#: Abbreviations that hold vowels.
+_ABBREVIATIONS = {"nees", "ospa", "gospa", "nmac", "siap"}
 _CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
 
 
@@ -76,7 +78,7 @@ def _spaced(name: str) -> str:
 def _short(word: str) -> bool:
     """Return whether a word is an abbreviation: IR, RCS, SNR."""
     two = len(word) == 2 and word.isalpha() and word not in _WORDS
-    return two or bool(_CONSONANTS.fullmatch(word))
+    return two or word in _ABBREVIATIONS or bool(_CONSONANTS.fullmatch(word))
 
 
 def _capital(text: str) -> str:

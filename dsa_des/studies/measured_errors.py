@@ -11,6 +11,7 @@ from dsa_des.costs.variants import Variants
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.record import StrictRecord
 from dsa_des.studies.safe_files import read_regular
+from dsa_des.studies.stored_rows import StoredRows
 
 ERRORS = "errors.json"
 _MOST_BYTES = 4 * 2**20
@@ -54,7 +55,7 @@ def measure_errors(folder: StudyFolder) -> None:
         If the folder cannot be written.
     """
     record = folder.record
-    (first,) = folder.results().slice(0, 1).to_pylist()
+    first = StoredRows(folder).first
     swaps, sets = record.changes(first)
     variants = Variants(
         Path(record.scene), sets=[f"{key}={value}" for key, value in sets],

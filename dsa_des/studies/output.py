@@ -23,6 +23,7 @@ from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.seal import parquet
 from dsa_des.studies.series_figure import draw_series, of_series
+from dsa_des.studies.stored_rows import StoredRows
 from dsa_des.studies.study import Study
 from dsa_des.studies.summary import Compared, Line, Rows, compare_axis, paired, summarise
 from dsa_des.text.safe_text import shortened
@@ -56,7 +57,7 @@ class Tables:
         record = self.record
         self.results = record.results_list()
         axes = [axis.column for axis in record.axes]
-        self.rows = Rows(folder.results(), axes, record.over)
+        self.rows = Rows(StoredRows(folder), axes, record.over)
         expected = self._earlier() if self.study is None else self._expected(self.study)
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval, expected

@@ -6,9 +6,6 @@ code that it names. Pictures stand in the page itself, and it loads nothing.
 
 import base64
 import hashlib
-from collections import Counter
-from collections.abc import Iterable, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -25,32 +22,14 @@ from dsa_des.studies.printing import (
     interval_text,
     ratio_cells,
 )
+from dsa_des.studies.report_html import page, table, text, verbatim
 from dsa_des.studies.report_models import models_part
 from dsa_des.studies.safe_files import read_regular
 from dsa_des.studies.study import run_command
-from dsa_des.text.safe_text import printable, shortened
 
 REPORT = "report.html"
 _LARGEST_PICTURE = 20 * 2**20
-_MOST_PICTURES, _MOST_RUNS, _MOST_ROWS, _MOST_PARTS = 60, 50, 5000, 1000
-_LONGEST = 400
-_STYLE = """
-:root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
-@media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
---note:#a5abb3}figure img{background:#fff;border-radius:4px}}
-body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;
-color:var(--ink);background:var(--paper);overflow-wrap:break-word}
-h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid var(--line)}
-h3{font-size:1em;margin:1.2em 0 .2em}
-.wide{overflow-x:auto;max-width:100%}table{border-collapse:collapse;margin:.6em 0;
-width:max-content}
-td,th{padding:.15em .7em;border-bottom:1px solid var(--line);text-align:left;vertical-align:top;
-}td{max-width:34em}th{background:var(--soft)}code,pre{background:var(--soft);
-font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figure{margin:1em 0}
-img{max-width:100%;height:auto}.note{color:var(--note)}
-@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}}
-@media print{.wide{overflow:visible}}
-"""
+_MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 
 
 def study_report(folder: StudyFolder) -> bytes:
@@ -73,40 +52,18 @@ def study_report(folder: StudyFolder) -> bytes:
         _asked(tables),
         _scene(tables, folder),
         models_part(
-            read_explained(folder), read_errors(folder), _table, _text, _explain(tables.record)
+            read_explained(folder), read_errors(folder), table, text, _explain(tables.record)
         ),
         _results(tables),
         _ratios(tables),
         _requirements(tables),
         _differences(tables),
         _pictures(folder),
-        _troubles(tables, folder),
+        _troubles(tables),
         _origin(folder),
         _repeat(tables, folder),
     ]
-    title = _text(record.title)
-    page = (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "img-src data:; style-src 'unsafe-inline'\">"
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{title}</title><style>{_STYLE}</style></head><body>\n"
-    )
-    return (page + "\n".join(filter(None, parts)) + "\n</body></html>\n").encode()
-
-
-def _text(value: Any) -> str:
-    return escape(shortened(printable(str(value)), _LONGEST))
-
-
-def _table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    def line(cells: Sequence[Any], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{_text(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-    body = "\n".join(line(row, "td") for row in rows)
-    if not body:
-        return ""
-    return f"<div class='wide'><table>{line(headings, 'th')}\n{body}</table></div>"
+    return page(record.title, parts)
 
 
 def _head(tables: Tables) -> str:
@@ -114,7 +71,7 @@ def _head(tables: Tables) -> str:
     rows = tables.rows
     runs = len(rows.places) + rows.failed
     said = f"{runs} runs in {record.cells} cells; {rows.failed} without result"
-    return f'<h1>{_text(record.title)}</h1><p class="note">{_text(said)}</p>'
+    return f'<h1>{text(record.title)}</h1><p class="note">{text(said)}</p>'
 
 
 def _asked(tables: Tables) -> str:
@@ -141,9 +98,9 @@ def _asked(tables: Tables) -> str:
     results = [(r.name, r.kind, r.meaning) for r in tables.results]
     return (
         "<h2>What was asked</h2>"
-        + _table(("", ""), rows)
-        + _table(("axis", "values", ""), axes)
-        + _table(("result", "kind", "meaning"), results)
+        + table(("", ""), rows)
+        + table(("axis", "values", ""), axes)
+        + table(("result", "kind", "meaning"), results)
     )
 
 
@@ -154,15 +111,14 @@ def _scene(tables: Tables, folder: StudyFolder) -> str:
     found = read_explained(folder)
     whole = ""
     if found is not None and found.scene:
-        lines = found.scene.splitlines()[:_MOST_ROWS]
         whole = (
-            "<details><summary>The first run's scene, every default written out</summary><pre>"
-            + "\n".join(escape(printable(line)) for line in lines)
-            + "</pre></details>"
+            "<details><summary>The first run's scene, every default written out</summary>"
+            + verbatim(found.scene.splitlines()[:_MOST_ROWS])
+            + "</details>"
         )
     return (
-        f"<h2>The scene</h2><p><code>{_text(record.scene)}</code></p>"
-        + _table(("in every cell", ""), changes)
+        f"<h2>The scene</h2><p><code>{text(record.scene)}</code></p>"
+        + table(("in every cell", ""), changes)
         + whole
     )
 
@@ -197,7 +153,7 @@ def _results(tables: Tables) -> str:
     note = f"<p>and {more} more lines in summary.parquet</p>" if more > 0 else ""
     return (
         "<h2>Results</h2><p class='note'>Cut off: values that the beginning or the end of a run "
-        "censored; the mean holds them.</p>" + _table(headings, rows) + note
+        "censored; the mean holds them.</p>" + table(headings, rows) + note
     )
 
 
@@ -207,7 +163,7 @@ def _ratios(tables: Tables) -> str:
         "<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. "
         "Below, above, induced: units with the event without and with the remedy, and with it "
         "alone. Effective size: Kish's, of the weights.</p>"
-        + _table((*tables.rows.axes, *RATIO_HEADS), rows)
+        + table((*tables.rows.axes, *RATIO_HEADS), rows)
         if rows
         else ""
     )
@@ -220,7 +176,7 @@ def _requirements(tables: Tables) -> str:
     sure = f"{100 * one_sided(tables.record.confidence):g} %"
     return (
         f"<h2>Requirements</h2><p class='note'>The cheapest value whose interval, and that of all "
-        f"dearer ones, lies within the limit; {sure} sure.</p>" + _table(ANSWER_HEADS, rows)
+        f"dearer ones, lies within the limit; {sure} sure.</p>" + table(ANSWER_HEADS, rows)
     )
 
 
@@ -237,7 +193,7 @@ def _differences(tables: Tables) -> str:
         for item in tables.compared[:_MOST_ROWS]
     ]  # fmt: skip
     headings = (*others, tables.baseline[0], "less", "result", "difference", "interval", "pairs")
-    return "<h2>Paired differences</h2>" + _table(headings, rows)
+    return "<h2>Paired differences</h2>" + table(headings, rows)
 
 
 def _pictures(folder: StudyFolder) -> str:
@@ -249,26 +205,25 @@ def _pictures(folder: StudyFolder) -> str:
             continue  # a link, or gone
         data = base64.b64encode(content).decode()
         found.append(
-            f'<figure><img alt="{_text(path.stem)}" src="data:image/png;base64,{data}">'
-            f"<figcaption>{_text(path.name)}</figcaption></figure>"
+            f'<figure><img alt="{text(path.stem)}" src="data:image/png;base64,{data}">'
+            f"<figcaption>{text(path.name)}</figcaption></figure>"
         )
     return "<h2>Figures</h2>" + "\n".join(found) if found else ""
 
 
-def _troubles(tables: Tables, folder: StudyFolder) -> str:
-    table = folder.results()
-    status = Counter(table["status"].to_pylist())
+def _troubles(tables: Tables) -> str:
+    stored = tables.rows.stored
     rows = [
         (row["cell"], row["replica"], row["status"], row["error"], tables.record.command(row))
-        for row in table.filter(table["error"].is_valid()).slice(0, _MOST_RUNS).to_pylist()
+        for row in stored.failed
     ]
     cut = sum(many for line in tables.lines for _, many in line.cut_off)
-    said = ", ".join(f"{many} {name}" for name, many in sorted(status.items()))
+    said = ", ".join(f"{many} {name}" for name, many in sorted(stored.status.items()))
     more = tables.rows.failed - len(rows)
     return (
-        f"<h2>Failed and censored runs</h2><p>Runs: {_text(said)}. Values cut off by a run's "
+        f"<h2>Failed and censored runs</h2><p>Runs: {text(said)}. Values cut off by a run's "
         f"beginning or end: {cut}.</p>"
-        + _table(("cell", "replica", "status", "error", "command"), rows)
+        + table(("cell", "replica", "status", "error", "command"), rows)
         + (f"<p>and {more} more</p>" if more > 0 else "")
     )
 
@@ -287,24 +242,23 @@ def _origin(folder: StudyFolder) -> str:
         "<h2>Seeds, versions and hashes</h2>"
         f"<p>Seed of the study: <code>{record.seed}</code>. Every run's own seed is in the column "
         "<code>seed</code> of the parts.</p>"
-        + _table(("package", "when the study was begun", "when this page was made"), rows)
-        + _table(("", "SHA-256"), hashes)
+        + table(("package", "when the study was begun", "when this page was made"), rows)
+        + table(("", "SHA-256"), hashes)
     )
 
 
 def _repeat(tables: Tables, folder: StudyFolder) -> str:
     record = tables.record
-    first = folder.results().slice(0, 1).to_pylist()[0]
-    lines = [
+    first = tables.rows.stored.first
+    commands = [
         f"dsa-des study {record.study}",
         f"dsa-des study show {folder.path}",
         f"dsa-des study report {folder.path}",
         _explain(record),
         f"{record.command(first)}    # cell {first['cell']}, replica {first['replica']}",
     ]
-    shown = "\n".join(escape(printable(line)) for line in lines)
     return (
-        f"<h2>To repeat it</h2><pre>{shown}</pre><p class='note'>Any other run: the same "
+        f"<h2>To repeat it</h2>{verbatim(commands)}<p class='note'>Any other run: the same "
         "with the seed, axes and draws that stand in its row of the parts; rows of failed runs "
         "hold it as <code>command</code>.</p>"
     )

@@ -15,6 +15,7 @@ from dsa_des.studies.executors import Executor
 from dsa_des.studies.explained import keep_explained
 from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.record import results_of
+from dsa_des.studies.stored_rows import StoredRows
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.summary import Rows
 
@@ -172,7 +173,7 @@ def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:
     assert stop is not None
     result = next(item for item in results_of(study) if item.name == stop.metric)
     # What a killed attempt left of later rounds must not decide: it would not have been there.
-    rows = Rows(folder.results(before_round=number), ["cell"], [])
+    rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
     found = set()
     for (cell,), chosen in rows.each_place():
         estimate, _ = rows.estimate(result, chosen, study.confidence, study.interval)

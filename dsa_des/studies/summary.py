@@ -7,7 +7,7 @@ and a cell of the summary joins all of them; otherwise the replicas are.
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +24,7 @@ from dsa_des.studies.statistics import (
     share,
     symmetric,
 )
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from dsa_des.studies.stored_rows import StoredRows
 
 #: Sets that are drawn for a bootstrap interval of a ratio.
 _RESAMPLES = 2000
@@ -54,22 +52,18 @@ class Rows:
 
     Parameters
     ----------
-    table : pyarrow.Table
-        Rows in order of cell and replica.
+    stored : StoredRows
     axes : sequence of str
         Columns of all axes.
     over : sequence of str
         Those that are a sample.
     """
 
-    def __init__(self, table: "pa.Table", axes: Sequence[str], over: Sequence[str]) -> None:
-        good = np.asarray(table["error"].is_null())
-        self.failed = int(len(good) - good.sum())
+    def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
+        self.stored = stored
+        self.failed = stored.status.total() - len(stored)
         #: Those of the failed whose process died; they are tried again.
-        self.crashed = table["status"].to_pylist().count(CRASHED)
-        self._columns: dict[str, AnyArray] = {}
-        self.names = set(table.column_names)
-        self._table = table.filter(good) if self.failed else table
+        self.crashed = stored.status[CRASHED]
         self.axes = [name for name in axes if name not in over]
         self.over = list(over)
         #: What rows share that belong to the same place, and to the same independent unit.
@@ -78,17 +72,14 @@ class Rows:
 
     def column(self, name: str) -> AnyArray:
         """Return a column; missing numbers are NaN."""
-        if name not in self._columns:
-            self._columns[name] = self._table[name].to_numpy(zero_copy_only=False)
-        return self._columns[name]
+        return self.stored.column(name)
 
     def row(self, number: int) -> dict[str, Any]:
         """Return a row as column → value."""
-        found: dict[str, Any] = self._table.slice(number, 1).to_pylist()[0]
-        return found
+        return {name: _plain(self.column(name)[number]) for name in self.stored.names}
 
     def _codes(self, names: Sequence[str]) -> IntArray:
-        codes = np.zeros(self._table.num_rows, dtype=np.int64)
+        codes = np.zeros(len(self.stored), dtype=np.int64)
         for name in names:
             _, code = np.unique(self.column(name), return_inverse=True)
             codes = codes * (int(code.max(initial=0)) + 1) + code

@@ -61,7 +61,7 @@ def line(name, time_s, place, up_m, track_deg, speed, climb, sigma_m):
 
 
 def encounter(path, *others):
-    """The ownship hovers in the file's plane, by both rows; others are (name, time, ...)."""
+    """Write an encounter: the ownship is at the origin in both rows, `others` are lines."""
     own = [line("own", t, (0.0, 0.0), 0.0, TRACK_DEG, SPEED_MPS, CLIMB_MPS, OWN_SIGMA_M)
            for t in (0, 1)]  # fmt: skip
     path.write_text(HEADER + "".join([*own, *others]), encoding="utf-8")

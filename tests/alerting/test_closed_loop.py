@@ -9,8 +9,8 @@ EN_ROUTE_M = 0.66 * 1852
 
 
 def closest_m(scene: str, *sets: str) -> float:
-    """Smallest slant range of the true flights."""
-    found = dsa_des.run(dsa_des.load_scene(CONFIGS / scene, sets=sets))
+    """Smallest slant range of the true flights, which would meet at 120 s."""
+    found = dsa_des.run(dsa_des.load_scene(CONFIGS / scene, sets=sets, duration_s="130"))
     return float(found.info["summary"]["targets"]["crossing"]["closest_approach"]["range_m"])
 
 
@@ -19,7 +19,7 @@ def test_the_ownship_turns_out_of_the_way():
 
 
 def test_a_pilot_keeps_clear_later():
-    found = dsa_des.run(dsa_des.load_scene(CONFIGS / "crossing_pilot.toml"))
+    found = dsa_des.run(dsa_des.load_scene(CONFIGS / "crossing_pilot.toml", duration_s="130"))
     manoeuvres = found.tables["manoeuvres"].to_pylist()
     assert manoeuvres[0]["time_s"] > 30.0
     closest = found.info["summary"]["targets"]["crossing"]["closest_approach"]["range_m"]

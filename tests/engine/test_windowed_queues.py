@@ -164,7 +164,7 @@ def test_who_sends_only_some_of_what_it_hears_is_found_out(lab, when_busy, servi
             f'{{from = "radar", to = "fickle"{wire}}}', '"fickle -> relay"',
             '"relay -> last"', '"last -> sink"', '"other -> sink"',
         ],
-        duration_s=5,
+        duration_s=3,
     )  # fmt: skip
     text = f'service_s = {service}\nservice_spread_s = 0.02\nwhen_busy = "{when_busy}"\n'
     tables = f"\n[processors.cpu]\n{text}\n[processors.slow]\nservice_s = 0.05\n"

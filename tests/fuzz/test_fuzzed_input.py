@@ -10,7 +10,7 @@ if sys.platform == "win32":
 from fuzz_cases import KINDS, Case, make_case
 from fuzz_judge import judge
 
-EACH = 12
+EACH = 8
 
 
 @pytest.mark.parametrize("number", range(EACH))

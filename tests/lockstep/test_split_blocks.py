@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from components.alerting.daidalus import DaidalusAlerting
 from dsa_des.block.component import ClockedParameters, Component
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
@@ -157,3 +158,14 @@ def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
         ticks[2:3], np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {}, None, 1000
     )
     assert _part(nothing, slice(0, 1), 1).held("cue") is None
+
+
+def test_what_comes_between_scans_waits_for_the_instance(lock, monkeypatch):
+    """Alerting looks every 7 s, in each replica at other times, and fits lines to all it got."""
+    monkeypatch.setattr(DaidalusAlerting, "serves_replicas", lambda self: False)
+    sets = ["blocks.traffic.intruders[0].east_m=2600", "blocks.traffic.intruders[0].north_m=2000",
+            "blocks.alerting.scan_rate_hz=1/7"]  # fmt: skip
+    scene = load_scene("configs/avoidance/crossing.toml", duration_s="14", sets=sets)
+    offsets = [{"blocks.alerting.offset_s": Fraction(n, 2)} for n in (0, 11)]
+    simulation = lock.same_as_alone(lock.replicas_of(scene, *offsets))
+    assert simulation.time.side_by_side and "alerting" in simulation.timeline.split

@@ -14,7 +14,7 @@ clock a scan late, an effect that is planned but not called, a metric that takes
 another. A command puts each of them, one at a time, into a copy of the project and runs the tests
 nearest to it.
 
-<!-- not run: takes ten minutes -->
+<!-- not run: takes half an hour -->
 ```
 python tests/mutation/run_faults.py --workers 2 --json /tmp/faults.json --page docs/mutation.md
 ```

@@ -74,7 +74,8 @@ FAULTS = [
          "rows[arrivals[rows] // self._span != ticks // self._span] = -1", "pass"),
     ),
     *in_file(
-        _GROUP, "dsa_des/replicas/split_block.py", _TOGETHER,
+        _GROUP, "dsa_des/replicas/split_block.py",
+        ("lockstep/test_split_blocks.py::test_what_comes_between_scans_waits_for_the_instance",),
         ("what-comes-between-wakes-is-lost", "            self._keep_waiting(wake, replica)\n",
          "            pass\n"),
     ),

@@ -80,6 +80,8 @@ FAULTS = [
         _GROUP, "components/metrics/steered.py", ("wiring/test_mitigated_metric.py",),
         ("told-is-flown-at-once", "came_s = time_s + self._delays_s[names[block]]",
          "came_s = time_s"),
+        ("manoeuvres-of-the-first-replica", "found.setdefault(replica, [])",
+         "found.setdefault(0, [])"),
     ),
     *in_file(
         _GROUP, "components/metrics/encounter.py", (_SEPARATION, _SEVERAL, _KEYS),
@@ -104,8 +106,8 @@ FAULTS = [
         ("time-to-closest-backwards", "value = time_s - when_s", "value = when_s - time_s"),
         ("target-of-encounter-ignored",
          "[flight for flight in flights if target in (None, flight.name)]", "list(flights)"),
-        ("step-ignored", "partial(separations, scene, step_s)",
-         "partial(separations, scene, 0.1)"),
+        ("step-ignored", "partial(separations, scene, step_s, until_s)",
+         "partial(separations, scene, 0.1, until_s)"),
         ("loss-at-start-not-said", "lost_at_start = in_scan(lost_s, begun_s)",
          "lost_at_start = in_scan(lost_s, begun_s + 1.0)"),
     ),
@@ -221,11 +223,6 @@ FAULTS = [
         ("classes-without-weights",
          'ratio=RatioOf(*flags, weight, cluster, (f"encounter_{by}", kind))',
          'ratio=RatioOf(*flags, None, cluster, (f"encounter_{by}", kind))'),
-    ),
-    *in_file(
-        _GROUP, "components/metrics/steered.py", ("encounters/test_risk_of_a_set.py",),
-        ("manoeuvres-of-the-first-replica", "found.setdefault(replica, [])",
-         "found.setdefault(0, [])"),
     ),
     *in_file(
         _GROUP, "dsa_des/studies/output.py", ("encounters/test_risk_of_a_set.py",),

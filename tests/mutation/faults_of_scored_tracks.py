@@ -41,9 +41,9 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/hard_update.py", (_COVER,),
-        ("innovation-after-the-last", "part.nis[which] + innovation_squared(",
-         "0.0 * part.nis[which] + innovation_squared("),
-        ("freedom-of-the-last", "part.freedom[which] + size", "size"),
+        ("innovation-after-the-last", 'before["nis"] + innovation_squared(',
+         '0.0 * before["nis"] + innovation_squared('),
+        ("freedom-of-the-last", 'before["freedom"] + size', "size"),
     ),
     *in_file(
         _GROUP, "components/tracking/step.py", (_COVER,),
@@ -151,8 +151,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/without_range.py", "wiring/test_tracks_without_range.py",
-        ("directions-from-the-first-ownship", "place.position_m[:, which]",
-         "place.position_m[:, which * 0]"),
+        ("directions-from-the-first-ownship", "selected(place.position_m, which)",
+         "selected(place.position_m, which * 0)"),
         ("ranged-tracks-in-polar-too", "blind = (~part.ranged[track]).nonzero()[0]",
          "blind = (~part.ranged[track] | True).nonzero()[0]"),
     ),

@@ -157,7 +157,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "dsa_des/studies/runner.py", ("studies/test_what_decides_and_repeats.py",),
-        ("later-rounds-decide", "folder.results(before_round=number), [", "folder.results(), ["),
+        ("later-rounds-decide", "StoredRows(folder, before_round=number)", "StoredRows(folder)"),
         ("any-confidence-ends-it", "(result, chosen, study.confidence, study.interval)",
          "(result, chosen, 0.5, study.interval)"),
     ),

@@ -2,7 +2,7 @@
 
     python tests/mutation/run_faults.py [--only TEXT ...] [--workers N] [--json FILE] [--page FILE]
 
-A development tool that needs `os.fork`; all of them take ten minutes. The suite only checks that
+A development tool that needs `os.fork`; all of them take half an hour. The suite only checks that
 every fault still fits its file, and that copying and running work. With `--json` outcomes are added
 to those of earlier runs, for the page to be made of all of them.
 """

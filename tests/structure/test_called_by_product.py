@@ -17,7 +17,7 @@ def words(tree: ast.Module) -> Counter[str]:
     """Names, attributes and words of texts that are neither docstrings nor lists of exports."""
     left_out = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
     for node in ast.walk(tree):
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
             left_out |= {id(part) for part in ast.walk(node)}
     found: Counter[str] = Counter()
     for node in ast.walk(tree):

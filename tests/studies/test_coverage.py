@@ -10,7 +10,8 @@ import pytest
 from dsa_des.studies.draws import parse_draw
 from dsa_des.studies.metric import EVENT, NUMBER, SHARE, TRIALS, Result
 from dsa_des.studies.statistics import Estimate, difference, mean, share
-from dsa_des.studies.summary import Rows, compare_axis, paired_units, summarise
+from dsa_des.studies.summary import compare_axis, paired_units, summarise
+from tests.studies.table_rows import rows_of_table
 
 #: Chance alone moves a coverage of 95 % over so many rounds by 0.5 % (two standard deviations: 1).
 ROUNDS = 2000
@@ -199,7 +200,7 @@ def covered(rounds: int, *, files: int, replicas: int, same_draws: bool) -> dict
     held: dict[str, int] = {}
     for _ in range(rounds):
         table = folder_study(random, files, replicas, same_draws=same_draws)
-        rows = Rows(table, ["file", "rate_hz"], ["file"])
+        rows = rows_of_table(table, ["file", "rate_hz"], ["file"])
         for line in summarise(rows, RESULTS, LEVEL, "t", {}):
             if line.at == (0.0,):
                 name, e = line.result.name, line.estimate

@@ -13,8 +13,9 @@ import pytest
 from dsa_des.studies import study as study_module
 from dsa_des.studies.record import results_of
 from dsa_des.studies.study_file import read_study
-from dsa_des.studies.summary import Rows, compare_axis, summarise
+from dsa_des.studies.summary import compare_axis, summarise
 from tests.studies.encounter_folder import rows_of, write_encounter, write_scene
+from tests.studies.table_rows import rows_of_table
 
 SENSOR = '''
 import numpy as np
@@ -85,7 +86,7 @@ def held(folder: Path, rounds: int) -> dict[str, float]:
         if number == 0:
             read = read_study(folder / "study.toml")
             results = results_of(read)
-        rows = Rows(
+        rows = rows_of_table(
             rows_of(dataclasses.replace(read, seed=number)),
             [axis.column for axis in read.axes],
             read.over,

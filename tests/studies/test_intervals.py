@@ -89,6 +89,7 @@ def test_few_values_are_marked() -> None:
 def test_axes_of_figures_carry_units() -> None:
     assert readable("declaration_range_m.radar") == "Declaration range, radar (m)"
     assert readable("track_breaks") == "Track breaks"
+    assert readable("track_nees") == "Track NEES"
     assert readable("fused_share.ir_with_radar") == "Fused share, IR with radar"
     assert axis_label("radar.scan_rate_hz") == "Radar scan rate (Hz)"
     assert axis_label("swap.fusion") == "Type of fusion"

@@ -9,6 +9,7 @@ import pytest
 from dsa_des.studies.metric import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.studies.ratio import paired_ratio
 from dsa_des.studies.summary import Rows, compare_axis, summarise
+from tests.studies.table_rows import rows_of_table
 
 FLAGS = [
     Result("n", EVENT, ""), Result("m", EVENT, ""), Result("w", NUMBER, ""),
@@ -29,7 +30,7 @@ def rows_of(n, m, w=None, family=None, kind=None, axis=None, replica=None) -> Ro
         "replica": np.arange(count) if replica is None else replica,
         "error": pa.nulls(count, pa.string()), "status": ["done"] * count,
     }  # fmt: skip
-    return Rows(pa.table({k: v for k, v in columns.items() if v is not None}), ["x"], [])
+    return rows_of_table(pa.table({k: v for k, v in columns.items() if v is not None}), ["x"], [])
 
 
 def test_a_ratio_by_hand_with_both_intervals() -> None:

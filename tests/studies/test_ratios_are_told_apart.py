@@ -9,7 +9,8 @@ import pytest
 from dsa_des.studies.metric import RATIO, RatioOf, Result
 from dsa_des.studies.ratio import paired_ratio
 from dsa_des.studies.study_file import read_study
-from dsa_des.studies.summary import Rows, compare_axis, summarise
+from dsa_des.studies.summary import compare_axis, summarise
+from tests.studies.table_rows import rows_of_table
 from tests.studies.test_ratios import ratio, rows_of
 from tests.studies.test_requirements import ROOT, STUDY
 
@@ -40,7 +41,9 @@ def test_an_encounter_s_number_means_another_in_another_file() -> None:
     })  # fmt: skip
     of = Result("r", RATIO, "", ratio=RatioOf("n", "m", None, "family"))
     for over, clusters in ((["file"], 4), ([], 2)):
-        (line,) = summarise(Rows(table, ["file"] if over else [], over), [of], 0.95, "t", {})
+        (line,) = summarise(
+            rows_of_table(table, ["file"] if over else [], over), [of], 0.95, "t", {}
+        )
         assert line.ratio is not None and line.ratio.clusters == clusters
 
 

@@ -6,7 +6,8 @@ import pytest
 from scipy import stats
 
 from dsa_des.studies.metric import NUMBER, SHARE, TRIALS, Result
-from dsa_des.studies.summary import Rows, compare_axis
+from dsa_des.studies.summary import compare_axis
+from tests.studies.table_rows import rows_of_table
 
 
 def table(**columns: list) -> pa.Table:
@@ -22,7 +23,7 @@ def test_a_difference_is_the_value_less_the_baseline_run_by_run():
     """Runs of a place may stand in any order; pairs are those of one replica."""
     replica = [0, 1, 2, 3, 3, 1, 0, 2]
     value = [1.0, 4.0, 2.0, 8.0, 9.1, 5.2, 2.0, 2.9]
-    rows = Rows(table(rate=[5] * 4 + [7] * 4, replica=replica, x=value), ["rate"], [])
+    rows = rows_of_table(table(rate=[5] * 4 + [7] * 4, replica=replica, x=value), ["rate"], [])
     (found,) = compare_axis(rows, "rate", 5, [NUMBERED], 0.95, "t")
     first, second = np.array([1.0, 4.0, 2.0, 8.0]), np.array([2.0, 5.2, 2.9, 9.1])
     expected = stats.ttest_rel(second, first).confidence_interval(0.95)
@@ -34,7 +35,7 @@ def test_a_difference_is_the_value_less_the_baseline_run_by_run():
 
 def test_a_share_is_weighed_by_trials_and_a_run_without_one_has_none():
     runs = table(replica=[0, 1, 2], x=[1.0, float("nan"), 0.5], **{"x" + TRIALS: [2.0, 5.0, 4.0]})
-    found, missing = Rows(runs, [], []).estimate(SHARED, np.arange(3), 0.95, "t")
+    found, missing = rows_of_table(runs, [], []).estimate(SHARED, np.arange(3), 0.95, "t")
     assert found.value == pytest.approx(4.0 / 6.0)
     assert (found.count, missing) == (2, 1)
 
@@ -42,7 +43,7 @@ def test_a_share_is_weighed_by_trials_and_a_run_without_one_has_none():
 def test_runs_of_one_encounter_are_one_unit():
     """Two encounters of three runs each: the mean is of two means."""
     runs = table(file=["a"] * 3 + ["b"] * 3, replica=[0, 1, 2] * 2, x=[1, 2, 3, 10.0, 20.0, 30.0])
-    rows = Rows(runs, ["file"], ["file"])
+    rows = rows_of_table(runs, ["file"], ["file"])
     found, _ = rows.estimate(NUMBERED, np.arange(6), 0.95, "t")
     assert (found.value, found.count) == (pytest.approx(11.0), 2)
     expected = stats.ttest_1samp([2.0, 20.0], 0.0).confidence_interval(0.95)

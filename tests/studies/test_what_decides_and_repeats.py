@@ -1,5 +1,6 @@
 """What ends a study early, and what makes one of its runs again."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,13 +26,23 @@ class _Folder:
         self.m = self.n & (random.random(90) < 0.5)
         self.w = random.choice([1.0, 4.0], 90)
 
-    def results(self, before_round: int | None = None) -> pa.Table:
-        count = 30 * (3 if before_round is None else before_round)
+        schema = self._round(0).schema
+        self.record = SimpleNamespace(cells=1, replicas=90, schema_of_parts=lambda: schema)
+
+    def _round(self, number: int) -> pa.Table:
+        rows = slice(30 * number, 30 * number + 30)
         return pa.table({
-            "n": self.n[:count].astype(float), "m": self.m[:count].astype(float),
-            "w": self.w[:count], "cell": [0] * count, "replica": list(range(count)),
-            "error": pa.nulls(count, pa.string()), "status": ["done"] * count,
+            "n": self.n[rows].astype(float), "m": self.m[rows].astype(float),
+            "w": self.w[rows], "cell": [0] * 30, "replica": list(range(rows.start, rows.stop)),
+            "error": pa.nulls(30, pa.string()), "status": ["done"] * 30,
         })  # fmt: skip
+
+    def each_part(
+        self, before_round: int | None = None, columns: Sequence[str] | None = None
+    ) -> Iterator[pa.Table]:
+        for number in range(3 if before_round is None else before_round):
+            table = self._round(number)
+            yield table if columns is None else table.select(columns)
 
 
 def test_a_ratio_ends_a_study_by_its_weighted_interval(monkeypatch: pytest.MonkeyPatch) -> None:

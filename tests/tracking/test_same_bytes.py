@@ -51,12 +51,13 @@ def test_windows_and_company_change_no_byte(kind):
     for window in (1, 7):
         assert tracks_of(Simulation, scene, window=window).equals(alone), window
     scenes = [scene_of(scene, Replica(scene.seed + i, {})) for i in range(3)]
+    each = [alone, *(tracks_of(Simulation, one) for one in scenes[1:])]
     for window in (None, 40):
         together = tracks_of(lock_step, scenes, window=window)
-        for number, one in enumerate(scenes):
+        for number, expected in enumerate(each):
             mine = together.filter(pc.equal(together["replica"], number))
             mine = mine.drop_columns(["replica"]).combine_chunks()
-            assert mine.equals(tracks_of(Simulation, one)), number
+            assert mine.equals(expected), number
 
 
 def test_tracks_know_nothing_of_the_roster(monkeypatch):

@@ -3,12 +3,8 @@
 import crooked
 import pymap3d
 import pytest
+from displayed import displayed
 from wired import chain
-
-import dsa_des
-from components.cdti.scope import Scope
-from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.running.simulation import Simulation
 
 #: Leaves the radar's range at some 2.6 km.
 AWAY = {**crooked.ROLLING, "speed_mps": 150.0, "heading_deg": 250.0}
@@ -20,19 +16,12 @@ RADAR = {
 
 def watched(scene):
     """The contacts at the end of each instant, and what was recorded."""
-    tables = MemorySink()
-    recorder = Recorder([tables])
-    simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder, window=1)
-    scope, pictures = Scope(simulation), {}
+    pictures = {}
 
-    def listen(block, message):
-        scope.listen(block, message)
-        time_s = int(message.tick[-1]) / simulation.ticks_per_s
+    def look(scope, time_s):
         pictures[time_s] = scope.picture(time_s)["contacts"]
 
-    recorder.listeners.append(listen)
-    simulation.run()
-    found = {name: table.to_pylist() for name, table in tables.tables().items()}
+    _, found = displayed(scene, look, window=1)
     return pictures, found
 
 

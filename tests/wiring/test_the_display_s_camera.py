@@ -5,12 +5,8 @@ import math
 import crooked
 import numpy as np
 import pytest
+from displayed import displayed
 from wired import SEES_ALL, chain
-
-import dsa_des
-from components.cdti.scope import Scope
-from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.running.simulation import Simulation
 
 EO = {"front_m2": 6.0, "side_m2": 22.0, "horizontal_m2": 40.0}
 IR = {"front_m2": 2.0, "side_m2": 5.0, "back_m2": 2.0, "horizontal_m2": 12.0}
@@ -47,18 +43,13 @@ def seen(request):
         duration_s=DURATION_S, tracker={"type": request.param},
         fusion={"type": "fusion.pass_through" if ekf else "fusion.pick_best"},
     )  # fmt: skip
-    tables = MemorySink()
-    recorder = Recorder([tables])
-    simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder)
-    scope = Scope(simulation)
-    recorder.listeners.append(scope.listen)
-    simulation.run()
+    scope, recorded = displayed(scene)
     contact = {}
     for number, _, _, _, bearing, *_ in scope.picture(DURATION_S)["contacts"]:
         off = {n: abs(bearing_deg(t) - bearing) for n, t in TARGETS.items()}
         contact.setdefault(min(off, key=off.get), number)
     assert set(contact) == set(TARGETS)
-    found = {(r["block"], r["target"]): r for r in tables.tables()["detections"].to_pylist()}
+    found = {(r["block"], r["target"]): r for r in recorded["detections"]}
     return scope, contact, found
 
 

@@ -6,13 +6,9 @@ import crooked
 import numpy as np
 import pymap3d
 import pytest
+from displayed import displayed
 from test_avoidance_by_bands import CONF
 from wired import SEES_ALL, chain
-
-import dsa_des
-from components.cdti.scope import Scope
-from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.running.simulation import Simulation
 
 #: The second one conflicts first; the volumes of the alerter that is used are 1500 m wide.
 ASIDE = {"name": "aside", "east_m": 3000.0, "north_m": -5900.0, "up_m": 10.0,
@@ -63,13 +59,7 @@ def shown(request, tmp_path_factory):
     scene["blocks"]["alerting"] = {"type": "alerting.daidalus", "scan_rate_hz": 2, **rules}
     scene["blocks"]["guidance"] = {"type": "guidance.daidalus", **rules}
     scene["wires"] += ["traffic -> alerting", "tracker -> alerting -> guidance"]
-    sink = MemorySink()
-    recorder = Recorder([sink])
-    simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder, window=None if ekf else 4)
-    scope = Scope(simulation)
-    recorder.listeners.append(scope.listen)
-    simulation.run()
-    recorded = {name: table.to_pylist() for name, table in sink.tables().items()}
+    scope, recorded = displayed(scene, window=None if ekf else 4)
     last = [row for row in recorded["alerts"] if row["time_s"] == 8.0]
     contact = {
         row["target"]: 1_000_000 + row["track"] if ekf else list(TARGETS).index(row["target"])

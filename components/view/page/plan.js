@@ -27,7 +27,7 @@ const Plan = (() => {
       c.arc(x, y, (i * step) / view.perPixel, 0, 2 * Math.PI);
       c.stroke();
       const km = (i * step) / 1000;
-      Canvas.text(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
+      Labels.keep(c, `${km < 1 ? km.toFixed(2) : +km.toFixed(1)} km`, x + 3,
         y - (i * step) / view.perPixel - 3, Symbols.colours.faint);
     }
   }

@@ -1,0 +1,158 @@
+"""What the summary of a run says of tracks, alerts and manoeuvres, against the recorded tables."""
+
+import numpy as np
+import pyarrow.parquet as pq
+import pymap3d
+import pytest
+
+import dsa_des
+from components.display.outcomes import TrackSummary
+from components.display.terminal import outcome_lines, unseen_lines
+from components.messages.state_tracks import STATUSES
+from dsa_des.block.message import Text
+from dsa_des.running.recorded_run import record_run
+
+ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory, configs):
+    folder = tmp_path_factory.mktemp("crossing") / "run"
+    scene = dsa_des.load_scene(
+        configs / "avoidance/crossing_tracked.toml",
+        sets=[
+            "blocks.pilot.held_s=0",
+            "blocks.pilot.initial_delay_s=1",
+            "blocks.pilot.coordination_s=0",
+        ],
+        duration_s="34",
+    )
+    return folder, record_run(scene, folder, draw=False)
+
+
+def test_errors_of_tracks_are_those_by_pymap3d(crossing):
+    folder, summary = crossing
+    tracks = pq.read_table(folder / "state_tracks.parquet").to_pylist()
+    held = [row for row in tracks if row["track_status"] in ("confirmed", "coasted")]
+    told = summary["tracks"]["tracker"]
+    assert told["confirmed"] == len({row["track"] for row in held}) > 0
+    truth = {
+        round(row["time_s"], 6): row
+        for row in pq.read_table(folder / "truth.parquet").to_pylist()
+        if row["target"] is not None
+    }
+    apart = {}
+    for row in held:
+        there = truth[round(row["state_s"], 6)]
+        north, east, down = pymap3d.geodetic2ned(
+            there["lat_deg"], there["lon_deg"], there["alt_m"],
+            row["origin_lat_deg"], row["origin_lon_deg"], row["origin_alt_m"],
+        )  # fmt: skip
+        place = [row["north_m"] - north, row["east_m"] - east, row["down_m"] - down]
+        apart.setdefault(row["track"], []).append(np.linalg.norm(place))
+    near = np.concatenate(list(apart.values()))
+    near = near[near < 300.0]
+    assert told["position_error_m"] == pytest.approx(np.sqrt(np.mean(near**2)), rel=1e-6)
+    assert told["false"] == sum(min(values) >= 300.0 for values in apart.values())
+
+
+class Still:
+    """Targets that stay where they are: 0, 0, 0 and 1000 m north of it, the second until 5 s."""
+
+    names = ("a", "b")
+
+    def at(self, time_s):
+        place = np.zeros((2, 3, len(time_s)))
+        place[1, 0] = np.where(time_s < 5.0, 1000.0, np.nan)
+        return place
+
+
+def test_who_never_comes_near_a_target_is_false():
+    rows = [
+        # number, status, range, instant, north: the rms of 3, 4 and 12 m is 7.5 m
+        (1, "tentative", True, 1.0, 0.0), (1, "confirmed", True, 2.0, 3.0),
+        (1, "coasted", True, 3.0, 4.0), (2, "confirmed", True, 1.0, 988.0),
+        (2, "confirmed", True, 6.0, 988.0), (3, "confirmed", True, 6.0, 988.0),
+        (4, "confirmed", False, 1.0, np.nan), (5, "deleted", True, 1.0, 500.0),
+    ]  # fmt: skip
+    columns = {
+        "block": Text(np.zeros(len(rows), dtype=np.int32), ("t",)),
+        "track": np.array([row[0] for row in rows]),
+        "track_status": Text(np.array([STATUSES.index(row[1]) for row in rows]), STATUSES),
+        "has_range": np.array([row[2] for row in rows]),
+        "state_s": np.array([row[3] for row in rows]),
+        "north_m": np.array([row[4] for row in rows]),
+        **{name: np.zeros(len(rows)) for name in ("east_m", "down_m", *ORIGIN)},
+    }
+    for pieces in (1, len(rows)):
+        summary = TrackSummary(["t", "u"], lambda origin: Still())
+        for part in np.array_split(np.arange(len(rows)), pieces):
+            some = {
+                name: Text(of.codes[part], of.names) if isinstance(of, Text) else of[part]
+                for name, of in columns.items()
+            }
+            summary.update("state_tracks", some)
+        assert summary.result()["tracks"] == {
+            "t": {"confirmed": 4, "false": 1, "position_error_m": pytest.approx(7.505553)},
+            "u": {"confirmed": 0, "false": None, "position_error_m": None},
+        }
+
+
+def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
+    folder, summary = crossing
+    alerts = pq.read_table(folder / "alerts.parquet").to_pylist()
+    for block, first_s in summary["alerts"].items():
+        mine = [row for row in alerts if row["block"] == block and row["level"] > 0]
+        levels = sorted({row["level"] for row in mine})
+        assert first_s == {
+            str(level): min(row["time_s"] for row in mine if row["level"] == level)
+            for level in levels
+        } != {}  # fmt: skip
+    flown = pq.read_table(folder / "manoeuvres.parquet")["time_s"].to_pylist()
+    assert summary["manoeuvres"]["pilot"] == {
+        "count": len(flown), "first_s": flown[0], "last_s": flown[-1]
+    }  # fmt: skip
+
+
+def test_without_recorded_truth_nothing_is_said_of_it_and_without_such_blocks_nothing(configs):
+    scene = configs / "avoidance/crossing_tracked.toml"
+    summary = dsa_des.run(dsa_des.load_scene(scene, sets=["record.truth=false"], duration_s="5"))
+    assert summary.summary["tracks"] == {"tracker": {"confirmed": 1}}
+    plain = dsa_des.run(dsa_des.load_scene(configs / "first_light.toml", duration_s="1")).summary
+    assert {"tracks", "alerts", "manoeuvres"}.isdisjoint(plain)
+
+
+def test_a_line_for_each_block():
+    summary = {
+        "tracks": {
+            "ekf": {"confirmed": 3, "false": 1, "position_error_m": 34.56},
+            "eo": {"confirmed": 1, "false": None, "position_error_m": None},
+            "ir": {"confirmed": 0},
+        },
+        "alerts": {"alerting": {"1": 12.0, "3": 14.25}, "true": {}},
+        "manoeuvres": {
+            "a": {"count": 0, "first_s": None, "last_s": None},
+            "b": {"count": 1, "first_s": 22.0, "last_s": 22.0},
+            "c": {"count": 2, "first_s": 22.0, "last_s": 34.0},
+        },
+    }
+    assert outcome_lines(summary) == [
+        "ekf: 3 confirmed tracks, 1 of them false; position error 34.6 m rms",
+        "eo: 1 confirmed track",
+        "ir: no confirmed track",
+        "alerting: alerts of level 1 from 12.0 s, level 3 from 14.2 s",
+        "true: no alert",
+        "a: no manoeuvre",
+        "b: 1 manoeuvre, at 22.0 s",
+        "c: 2 manoeuvres, from 22.0 s to 34.0 s",
+    ]
+    assert outcome_lines({}) == []
+
+
+def test_a_sensor_that_is_off_is_said_to_be(configs):
+    scene = dsa_des.load_scene(
+        configs / "first_light.toml", sets=["blocks.ir.enabled=false"], duration_s="0.1"
+    )
+    sensors = dsa_des.run(scene).summary["sensors"]
+    assert "ir saw nothing: it is switched off (enabled = false)" in unseen_lines(sensors)
+    assert [name for name, told in sensors.items() if "enabled" in told] == ["ir"]
