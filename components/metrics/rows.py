@@ -103,11 +103,17 @@ def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
         Number of replicas.
     """
     table: Any = columns
+    if len(rows) == 0:
+        return np.full(count, -1, dtype=np.int64)
     replica = table["replica"][rows]
-    starts = np.flatnonzero(np.diff(replica, prepend=-1))
-    first_tick = np.full(count, -1, dtype=np.int64)
-    first_tick[replica[starts]] = table["tick"][rows[starts]]
-    rows = rows[table["tick"][rows] == first_tick[replica]]
+    starts = np.flatnonzero(np.append(True, replica[1:] != replica[:-1]))
+    tick, place, found_at = table["tick"], starts, [starts]
+    while len(place := place[place + 1 < len(rows)]):  # those of the same instant follow
+        ahead = rows[place + 1]
+        same = (replica[place + 1] == replica[place]) & (tick[ahead] == tick[rows[place]])
+        place = place[same] + 1
+        found_at.append(place)
+    rows = rows[np.sort(np.concatenate(found_at))]
     ranges = table["true_range_m"][rows]
     order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
     numbers, place = np.unique(table["replica"][rows][order], return_index=True)

@@ -20,16 +20,25 @@ def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
 
 def _scan_time_s(group: Group, name: str, number: int) -> FloatArray:
     columns: Any = group.tables["scans"]
-    rows = np.flatnonzero(is_named(columns["block"], name))
-    replica = columns["replica"][rows]
-    first, end = (np.searchsorted(replica, np.arange(len(group)), side) for side in _SIDES)
-    at = first + number - 1
+    start, end = (np.searchsorted(columns["replica"], np.arange(len(group)), s) for s in _SIDES)
     found = np.full(len(group), np.nan)
-    there = at < end
-    found[there] = columns["time_s"][rows[at[there]]]
+    of_sensor = is_named(columns["block"], name)
+    left, width = np.flatnonzero(end > start), _FIRST_LOOK
+    while len(left):  # farther, where a replica has not so many scans among its first rows
+        rows = start[left, np.newaxis] + np.arange(width)
+        inside = rows < end[left, np.newaxis]
+        rows = np.where(inside, rows, 0)
+        mine = inside & of_sensor[rows]
+        there = mine & (np.cumsum(mine, axis=1) == number)
+        seen = there.any(axis=1)
+        found[left[seen]] = columns["time_s"][rows[there]]
+        left = left[~seen & inside[:, -1]]
+        width *= 8
     return found
 
 
+# Rows of a replica among which its scan is sought first.
+_FIRST_LOOK = 64
 _SIDES: Any = ("left", "right")
 
 

@@ -19,6 +19,7 @@ from components.metrics.rows import (
     of_target,
 )
 from components.metrics.single_sensor import only_feed
+from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Result, recorded_by
@@ -30,7 +31,7 @@ class _Lines:
     def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
         self.rows = chosen(columns, rows, "target", "time_s", *names)
         target = name_ranks(self.rows["target"])
-        self.order = np.lexsort((self.rows["time_s"], target, self.rows["replica"]))
+        self.order = _order(self.rows["replica"], target, self.rows["time_s"])
         self.replica: IntArray = self.rows["replica"][self.order]
         self.time_s: FloatArray = self.rows["time_s"][self.order]
         target = target[self.order]
@@ -39,6 +40,14 @@ class _Lines:
         self.end: IntArray = np.flatnonzero(same) + 1
         self.gap_s = self.time_s[self.end] - self.time_s[self.end - 1]
         self.of_gap = self.replica[self.end]
+
+
+def _order(replica: IntArray, target: IntArray, time_s: FloatArray) -> Any:
+    """Return what puts rows in order of replica, target and time; of one target they are so."""
+    same = (replica[1:] == replica[:-1]) & (target[1:] == target[:-1])
+    if bool((same & (time_s[1:] >= time_s[:-1]) | (replica[1:] > replica[:-1])).all()):
+        return slice(None)
+    return np.lexsort((time_s, target, replica))
 
 
 def _sums(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
@@ -123,7 +132,7 @@ class AgeOfInformation(TargetMetric):
 
 def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
     """Return the largest value so far on each line."""
-    if len(values) == 0:
+    if bool((values[lines.end] >= values[lines.end - 1]).all()):
         return values
     starts = np.ones(len(values), dtype=bool)
     starts[lines.end] = False
@@ -143,7 +152,7 @@ def _ramp_quantiles(
         start, end = np.searchsorted(replica, [number, number + 1])
         lows, highs = np.sort(low[start:end]), np.sort(high[start:end])
         # Time spent at or below age x is Σ min(x, high) - min(x, low): piecewise linear in x.
-        ages = np.unique(np.concatenate([lows, highs]))
+        ages = sorted_union([lows, highs])
         below = _clipped_sums(highs, ages) - _clipped_sums(lows, ages)
         found[number] = np.interp(share * span[number], below, ages)
     return found

@@ -195,7 +195,7 @@ class ReplicaChannel(Channel):
     def _held_rows(self, arrivals: IntArray, ticks: IntArray) -> IntArray:
         """Return the row that is held at each tick; -1 where its replica holds nothing yet."""
         rows = last_at_or_before(arrivals, ticks)
-        if arrivals is not ticks:
+        if not np.array_equal(arrivals[rows], ticks):
             rows[arrivals[rows] // self._span != ticks // self._span] = -1
         return rows
 

@@ -18,6 +18,7 @@ from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
+from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.lookahead import Edge, lookahead_ticks, opened_loops
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.replicas.streams import ReplicaStreams
@@ -90,7 +91,7 @@ class Replicas(Timeline):
 
     def __init__(self, scenes: Sequence[Scene], report: TakeReport | None = None) -> None:
         super().__init__(scenes[0])
-        self._scenes = list(scenes)
+        self._scenes = scenes if isinstance(scenes, ReplicaScenes) else list(scenes)
         self._report = report
         #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
@@ -101,10 +102,11 @@ class Replicas(Timeline):
         self._watched: dict[str, WatchedParameters] = {}
         self._clocks: list[ReplicaClock] = []
         _check_alike(self._scenes)
+        self._seeds = _seeds_of(self._scenes)
         #: Wires at which feedback loops are opened: a window is no longer than their delay.
         self._opened = opened_loops(self.scene)
         self._delays: dict[Edge, int] = {}
-        self.streams = ReplicaStreams([scene.seed for scene in self._scenes])
+        self.streams = ReplicaStreams(self._seeds)
 
     def parameters(self, name: str) -> Any:
         """Return those of the first replica, watched where clocks differ."""
@@ -155,6 +157,8 @@ class Replicas(Timeline):
         return not self._differing[name]
 
     def _find_differing(self, name: str) -> set[str]:
+        if isinstance(self._scenes, ReplicaScenes):
+            return self._scenes.differing(name)
         first = self._scenes[0].blocks[name].parameters
         found: set[str] = set()
         for scene in self._scenes[1:]:
@@ -176,6 +180,8 @@ class Replicas(Timeline):
             return None  # what is wrong with one of them shows when that one is made
 
     def _parameters_of(self, name: str) -> list[Any]:
+        if isinstance(self._scenes, ReplicaScenes):
+            return self._scenes.parameters_of(name)
         return [scene.blocks[name].parameters for scene in self._scenes]
 
     def _made(self, name: str, number: int) -> Component:
@@ -259,7 +265,7 @@ class Replicas(Timeline):
                     raise NotInLockStep(f"wire {wire} counts its delay in scans that differ")
 
         def jitter(number: int) -> Callable[[IntArray], FloatArray]:
-            return Streams(self._scenes[number].seed).scan_normals(name, "clock jitter")
+            return Streams(self._seeds[number]).scan_normals(name, "clock jitter")
 
         clock = ReplicaClock(specs, self.scene.ticks_per_s, self.time, jitter)
         self._clocks.append(clock)
@@ -300,10 +306,8 @@ class Replicas(Timeline):
         return ReplicaChannel(wire.source, delay_ticks, faults, self.time, self.ends)
 
     def stretch(self, ticks: IntArray, window: Window) -> tuple[int, int]:
-        """Return the window where replicas go side by side."""
-        if self.time.side_by_side:
-            return window.start, window.end
-        return super().stretch(ticks, window)
+        """Return the window: clocks are asked for one stretch only, and know it the second time."""
+        return window.start, window.end
 
     def final_before(self, tick: int) -> int:
         """Return 0 where replicas go side by side: rows are put in order at the end."""
@@ -321,6 +325,12 @@ class Replicas(Timeline):
         return {}
 
 
+def _seeds_of(scenes: Sequence[Scene]) -> Sequence[int]:
+    if isinstance(scenes, ReplicaScenes):
+        return scenes.seeds
+    return [scene.seed for scene in scenes]
+
+
 def _check_alike(scenes: Sequence[Scene]) -> None:
     """Refuse scenes that differ in more than seeds and parameters of blocks."""
     first = scenes[0]
@@ -329,6 +339,8 @@ def _check_alike(scenes: Sequence[Scene]) -> None:
         raise NotInLockStep(f"blocks that run scan by scan: {', '.join(late)}")
     if first.processors:
         raise NotInLockStep("shared processors order messages of one run")
+    if isinstance(scenes, ReplicaScenes):  # which differ in nothing else
+        return
     for scene in scenes[1:]:
         same = (
             scene.wires == first.wires

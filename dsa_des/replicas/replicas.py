@@ -1,30 +1,20 @@
-"""Many runs of one scene that differ by their seed and by a few values.
-
-The scene is validated once; a replica validates again only what it changes.
-"""
+"""Many runs of one scene that differ by their seed and by a few values."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from functools import lru_cache, partial
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
 
 from dsa_des.block.message import Columns, rows_of
-from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
+from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.block import Block
-from dsa_des.scene.checks import check_times
-from dsa_des.scene.options import BlockOptions, with_latencies
-from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
-from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.steps import no_item, place_of, unquoted
-from dsa_des.time.clock import parse_rational
 
 # Replicas that run together, and scans that they have together.
 _MOST_TOGETHER, _MOST_ROWS = 1024, 4e6
@@ -34,19 +24,18 @@ Wanted = Mapping[str, Collection[str]] | None
 
 
 @dataclass(frozen=True)
-class Replica:
-    """One run: a seed, and what it changes in the scene.
+class Shared:
+    """What runs in lock step recorded together.
 
     Parameters
     ----------
-    seed : int
-    changes : mapping
-        Dotted keys and their values, for example ``{"blocks.radar.offset_s": Fraction(1, 20)}``;
-        blocks, wires and types stay as they are.
+    tables : dict
+        Table name → column name → values, in order of the column ``replica``.
+    replicas : int
     """
 
-    seed: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    tables: dict[str, Columns]
+    replicas: int
 
 
 @dataclass(frozen=True)
@@ -63,6 +52,10 @@ class Recorded:
         Returns the sections that blocks add to the summary of the run.
     ended_early : bool
         Whether a block ended it before its time.
+    shared : Shared, optional
+        The recording of which `tables` are a part.
+    number : int
+        Which replica's.
     """
 
     tables: dict[str, Columns]
@@ -70,6 +63,8 @@ class Recorded:
     duration_s: float
     report: Callable[[], dict[str, Any]]
     ended_early: bool = False
+    shared: Shared | None = None
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -96,6 +91,22 @@ def run_replicas(
     list of Recorded or Failed
         In the order of `replicas`; each is identical to a run of its own.
     """
+    found, scenes = _checked(scene, replicas)
+    ran: list[Recorded | Failed] = []
+    for part in _at_once(scenes):
+        together: Sequence[Recorded | Failed] | None = _together(part, wanted)
+        ran += together or [_run(one, wanted) for one in part]
+    outcomes = iter(ran)
+    return [next(outcomes) if one is None else one for one in found]
+
+
+def _checked(
+    scene: Scene, replicas: Sequence[Replica]
+) -> tuple[list[Recorded | Failed | None], Sequence[Scene]]:
+    """Return which replicas failed already, None for the others, and the scenes of those."""
+    together = drawn_columns(scene, replicas)
+    if together is not None:
+        return [None] * len(replicas), together
     found: list[Recorded | Failed | None] = []
     scenes: list[Scene] = []
     for replica in replicas:
@@ -104,12 +115,7 @@ def run_replicas(
             found.append(None)
         except SceneError as error:
             found.append(Failed(str(error)))
-    ran: list[Recorded | Failed] = []
-    for part in _at_once(scenes):
-        together: Sequence[Recorded | Failed] | None = _together(part, wanted)
-        ran += together or [_run(one, wanted) for one in part]
-    outcomes = iter(ran)
-    return [next(outcomes) if one is None else one for one in found]
+    return found, scenes
 
 
 def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
@@ -128,7 +134,7 @@ def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
 def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     """Return why replicas cannot run in lock step, as far as it shows before they run."""
     try:
-        together = Replicas([scene_of(scene, replica) for replica in replicas])
+        together = Replicas(scenes_of(scene, replicas))
         Simulation(together.scene, timeline=together)
         together.rehearse()
     except NotInLockStep as reason:
@@ -143,20 +149,31 @@ def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
     if len(scenes) < 2:
         return None
     sink = ColumnSink()
+    recorder = Recorder([sink], wanted=wanted)
     try:
-        simulation = lock_step(scenes, recorder=Recorder([sink], wanted=wanted))
+        simulation = lock_step(scenes, recorder=recorder)
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
-    parts = _by_replica(sink.tables(), len(scenes))
+    shared = Shared(sink.tables(), len(scenes))
+    recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
+    parts = _by_replica(shared.tables, len(scenes))
     ended = simulation.ends.by
     durations_s = [
         int(tick) / simulation.ticks_per_s if n in ended else outcome.duration_s
         for n, tick in enumerate(simulation.ends.ticks)
     ]
     return [
-        Recorded(tables, simulation.ticks_per_s, duration_s, partial(_report, one), n in ended)
-        for n, (tables, duration_s, one) in enumerate(zip(parts, durations_s, scenes, strict=True))
+        Recorded(
+            tables,
+            simulation.ticks_per_s,
+            duration_s,
+            partial(_report, scenes, n),
+            n in ended,
+            shared,
+            n,
+        )
+        for n, (tables, duration_s) in enumerate(zip(parts, durations_s, strict=True))
     ]
 
 
@@ -171,8 +188,8 @@ def _by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Column
     return parts
 
 
-def _report(scene: Scene) -> dict[str, Any]:
-    return Simulation(scene).run().report
+def _report(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
+    return Simulation(scenes[number]).run().report
 
 
 def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
@@ -186,208 +203,3 @@ def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
         sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
         simulation.ends.early,
     )  # fmt: skip
-
-
-def scene_of(scene: Scene, replica: Replica) -> Scene:
-    """Return the scene of one replica.
-
-    Raises
-    ------
-    SceneError
-        If a change names nothing in the scene or its value is not allowed.
-    """
-    if not replica.changes:
-        return replace(scene, seed=replica.seed)
-    paths = {key: key_path(key) for key in replica.changes}
-    try:
-        blocks, sections, duration = _all_changed(scene, replica.changes, paths)
-    except (ValidationError, ValueError, LookupError, TypeError):
-        problems: list[Problem] = []
-        blocks, sections, duration = _each_changed(scene, replica.changes, paths, problems)
-        if problems:
-            raise SceneError(problems) from None
-    wires = scene.wires
-    if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
-        wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
-    ticks_per_s = scene.ticks_per_s
-    if wires is not scene.wires or duration is not scene.duration_s or _times_differ(scene, blocks):
-        problems = []
-        ticks_per_s = check_times(SceneFile(scene.path, {}), blocks, wires, duration, problems)
-        if problems:
-            raise SceneError(problems)
-    return replace(
-        scene,
-        seed=replica.seed,
-        blocks=blocks,
-        sections=sections,
-        wires=wires,
-        duration_s=duration,
-        ticks_per_s=ticks_per_s,
-    )
-
-
-_Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
-
-
-def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
-    """Return blocks, sections and duration with all changes made at once, each table checked once.
-
-    Raises
-    ------
-    ValidationError, ValueError, LookupError, TypeError
-        If anything is wrong with any change.
-    """
-    blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
-    of_block: dict[str, dict[tuple[str | int, ...], Any]] = {}
-    for key, value in changes.items():
-        path = paths[key]
-        if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
-            of_block.setdefault(path[1], {})[path[2:]] = value
-        elif path[0] in sections and len(path) > 1:
-            sections[path[0]] = _changed(sections[path[0]], path[1:], value)
-        elif path == ("duration_s",):
-            duration = parse_rational(value)
-        else:
-            raise LookupError(key)
-    for name, mine in of_block.items():
-        block = blocks[name]
-        of_engine = BlockOptions.model_fields.keys() - block.cls.Parameters.model_fields.keys()
-        for path in [path for path in mine if path[0] in of_engine]:
-            block = replace(block, options=_changed(block.options, path, mine.pop(path)))
-        if mine:
-            block = replace(block, parameters=_changed_together(block.parameters, mine))
-        blocks[name] = block
-    return blocks, sections, duration
-
-
-def _each_changed(
-    scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any], problems: list[Problem]
-) -> _Changed:
-    """Make one change after the other, and say what is wrong with each."""
-    blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
-    for key, value in changes.items():
-        path = paths[key]
-        try:
-            if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
-                name = str(path[1])
-                blocks[name] = _changed_block(blocks[name], path[2:], value)
-            elif path[0] in sections and len(path) > 1:
-                sections[str(path[0])] = _changed(sections[str(path[0])], path[1:], value)
-            elif path == ("duration_s",):
-                duration = parse_rational(value)
-            else:
-                known = [f"blocks.{name}" for name in blocks] + [*sections, "duration_s"]
-                hint = did_you_mean(".".join(map(str, path[:2])), known)
-                problems.append(_problem(scene, key, f"is no key of this scene{hint}", value))
-        except ValidationError as error:
-            file = SceneFile(scene.path, {})
-            for found in explain(file, (), key, BlockOptions, error):
-                problems.append(_problem(scene, key, found.message, value))
-        except (ValueError, LookupError, TypeError) as error:
-            problems.append(_problem(scene, key, str(error), value))
-    return blocks, sections, duration
-
-
-def _times_differ(scene: Scene, blocks: Mapping[str, Block]) -> bool:
-    """Return whether exact times of any block are others than those of the scene."""
-    for name, block in scene.blocks.items():
-        one, other = block.parameters, blocks[name].parameters
-        if one is other:
-            continue
-        if block.cls.clock_of(one) != block.cls.clock_of(other):
-            return True
-        for what, value in other:
-            if isinstance(value, Fraction) and value != getattr(one, what):
-                return True
-    return False
-
-
-@lru_cache(maxsize=4096)
-def key_path(key: str) -> tuple[str | int, ...]:
-    """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
-    parts = unquoted(key).replace("[", ".").replace("]", "").split(".")
-    return tuple(
-        int(part)
-        if part.isascii() and part.isdecimal() and len(part) < 10 and str(int(part)) == part
-        else part
-        for part in parts
-    )
-
-
-def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
-    return Problem(
-        str(scene.path), key, message, float(value) if isinstance(value, Fraction) else value
-    )
-
-
-def _changed_block(block: Block, path: tuple[str | int, ...], value: Any) -> Block:
-    name = path[0]
-    if name in BlockOptions.model_fields and name not in block.cls.Parameters.model_fields:
-        return replace(block, options=_changed(block.options, path, value))
-    return replace(block, parameters=_changed(block.parameters, path, value))
-
-
-def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
-    """Return `old` with the value at `path` replaced; every model on the way is validated again."""
-    if not path:
-        return value
-    first, rest = path[0], path[1:]
-    if isinstance(old, BaseModel):
-        model = type(old)
-        if first not in model.model_fields:
-            hint = did_you_mean(str(first), model.model_fields)
-            raise ValueError(f"there is no parameter {first!r}{hint}")
-        given = {name: getattr(old, name) for name in old.model_fields_set}
-        given[str(first)] = _changed(getattr(old, str(first)), rest, value)
-        return model.model_validate(given)
-    if isinstance(old, list | tuple):
-        items = list(old)
-        place, rest = _item(items, path)
-        items[place] = _changed(items[place], rest, value)
-        return items
-    if isinstance(old, dict):
-        return {**old, first: _changed(old.get(first), rest, value)}
-    raise ValueError(f"{first!r}: there is no table around it")
-
-
-def _changed_together(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> Any:
-    """Return `old` with the values at many paths replaced; every model is validated once."""
-    if () in changes and len(changes) > 1:
-        raise ValueError  # a table and something in it: one after the other
-    if len(changes) == 1:
-        ((path, value),) = changes.items()
-        return _changed(old, path, value)
-    parts: dict[Any, dict[tuple[str | int, ...], Any]] = {}
-    for path, value in changes.items():
-        first, rest = path[0], path[1:]
-        if isinstance(old, list | tuple):
-            first, rest = _item(list(old), path)
-        parts.setdefault(first, {})[rest] = value
-    if isinstance(old, BaseModel):
-        model = type(old)
-        if not parts.keys() <= model.model_fields.keys():
-            raise LookupError
-        given = {name: getattr(old, name) for name in old.model_fields_set}
-        for name, mine in parts.items():
-            given[str(name)] = _changed_together(getattr(old, str(name)), mine)
-        return model.model_validate(given)
-    if isinstance(old, list | tuple):
-        items = list(old)
-        for place, mine in parts.items():
-            items[place] = _changed_together(items[place], mine)
-        return items
-    if isinstance(old, dict):
-        return {**old, **{n: _changed_together(old.get(n), mine) for n, mine in parts.items()}}
-    raise ValueError
-
-
-def _item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
-    """Return which item the head of a path means, by number or name, and the tail of the path.
-
-    Names may hold the dots at which the path was split.
-    """
-    for length in range(len(path), 0, -1):
-        place = place_of(items, ".".join(map(str, path[:length])))
-        if place is not None:
-            return place, path[length:]
-    raise ValueError(no_item(items, str(path[0])))

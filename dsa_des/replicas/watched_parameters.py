@@ -1,12 +1,16 @@
-"""Parameters of a block that all replicas share though their clocks differ.
+"""Parameters that tell when a field is read that differs between replicas.
 
 The engine gives each replica its own scan instants, and a block may then serve all of them: unless
-it reads a clock's parameters itself. Whether it does is watched, not assumed.
+it reads a clock's parameters itself. And what is drawn may be checked as a column, unless a
+validator reads it together with other fields. Whether they do is watched, not assumed.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
+
+from pydantic import BaseModel
 
 from dsa_des.block.component import Parameters
 
@@ -63,3 +67,36 @@ class WatchedParameters:
     def refuse(self, refusal: Exception) -> None:
         """Raise from now on when one of them is read."""
         self._watch.refusal = refusal
+
+
+#: Fields that were read while `reading`, by watched types; None at other times.
+_noted: list[set[str]] = []
+# What does not show any field's value. All else of a model's own may show all of them.
+_HARMLESS = frozenset({"__class__", "__pydantic_fields_set__"})
+_ALL_FIELDS = frozenset(dir(BaseModel)) - _HARMLESS - {"model_fields", "model_fields_set"}
+
+
+@contextmanager
+def reading() -> Iterator[set[str]]:
+    """Give the names that are read meanwhile of what `watched_type` makes."""
+    _noted.append(set())
+    try:
+        yield _noted[-1]
+    finally:
+        _noted.pop()
+
+
+@lru_cache(maxsize=256)
+def watched_type(model: type[BaseModel], fields: frozenset[str]) -> type[BaseModel]:
+    """Return a model like another one that notes when one of some fields is read.
+
+    It is validated as the other one is; to look at all fields at once is to read them too.
+    """
+
+    def get(self: Any, name: str) -> Any:
+        if _noted and (name in fields or name in _ALL_FIELDS):
+            _noted[-1].add(name)
+        return object.__getattribute__(self, name)
+
+    space = {"__getattribute__": get, "__module__": model.__module__, "__doc__": model.__doc__}
+    return type(model.__name__, (model,), space)

@@ -7,16 +7,18 @@ the same.
 import gc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dsa_des.arrays.types import AnyArray
+from dsa_des.block.recorded_columns import Text
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import SceneError
-from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import CLASS, RATIO, SHARE, TRIALS, Group, Metric, Result, wanted_by
 from dsa_des.studies.seal import parquet
@@ -183,19 +185,65 @@ def _run_cell(study: Study, schema: pa.Schema, cell: int, start: int, end: int) 
         rows["error"] = [str(error)] * len(numbers)
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
-    outcomes = _outcomes(scene, replicas, wanted_by(metrics))
-    good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
-    for k, outcome in enumerate(outcomes):
-        if isinstance(outcome, Failed):
-            rows["error"][k] = outcome.error
     values: dict[str, AnyArray] = {}
-    found, errors = _measured(scene, metrics, [(replicas[k], outcomes[k]) for k in good])
-    for name, column in found.items():
-        values[name] = _nothing(len(numbers), text=column.dtype == object)
-        values[name][good] = column
-    for k, text in errors.items():
-        rows["error"][good[k]] = text
+    done, size = 0, _Size.of(study, cell)
+    while done < len(replicas):
+        part = replicas[done : done + size.runs]
+        outcomes = _outcomes(scene, part, wanted_by(metrics))
+        size.learn(outcomes)
+        good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
+        for k, outcome in enumerate(outcomes):
+            if isinstance(outcome, Failed):
+                rows["error"][done + k] = outcome.error
+        found, errors = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+        for name, column in found.items():
+            nothing = _nothing(len(numbers), text=column.dtype == object)
+            values.setdefault(name, nothing)[done + np.array(good)] = column
+        for k, text in errors.items():
+            rows["error"][done + good[k]] = text
+        done += len(part)
     return _table(study, schema, cell, rows, values)
+
+
+class _Size:
+    """How many runs of a cell are recorded at a time, so that their rows fit in memory.
+
+    That is learnt from those before: it follows from the scene, and changes no result.
+    """
+
+    _known: ClassVar[dict[tuple[str, int], "_Size"]] = {}
+
+    def __init__(self) -> None:
+        self._bytes = _MOST_BYTES / _FIRST_RUNS
+
+    @classmethod
+    def of(cls, study: Study, cell: int) -> "_Size":
+        """Return what is known of a cell."""
+        if len(cls._known) > _MOST_KNOWN:
+            cls._known.clear()
+        return cls._known.setdefault((str(study.path), cell), cls())
+
+    @property
+    def runs(self) -> int:
+        """How many there is room for."""
+        return max(1, int(_MOST_BYTES / max(1.0, self._bytes)))
+
+    def learn(self, outcomes: Sequence[Recorded | Failed]) -> None:
+        """Take note of how much runs have recorded."""
+        recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
+        if recorded:
+            self._bytes = sum(_bytes_of(run) for run in recorded) / len(recorded)
+
+
+#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
+#: runs of a cell tell how many that is.
+_MOST_BYTES, _FIRST_RUNS = 150e6, 64
+_MOST_KNOWN = 1000
+
+
+def _bytes_of(run: Recorded) -> int:
+    columns = [column for table in run.tables.values() for column in table.values()]
+    return sum(c.codes.nbytes if isinstance(c, Text) else c.nbytes for c in columns)
 
 
 def _outcomes(

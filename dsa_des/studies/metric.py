@@ -5,7 +5,7 @@ column, ``replica``, with the number of the replica each row belongs to. It is w
 so ten thousand replicas cost little more than one.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,9 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
-from dsa_des.replicas.replicas import Recorded, Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.drawn_columns import scenes_of
+from dsa_des.replicas.replicas import Recorded
 from dsa_des.scene.scene import Scene
 
 METRICS = "dsa_des.metrics"
@@ -162,29 +164,51 @@ class Group:
         return found
 
     @cached_property
-    def scenes(self) -> list[Scene]:
+    def scenes(self) -> Sequence[Scene]:
         """The scene of every replica with its changes."""
-        return [scene_of(self.scene, replica) for replica in self.replicas]
+        return scenes_of(self.scene, self.replicas)
 
 
 def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:
-    parts: list[Columns] = [run.tables.get(table, {}) for run in recorded]
-    full = [number for number, part in enumerate(parts) if part and len(part["tick"])]
-    counts = [len(parts[number]["tick"]) for number in full]
-    joined: Columns = {"replica": np.repeat(np.array(full, dtype=np.int64), counts)}
+    parts = [part for part in _parts(table, recorded) if len(part["tick"])]
+    joined: Columns = {"replica": _joined([part["replica"] for part in parts])}
     for name in columns:
-        if any(name not in parts[number] for number in full):
+        if any(name not in part for part in parts):
             continue  # a recording of before the column; a metric asks whether it is there
-        pieces: list[Any] = [parts[number][name] for number in full]
-        if not pieces:
-            text = any(isinstance(part.get(name), Text) for part in parts)
-            none = np.empty(0, dtype=np.int64)
-            joined[name] = Text(none, ()) if text or name == "block" else np.empty(0)
-        elif isinstance(pieces[0], Text):
-            joined[name] = _text(pieces)
-        else:
-            joined[name] = np.concatenate(pieces)
+        if parts:
+            joined[name] = _joined([part[name] for part in parts])
+            continue
+        text = any(isinstance(run.tables.get(table, {}).get(name), Text) for run in recorded)
+        none = np.empty(0, dtype=np.int64)
+        joined[name] = Text(none, ()) if text or name == "block" else np.empty(0)
     return joined
+
+
+def _parts(table: str, recorded: Sequence[Recorded]) -> Iterator[Columns]:
+    """Return what was recorded in one table, with ``replica``: of a whole lock step at once."""
+    start = 0
+    while start < len(recorded):
+        shared = recorded[start].shared
+        runs = recorded[start : start + (1 if shared is None else shared.replicas)]
+        alike = all(run.shared is shared and run.number == k for k, run in enumerate(runs))
+        if shared is not None and alike and len(runs) == shared.replicas:
+            columns: Any = shared.tables.get(table)
+            if columns:
+                yield {**columns, "replica": columns["replica"] + start if start else
+                       columns["replica"]}  # fmt: skip
+            start += len(runs)
+            continue
+        if part := recorded[start].tables.get(table):
+            yield {**part, "replica": np.full(len(part["tick"]), start, dtype=np.int64)}
+        start += 1
+
+
+def _joined(pieces: Sequence[Any]) -> Any:
+    if len(pieces) == 1:
+        return pieces[0]
+    if pieces and isinstance(pieces[0], Text):
+        return _text(pieces)
+    return np.concatenate(pieces) if pieces else np.empty(0, dtype=np.int64)
 
 
 def _text(pieces: Sequence[Text]) -> Text:

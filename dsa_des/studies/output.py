@@ -10,7 +10,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import SceneError, UsageError
-from dsa_des.replicas.replicas import scene_of
+from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.studies.cheapest import Answer, answers, one_sided
 from dsa_des.studies.distribution_figures import draw_cdf, draw_histogram
 from dsa_des.studies.figures import SummaryPlaces, draw_axis, draw_heat, draw_polar, draw_scatter

@@ -16,7 +16,7 @@ from typing import Any, overload
 from dsa_des.block.class_text import sourced
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem
-from dsa_des.replicas.replicas import Replica
+from dsa_des.replicas.changed_scene import Replica
 from dsa_des.scene.overrides import set_value, swap_type
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile

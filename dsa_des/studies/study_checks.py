@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile

@@ -9,7 +9,8 @@ from snippets import file_of, read_snippets
 
 from dsa_des.block.message import Text
 from dsa_des.record.recording import MemorySink, Recorder
-from dsa_des.replicas.replicas import Recorded, Replica
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Recorded
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import Group, find_metric, wanted_by

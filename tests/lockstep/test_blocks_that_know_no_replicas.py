@@ -10,7 +10,7 @@ from components.radar.weather_effects import Rain
 from components.tracking.stub import TrackerStub
 from dsa_des.block.component import Component
 from dsa_des.block.ports import Input
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"

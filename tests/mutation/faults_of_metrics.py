@@ -120,8 +120,9 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/metrics/rows.py", (_KEYS, _BY_HAND),
-        ("last-report-for-first", "starts = np.flatnonzero(np.diff(replica, prepend=-1))",
-         "starts = np.flatnonzero(np.diff(replica, append=-1))"),
+        ("last-report-for-first",
+         "starts = np.flatnonzero(np.append(True, replica[1:] != replica[:-1]))",
+         "starts = np.flatnonzero(np.append(replica[1:] != replica[:-1], True))"),
         ("farthest-of-those-seen-at-once",
          "order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), ",
          "order = np.lexsort((np.where(np.isnan(ranges), np.inf, -ranges), "),
@@ -176,7 +177,10 @@ FAULTS = [
         ("broken-from-the-last-update",
          "broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)",
          "broken = np.where(lines.gap_s > self.p.break_after_s, lines.gap_s, 0.0)"),
-        ("gaps-across-targets", "& (target[1:] == target[:-1])", "& (target[1:] == target[1:])"),
+        ("gaps-across-targets", "(target[1:] == target[:-1])\n        #: Index",
+         "(target[1:] == target[1:])\n        #: Index"),
+        ("targets-in-any-order", "(target[1:] == target[:-1])\n    if",
+         "(target[1:] == target[1:])\n    if"),
         ("position-error-by-range-alone", "square = (r - t) ** 2 + r * t * chord[ranged] ** 2",
          "square = (r - t) ** 2"),
         ("position-error-with-range-squared",
@@ -212,7 +216,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/metrics/run_ends.py", (_KEYS, "studies/test_cut_off_values.py"),
-        ("second-scan-for-first", "at = first + number - 1", "at = first + number"),
+        ("second-scan-for-first", "== number)", "== number + 1)"),
     ),
     *in_file(
         _GROUP, "components/encounters/risk_metric.py", ("encounters/test_risk_of_a_set.py",),

@@ -10,6 +10,20 @@ _SUMMARIES = "studies/test_summaries_by_hand.py"
 
 FAULTS = [
     *in_file(
+        _GROUP, "dsa_des/replicas/drawn_columns.py", "studies/test_drawn_columns.py",
+        ("values-next-to-zero-unchecked", "key=lambda value: (value == 0, abs(value))", "key=abs"),
+        ("validators-unwatched", "                if read:\n", "                if not read:\n"),
+        ("any-offset-keeps-the-ticks", "NANOSECONDS % value.denominator", "0 % value.denominator"),
+    ),
+    *in_file(
+        _GROUP, "dsa_des/studies/chunk.py", "studies/test_rows_held_at_a_time.py",
+        ("all-at-once", "done + size.runs]", "len(replicas)]"),
+        ("errors-of-the-first-part", 'rows["error"][done + k]', 'rows["error"][k]'),
+        ("errors-of-metrics-of-the-first-part", 'rows["error"][done + good[k]]',
+         'rows["error"][good[k]]'),
+        ("values-in-the-first-part", "[done + np.array(good)] = ", "[np.array(good)] = "),
+    ),
+    *in_file(
         _GROUP, "dsa_des/studies/statistics.py", _INTERVALS,
         ("biased-spread", "/ (count - 1) / count)", "/ count / count)"),
         ("spread-of-one-value", "/ (count - 1) / count)", "/ (count - 1))"),

@@ -16,8 +16,9 @@ from random_scene import Case
 from dsa_des.block.message import Text
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, scene_of
+from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from dice import Dice
 
-from dsa_des.replicas.replicas import Replica
+from dsa_des.replicas.changed_scene import Replica
 
 #: Parameter → values, by the beginning of the block's type.
 _DRAWS: dict[str, dict[str, tuple[Any, ...]]] = {

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from components.metrics.clock_coincidence import coincidence_share
-from dsa_des.replicas.replicas import Replica, run_replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.studies.metric import Group, wanted_by
 from dsa_des.studies.study import MetricSpec

@@ -14,7 +14,8 @@ from components.metrics.track_quality import _ramp_quantiles
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Text
-from dsa_des.replicas.replicas import Recorded, Replica, run_replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Recorded, run_replicas
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.metric import METRICS, Group, wanted_by
 from dsa_des.studies.study import MetricSpec

@@ -3,8 +3,8 @@
 import pyarrow.compute as pc
 
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

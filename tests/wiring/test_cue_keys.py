@@ -266,8 +266,8 @@ def test_replicas_of_a_loop_are_the_same_together_as_alone(late):
     import pyarrow.compute as pc
 
     from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.replicas.changed_scene import Replica, scene_of
     from dsa_des.replicas.lockstep import lock_step
-    from dsa_des.replicas.replicas import Replica, scene_of
     from dsa_des.running.simulation import Simulation
 
     grid = {"azimuth_resolution_deg": 0.5, "elevation_resolution_deg": 0.5,

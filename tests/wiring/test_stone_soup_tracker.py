@@ -18,8 +18,8 @@ import dsa_des
 from components.tracking.stone_soup import StoneSoupTracker
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "stone-soup.md"

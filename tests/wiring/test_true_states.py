@@ -107,8 +107,8 @@ def test_a_velocity_where_a_flight_begins_or_ends_is_that_of_its_own_side():
 @pytest.mark.parametrize("key", ["blocks.radar.scan_rate_hz", "blocks.traffic.intruders[0].up_m"])
 def test_replicas_in_lock_step_have_the_truth_of_each(key):
     """Of shared traffic and of one for each replica."""
+    from dsa_des.replicas.changed_scene import Replica, scene_of
     from dsa_des.replicas.lockstep import lock_step
-    from dsa_des.replicas.replicas import Replica, scene_of
 
     loaded = dsa_des.load_scene(far_scene())
     values = (4.0, 5.0) if "radar" in key else (-510.0, -400.0)

@@ -11,8 +11,9 @@ from components.evidence.benchmark.cases import SCENES, replicas_of, scene_of
 from components.evidence.benchmark.cases import chosen as chosen_cases
 from components.examples import folder
 from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Failed, Replica, run_replicas
+from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.chunk import run_chunk
@@ -31,6 +32,10 @@ _DRAWN = {
     "east_m": (-6000.0, 6000.0), "north_m": (2000.0, 9000.0), "heading_deg": (0.0, 360.0),
     "speed_mps": (40.0, 90.0),
 }  # fmt: skip
+
+
+# Replicas whose every column is held at a time.
+_ALL_AT_ONCE = 128
 
 
 def other_flights(count: int) -> list[Replica]:
@@ -82,12 +87,29 @@ def loop(count: int) -> Callable[[], object]:
 
 
 def replicas(count: int) -> Callable[[], object]:
-    """Return what runs replicas of one encounter with other phases of the clocks, all recorded."""
+    """Return what runs a chunk of a study: one encounter with other phases of the clocks.
+
+    Its metrics are those of first detections and of the age of information, with what they need of
+    the tables `scans`, `detections` and `fused` recorded to memory.
+    """
+    scan_s = {"radar": 0.2, "eo": 0.05, "ir": 0.5}
+    tables = {
+        "replicas": 100_000,
+        "metrics": ["first_detection", "age_of_information"],
+        "draws": {"blocks": {n: {"offset_s": {"uniform": [0, s]}} for n, s in scan_s.items()}},
+    }
+    return _chunks("monte_carlo.toml", tables, count)
+
+
+def replicas_all(count: int) -> Callable[[], object]:
+    """Return what runs the same replicas with every column, and the truth, recorded to memory."""
     (case,) = chosen_cases(["monte_carlo"])
     scenes = replicas_of(scene_of(case, quick=False), count)
 
     def do() -> None:
-        lock_step(scenes, recorder=Recorder([ColumnSink()])).run()
+        for start in range(0, count, _ALL_AT_ONCE):  # what a study would hold at a time
+            part = scenes[start : start + _ALL_AT_ONCE]
+            lock_step(part, recorder=Recorder([ColumnSink()])).run()
 
     return do
 
@@ -99,8 +121,12 @@ def risk(count: int) -> Callable[[], object]:
         "metrics": ["risk_ratio"],
         "draws": {"blocks": {"traffic": {"encounter": {"sequence": [0, 1]}}}},
     }
-    base = read_scene_file(SCENES / "closed_loop_risk.toml")
-    study = study_of_tables(tables, base, (), ())
+    return _chunks("closed_loop_risk.toml", tables, count)
+
+
+def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], object]:
+    """Return what runs chunks of a study, each time one of other runs."""
+    study = study_of_tables(tables, read_scene_file(SCENES / scene), (), ())
     starts = iter(range(0, 100_000 - count, count))  # each time other encounters
 
     def do() -> None:

@@ -117,10 +117,17 @@ RATES = (
     ),
     Rate(
         "replicas",
-        "replicas of 120 s, an intruder, 5, 20 and 2 Hz, other phases, all recorded",
+        "runs of 120 s, an intruder, 5, 20 and 2 Hz, other phases, first detections and ages",
         1000,
-        1000,
+        500,
         encounters.replicas,
+    ),
+    Rate(
+        "replicas_all",
+        "the same, every column and the truth recorded to memory",
+        1000,
+        500,
+        encounters.replicas_all,
     ),
     Rate(
         "flights",

@@ -7,8 +7,8 @@ from typing import Any
 import dsa_des
 from components.tracking.ekf import ExtendedKalman
 from dsa_des.block.wake import Wake
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
 
 _DURATION_S = 4
 #: Of radar and two cameras, in `_DURATION_S`.

@@ -13,7 +13,8 @@ from dsa_des.arrays.types import AnyArray
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import UsageError
 from dsa_des.record.recording import ColumnSink, Recorder
-from dsa_des.replicas.replicas import Failed, Replica, run_replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 

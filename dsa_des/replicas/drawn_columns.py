@@ -1,0 +1,326 @@
+"""Scenes of many replicas whose drawn values are checked as columns: no scene for each of them.
+
+What a value is checked by is known: its field's type and bounds, and validators of the tables
+around it. Where no validator reads any of the fields that are drawn, which is watched, a value is
+allowed or not by itself; and where a field has nothing but bounds, so are all values between two
+that are allowed. So three replicas are made and checked, with the lowest and the highest of every
+column and with those closest to 0, and stand for all. What cannot be checked like that, and all of
+them where one of the three is refused, is checked replica by replica.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from inspect import signature
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, overload
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import AfterValidator, BaseModel, BeforeValidator, PlainSerializer
+
+from dsa_des.block.component import ClockedParameters, Component, Parameters
+from dsa_des.errors import SceneError
+from dsa_des.replicas.changed_scene import Replica, item_of, key_path, scene_of
+from dsa_des.replicas.watched_parameters import reading, watched_type
+from dsa_des.scene.options import BlockOptions
+from dsa_des.scene.scene import Scene
+from dsa_des.time.clock import NANOSECONDS, parse_rational
+
+#: Of fewer replicas each is checked by itself: to learn what validators read costs more.
+_FEWEST = 12
+_BOUNDS = (Ge, Gt, Le, Lt)
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class DrawnColumn:
+    """The values of one drawn key, one for each replica.
+
+    Parameters
+    ----------
+    block : str
+    path : tuple
+        Where it stands in the block's parameters: names of fields, and numbers of items.
+    values : sequence
+        As the field holds them.
+    """
+
+    block: str
+    path: Path
+    values: Sequence[Any]
+
+
+class ReplicaScenes(Sequence[Scene]):
+    """The scenes of replicas that differ in seeds and columns only; one is made when asked for.
+
+    Parameters
+    ----------
+    scene : Scene
+        A checked one of them; what columns hold counts instead of what it says there.
+    seeds : sequence of int
+    columns : sequence of DrawnColumn
+    """
+
+    def __init__(self, scene: Scene, seeds: Sequence[int], columns: Sequence[DrawnColumn]) -> None:
+        self._scene, self._drawn = scene, columns
+        self.seeds = seeds
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    @overload
+    def __getitem__(self, place: int) -> Scene: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> "ReplicaScenes": ...
+
+    def __getitem__(self, place: int | slice) -> "Scene | ReplicaScenes":
+        if isinstance(place, slice):
+            columns = [replace(column, values=column.values[place]) for column in self._drawn]
+            return ReplicaScenes(self._scene, self.seeds[place], columns)
+        blocks = dict(self._scene.blocks)
+        for name in {column.block for column in self._drawn}:
+            parameters = self._parameters_of(name, place)
+            blocks[name] = replace(blocks[name], parameters=parameters)
+        return replace(self._scene, seed=self.seeds[place], blocks=blocks)
+
+    def parameters_of(self, block: str) -> list[Any]:
+        """Return a block's parameters in every replica."""
+        if not any(column.block == block for column in self._drawn):
+            return [self._scene.blocks[block].parameters] * len(self)
+        return [self._parameters_of(block, number) for number in range(len(self))]
+
+    def differing(self, block: str) -> set[str]:
+        """Return which of a block's parameters are not the same in all replicas."""
+        return {
+            str(column.path[0])
+            for column in self._drawn
+            if column.block == block and any(v != column.values[0] for v in column.values)
+        }
+
+    def _parameters_of(self, block: str, number: int) -> Any:
+        changes = {c.path: c.values[number] for c in self._drawn if c.block == block}
+        return _with(self._scene.blocks[block].parameters, changes)
+
+
+def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
+    """Return a table with values in it that are known to be allowed."""
+    parts: dict[Any, dict[Path, Any]] = {}
+    for path, value in changes.items():
+        parts.setdefault(path[0], {})[path[1:]] = value
+    if not isinstance(old, BaseModel):
+        items = list(old)
+        for place, mine in parts.items():
+            items[place] = mine[()] if () in mine else _with(items[place], mine)
+        return type(old)(items)
+    fields = {name: old.__dict__[name] for name in type(old).model_fields}
+    for name, mine in parts.items():
+        fields[name] = mine[()] if () in mine else _with(fields[name], mine)
+    return _model_of(type(old), fields, set(old.model_fields_set))
+
+
+def _model_of(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -> BaseModel:
+    new = model.__new__(model)
+    object.__setattr__(new, "__dict__", fields)
+    object.__setattr__(new, "__pydantic_fields_set__", given)
+    object.__setattr__(new, "__pydantic_extra__", None)
+    object.__setattr__(new, "__pydantic_private__", None)
+    return new
+
+
+def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | None:
+    """Return the scenes of replicas, checked as columns; None where that cannot be done.
+
+    Then every one has to be made and checked by itself (`scene_of`), which also says what is wrong.
+    """
+    if len(replicas) < _FEWEST:
+        return None
+    keys = replicas[0].changes.keys()
+    if any(replica.changes.keys() != keys for replica in replicas):
+        return None
+    try:
+        columns = {key: _column(scene, key, [r.changes[key] for r in replicas]) for key in keys}
+        if len({(column.block, column.path) for column in columns.values()}) < len(columns):
+            return None
+        seeds = [replica.seed for replica in replicas]
+        probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
+        made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]
+        return ReplicaScenes(made[0], seeds, _watched(made[0], list(columns.values())))
+    except (_NoColumn, SceneError):
+        return None
+
+
+def scenes_of(scene: Scene, replicas: Sequence[Replica]) -> Sequence[Scene]:
+    """Return the scene of every replica.
+
+    Raises
+    ------
+    SceneError
+        As `scene_of`, for the first replica with something wrong.
+    """
+    together = drawn_columns(scene, replicas)
+    return [scene_of(scene, replica) for replica in replicas] if together is None else together
+
+
+#: Which replicas stand for all: those with the lowest and highest values, and those closest to 0.
+_PROBES: tuple[Callable[[Sequence[Any]], Any], ...] = (
+    min, max, lambda values: min(values, key=lambda value: (value == 0, abs(value))),
+)  # fmt: skip
+
+
+class _NoColumn(Exception):
+    """These values cannot be checked as columns."""
+
+
+def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
+    """Return the column of a key, its values as its field would hold them."""
+    path = key_path(key)
+    if len(path) < 3 or path[0] != "blocks" or path[1] not in scene.blocks:
+        raise _NoColumn
+    block = scene.blocks[str(path[1])]
+    if path[2] in BlockOptions.model_fields and path[2] not in type(block.parameters).model_fields:
+        raise _NoColumn
+    found, model, name = _place(block.parameters, path[2:])
+    return DrawnColumn(block.name, found, _as_held(model, name, values))
+
+
+def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
+    """Return a path with items by number, and the field at its end."""
+    found: list[str | int] = []
+    old: Any = parameters
+    while path:
+        if isinstance(old, BaseModel):
+            model, name = type(old), str(path[0])
+            if name not in model.model_fields or not _allows_columns(model):
+                raise _NoColumn
+            old, path = getattr(old, name), path[1:]
+            found.append(name)
+            if not path:
+                return tuple(found), model, name
+        elif type(old) in (list, tuple):
+            try:
+                place, path = item_of(old, path)
+            except ValueError:
+                raise _NoColumn from None
+            found.append(place)
+            old = old[place]
+        else:
+            break
+    raise _NoColumn
+
+
+def _allows_columns(model: type[BaseModel]) -> bool:
+    """Whether a model's values are checked by their own fields and by validators of the whole."""
+    known = model.__pydantic_decorators__
+    alien = (
+        model.__init__ is not BaseModel.__init__
+        or "model_validate" in _written(model)
+        or model.__private_attributes__
+        or model.model_config.get("extra") == "allow"
+        or known.root_validators
+        or known.validators
+        or any(found.info.mode != "after" for found in known.model_validators.values())
+        or any(
+            len(signature(found.func).parameters) > 1 and not _is_of_all(found.func)
+            for found in known.field_validators.values()
+        )
+        or any(field.default_factory_takes_validated_data for field in model.model_fields.values())
+    )
+    return not alien and all(
+        len(signature(check.func).parameters) == 1
+        for field in model.model_fields.values()
+        for check in field.metadata
+        if isinstance(check, AfterValidator | BeforeValidator)
+    )
+
+
+def _written(cls: type, known: type = BaseModel) -> set[str]:
+    """Return what a class and its bases say themselves, up to one that is known."""
+    bases = cls.__mro__[: cls.__mro__.index(known)] if known in cls.__mro__ else cls.__mro__
+    return {name for base in bases for name in vars(base)}
+
+
+def _is_of_all(function: Any) -> bool:
+    """Whether a validator of fields is the one that all parameters have, of their size."""
+    return getattr(function, "__func__", None) is Parameters._computable.__func__  # type: ignore[attr-defined]
+
+
+def _as_held(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
+    """Return values of a field that has bounds and nothing else, as it holds them."""
+    field = model.model_fields[name]
+    union = get_origin(field.annotation) in (Union, UnionType)
+    options = get_args(field.annotation) if union else (field.annotation,)
+    ((kind, *others),) = [set(options) - {type(None)}]
+    validators = model.__pydantic_decorators__.field_validators.values()
+    mine = [v for v in validators if name in v.info.fields or "*" in v.info.fields]
+    if others or not all(_is_of_all(found.func) for found in mine):
+        raise _NoColumn
+    exact = kind is Fraction
+    for check in field.metadata:
+        read = isinstance(check, BeforeValidator) and check.func is parse_rational
+        if not (isinstance(check, _BOUNDS) or (exact and (read or type(check) is PlainSerializer))):
+            raise _NoColumn
+    if kind is float and all(type(v) is float for v in values):
+        held: list[Any] = list(values)
+    elif kind is float and all(type(v) in (int, float) for v in values):
+        held = [float(v) for v in values]
+    elif kind is int and all(type(v) is int for v in values):
+        held = list(values)
+    elif exact and all(type(v) is Fraction for v in values):
+        held = [parse_rational(v) for v in values]
+    else:
+        raise _NoColumn
+    if kind is float and not all(map(math.isfinite, held)):
+        raise _NoColumn
+    return held
+
+
+def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColumn]:
+    """Return the columns if no validator reads what is drawn, and clocks read offsets only.
+
+    Ticks of a second and times that they can hold are then those of the replicas that were checked.
+    """
+    for name in {column.block for column in columns}:
+        mine = [column for column in columns if column.block == name]
+        block = scene.blocks[name]
+        try:
+            with reading() as read:
+                parameters = _validated(block.parameters, [column.path for column in mine])
+                if read:
+                    raise _NoColumn
+                block.cls.clock_of(parameters)
+                own_clock = bool(read)
+        except Exception as error:  # a stranger's validator, in a class derived from its own
+            raise _NoColumn from error
+        for column in mine if own_clock else ():
+            if (
+                "clock_of" in _written(block.cls, Component)
+                or "clock_spec" in _written(type(block.parameters), ClockedParameters)
+                or column.path == ("scan_rate_hz",)
+                or any(NANOSECONDS % value.denominator for value in _offsets(column))
+            ):
+                raise _NoColumn
+    return columns
+
+
+def _offsets(column: DrawnColumn) -> Sequence[Fraction]:
+    return column.values if column.path == ("offset_s",) else ()
+
+
+def _validated(old: Any, paths: Sequence[Path]) -> Any:
+    """Validate a table again, with tables in it that note what is read of the values at paths."""
+    parts: dict[Any, list[Path]] = {}
+    for path in paths:
+        parts.setdefault(path[0], []).append(path[1:])
+    if not isinstance(old, BaseModel):
+        items = list(old)
+        for place, mine in parts.items():
+            items[place] = _validated(items[place], mine)
+        return items
+    given = {name: getattr(old, name) for name in old.model_fields_set | parts.keys()}
+    for name, mine in parts.items():
+        if mine != [()]:
+            given[name] = _validated(given[name], mine)
+    drawn = frozenset(name for name, mine in parts.items() if mine == [()])
+    return watched_type(type(old), drawn).model_validate(given)

@@ -1,0 +1,63 @@
+"""A chunk whose rows do not fit in memory at once is run in parts, with the same bytes."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dsa_des.replicas.replicas import run_replicas
+from dsa_des.scene.scene_file import read_scene_file
+from dsa_des.studies import chunk as chunks
+from dsa_des.studies.chunk import run_chunk
+from dsa_des.studies.metric import Group
+from dsa_des.studies.study import Chunk
+from dsa_des.studies.study_file import study_of_tables
+
+
+def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flaw = {"choice": ["none", "none", "raise"]}
+    tables = {
+        "replicas": 16,
+        "metrics": ["first_detection"],
+        "draws": {"blocks": {"radar": {"flaw": flaw}}},
+    }
+    study = study_of_tables(tables, read_scene_file("small.toml"), (), ())
+    recorded, measured = list[int](), list[int]()
+
+    def run(scene: Any, replicas: Any, **how: Any) -> Any:
+        recorded.append(len(replicas))
+        return run_replicas(scene, replicas, **how)
+
+    def made(*given: Any) -> Group:
+        group = Group(*given)
+        measured.append(len(group))
+        if any(replica.seed % 3 == 0 for replica in group.replicas):
+            raise ValueError("threes break")  # of their metrics
+        return group
+
+    def broken(scene: Any, metrics: Any, runs: Any) -> Any:
+        try:
+            return plain(scene, metrics, runs)
+        except ValueError as error:
+            if len(runs) == 1:
+                return {}, {0: str(error)}
+            return chunks._one_by_one(scene, metrics, runs)
+
+    plain = chunks._measured
+    monkeypatch.setattr(chunks, "run_replicas", run)
+    monkeypatch.setattr(chunks, "Group", made)
+    monkeypatch.setattr(chunks, "_measured", broken)
+    whole = run_chunk(study, Chunk("part", ((0, 0, 16),)))
+    assert recorded == [16] and 0 < whole.failed < 16
+    monkeypatch.setattr(chunks, "_MOST_BYTES", 15e3)
+    monkeypatch.setattr(chunks, "_FIRST_RUNS", 5)
+    chunks._Size._known.clear()
+    del recorded[:]
+    parts = run_chunk(study, Chunk("part", ((0, 0, 16),)))
+    assert parts.content == whole.content
+    assert recorded[0] == 5 and max(recorded[1:]) < 16 and sum(recorded) == 16
+    assert max(measured[-len(recorded) :]) < 16
+    # What was learnt holds for the next chunk of the cell.
+    del recorded[:]
+    run_chunk(study, Chunk("next", ((0, 0, 16),)))
+    assert recorded[0] == max(recorded)
