@@ -80,9 +80,10 @@ NOISY = {
 }  # fmt: skip
 _MISSED = 0.3
 _CLASS = f"{__name__ if __name__ != '__main__' else 'components.evidence.track_consistency'}:"
-#: White acceleration so small that a flight of a minute hardly notices it; with less of it tracks
-#: notice that level flight follows the Earth, 0.6 mm/s² off a straight line.
-STILL = {"acceleration_intensity_m2_s3": 3e-6}
+#: Straight flights have no noise of their own, but level flight follows the Earth: 60 m/s bend by
+#: a = v²/R = 0.57 mm/s² from a straight line of the frame. White acceleration of intensity a² T
+#: makes velocities as uncertain within the T = 37 s of a scene as they become wrong by, a T.
+STILL = {"acceleration_intensity_m2_s3": 1.2e-5}
 
 
 class _Missing:
@@ -134,6 +135,11 @@ class Case:
 
 _EKF = {"type": "tracking.ekf", **STILL}
 _DEGREE = math.radians(1.0)
+#: Of turns that a computer flies: all but no noise in a model, and turns begin at any time.
+_STEADY = {
+    "acceleration_intensity_m2_s3": 0.01, "turn_acceleration_intensity_m2_s3": 1.2e-5,
+    "transition_rates_per_s": [[0.0, 0.05], [0.01, 0.0]],
+}  # fmt: skip
 #: The default of `tracking.imm`.
 _TURN = CoordinatedTurn(0.1, 0.01 * _DEGREE**2)
 _GONE = {"delete_misses": 40}
@@ -152,6 +158,8 @@ CASES = {
                  drawn=_TURN, targets=[]),
     "circle": Case("3 deg/s turn without any noise, imm as it is", {"type": "tracking.imm"},
                    [TURNING]),
+    "steady": Case("the same, models as steady as that",
+                   {"type": "tracking.imm", **_STEADY}, [TURNING]),
     "crossing": Case("two that cross 40 m apart, gnn", _EKF, CROSSING),
     "crossing_jpda": Case("the same, jpda", {**_EKF, "association": "jpda"}, CROSSING),
     "nearly": Case("two that cross 10 m apart, gnn", _EKF, NEARLY),

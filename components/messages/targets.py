@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
+from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
 from components.messages.true_states import truth_columns
@@ -69,6 +70,26 @@ class TrafficStates(Message):
 
     joins_static = frozenset({"columns"})
     may_hold = frozenset({"truth"})
+
+    @classmethod
+    def of(cls, tick: IntArray, own: TrajectoryState, others: TrajectoryState, **more: Any) -> Self:
+        """Return the message of what an ownship and others fly; `more` are its other fields."""
+        return cls(
+            tick=tick,
+            own_lat_deg=own.lat_deg,
+            own_lon_deg=own.lon_deg,
+            own_alt_m=own.alt_m,
+            own_yaw_rad=own.yaw_rad,
+            own_pitch_rad=own.pitch_rad,
+            own_roll_rad=own.roll_rad,
+            lat_deg=others.lat_deg,
+            lon_deg=others.lon_deg,
+            alt_m=others.alt_m,
+            yaw_rad=others.yaw_rad,
+            pitch_rad=others.pitch_rad,
+            roll_rad=others.roll_rad,
+            **more,
+        )
 
     def tables(self) -> dict[str, Columns]:
         """Return the table of the truth where it is recorded."""

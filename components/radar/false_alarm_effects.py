@@ -17,6 +17,13 @@ MOST_PER_SCAN = 1e5
 _NO_TARGET = np.uint64(0)
 
 
+def alarms_are_asked_for(parameters: Any) -> Verdict:
+    """Return whether a radar that is switched on has false alarms."""
+    if parameters.false_alarms and not parameters.enabled:
+        return Verdict(False, "enabled is false")
+    return Verdict.of_flag(parameters, "false_alarms")
+
+
 class FalseAlarms(Effect):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
@@ -35,9 +42,7 @@ class FalseAlarms(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``false_alarms``, and whether the radar is switched on."""
-        if block.p.false_alarms and not block.p.enabled:
-            return Verdict(False, "enabled is false")
-        return Verdict(block.p.false_alarms, f"false_alarms is {str(block.p.false_alarms).lower()}")
+        return alarms_are_asked_for(block.p)
 
     def build(self, block: Any) -> "NoiseReports":
         """Return what adds false alarms to a report."""

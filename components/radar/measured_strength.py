@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from components.radar.false_alarm_effects import alarms_are_asked_for
 from components.radar.false_alarms import measured_snr
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import IntArray
@@ -27,9 +28,7 @@ class MeasuredStrength(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``false_alarms``, and whether the radar is switched on."""
-        if block.p.false_alarms and not block.p.enabled:
-            return Verdict(False, "enabled is false")
-        return Verdict(block.p.false_alarms, f"false_alarms is {str(block.p.false_alarms).lower()}")
+        return alarms_are_asked_for(block.p)
 
     def build(self, block: Any) -> "Strength":
         """Return what measures the strength of detections."""

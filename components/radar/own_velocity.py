@@ -30,8 +30,7 @@ class OwnVelocity(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``measures_range_rate``."""
-        asked = block.p.measures_range_rate
-        return Verdict(asked, f"measures_range_rate is {str(asked).lower()}")
+        return Verdict.of_flag(block.p, "measures_range_rate")
 
     def build(self, block: Any) -> Any:
         """Return what adds the velocity to a report."""

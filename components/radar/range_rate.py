@@ -33,8 +33,7 @@ class RangeRate(Effect):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``measures_range_rate``."""
-        asked = block.p.measures_range_rate
-        return Verdict(asked, f"measures_range_rate is {str(asked).lower()}")
+        return Verdict.of_flag(block.p, "measures_range_rate")
 
     def build(self, block: Any) -> Any:
         """Return what gives the rates of some cells."""

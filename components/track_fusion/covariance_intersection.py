@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -98,6 +98,14 @@ class _Heads:
             self.time_s[which], self.own_m[:, which],
         )  # fmt: skip
 
+    def kept_with(self, newer: "_Heads") -> "_Heads":
+        """Return those of all replicas, as they are in `newer` where they are among them."""
+        old = self.take(~np.isin(self.replica, newer.replica))
+        names = [field.name for field in fields(self)]
+        both = (np.concatenate([getattr(h, n) for h in (old, newer)], axis=-1) for n in names)
+        whole = _Heads(*both)
+        return whole.take(np.argsort(whole.replica, kind="stable"))
+
 
 @dataclass(frozen=True, eq=False)
 class _Reports:
@@ -133,6 +141,7 @@ class CovarianceIntersection(Component):
     Parameters = IntersectionParameters
     windowed = True
     lockstep = True
+    side_by_side = True
     rewindable = True
     ladders = (RULE,)
 
@@ -150,7 +159,8 @@ class CovarianceIntersection(Component):
         )
         none = np.empty(0, dtype=np.int64)
         self._heads = _Heads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
-        self._newest: dict[str, int] = {}
+        #: By tracker: of each replica, the newest instant that it told of.
+        self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
         self._told = nothing_told()
 
@@ -167,7 +177,7 @@ class CovarianceIntersection(Component):
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what the trackers told, instant by instant, and tell the fused tracks."""
-        came = {new.source: self._fresh(new) for new in wake.arrivals("tracks")}
+        came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
         row_of = {name: np.searchsorted(wake.ticks, new.tick) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
@@ -186,19 +196,36 @@ class CovarianceIntersection(Component):
             parts.append(new)
             kept = taken(new, new["track_status"] != DELETED)
             told = joined([taken(told, ~np.isin(told["replica"], replica[at])), kept])
+        self._remember(heads, local, told, wake)
+        return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
+
+    def _remember(self, heads: _Heads, local: LocalTracks, told: Told, wake: Wake) -> None:
+        """Keep what is held of the replicas that may come again."""
+        if wake.side_by_side:
+            others = ~np.isin(self._local.replica, heads.replica)
+            self._local = LocalTracks.joined([self._local.take(others), local])
+            others = ~np.isin(self._told["replica"], heads.replica)
+            self._told = joined([taken(self._told, others), told])
+            self._heads = self._heads.kept_with(heads)
+            return
         last = heads.replica[-1]
         self._heads = heads.take(heads.replica == last)
         self._local = local.take(local.replica == last)
         self._told = taken(told, told["replica"] == last)
-        return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
 
-    def _fresh(self, new: Arrivals) -> Arrivals:
+    def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
-        made = new.message.tick
-        before = self._newest.get(new.source, np.iinfo(np.int64).min)
-        kept = made >= np.maximum(np.maximum.accumulate(made), before)
+        made, replica = new.message.tick, wake.replica_of(new.tick)
+        newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
+        more = max(int(replica[-1]) + 1 - len(newest), 0)
+        newest = np.append(newest, np.full(more, np.iinfo(np.int64).min))
+        # Along the common line, nothing of one replica is newer than what is of the next.
+        so_far = np.maximum(np.maximum.accumulate(made), newest[replica])
+        kept = made >= so_far
         kept[:-1] &= ~((new.tick[1:] == new.tick[:-1]) & kept[1:])
-        self._newest = {**self._newest, new.source: max(before, int(made.max()))}
+        ends = np.append(replica[1:] != replica[:-1], True)
+        newest[replica[ends]] = so_far[ends]
+        self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
         return Arrivals(new.source, new.tick[which], new.message.take(which))
 
@@ -216,17 +243,16 @@ class CovarianceIntersection(Component):
             message = came[name].message
             row = np.repeat(row_of[name], np.diff(message.offsets))
             of, entries = np.unique(np.searchsorted(replicas, wake.replica[row]), return_index=True)
-            for place, entry in zip(of.tolist(), entries.tolist(), strict=True):
-                if row[entry] < first[place]:
-                    first[place] = row[entry]
-                    heads.origin[:, place] = [getattr(message, c)[entry] for c in _ORIGIN]
-        for old in np.flatnonzero(np.isin(self._heads.replica, replicas)).tolist():
-            here = int(np.searchsorted(replicas, self._heads.replica[old]))
-            heads.next_number[here] = self._heads.next_number[old]
-            heads.time_s[here] = self._heads.time_s[old]
-            heads.own_m[:, here] = self._heads.own_m[:, old]
-            if not np.isnan(self._heads.origin[0, old]):
-                heads.origin[:, here] = self._heads.origin[:, old]
+            sooner = row[entries] < first[of]
+            of, entries = of[sooner], entries[sooner]
+            first[of] = row[entries]
+            heads.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
+        old = self._heads.take(np.isin(self._heads.replica, replicas))
+        here = np.searchsorted(replicas, old.replica)
+        heads.next_number[here], heads.time_s[here] = old.next_number, old.time_s
+        heads.own_m[:, here] = old.own_m
+        begun = ~np.isnan(old.origin[0])
+        heads.origin[:, here[begun]] = old.origin[:, begun]
         return heads
 
     def _reports(

@@ -11,11 +11,12 @@ from components.estimation.batched import is_everything, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind
+from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.filter_bank import PairMeasurement, log_mixture
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import Scans, kind_of
 from components.tracking.track_store import TrackStore
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # So many pairs are looked at together.
 _MOST_PAIRS = 1 << 20
@@ -45,7 +46,7 @@ def gated_pairs(
     detection: IntArray,
     of_detection: IntArray,
     looks: int,
-) -> tuple[list[GatedPairs], FloatArray | None]:
+) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
     """Return the pairs of one look in whose gate they are, kind by kind.
 
     Parameters
@@ -68,8 +69,11 @@ def gated_pairs(
     pairs : list of GatedPairs
     direction : (2, tracks) or None
         Azimuth and elevation in body axes that the first model expects, where they were needed.
+    held : (detections,) of bool
+        Which lie in the gate of a track, or in the wider one of a track that is confirmed.
     """
     found: list[GatedPairs] = []
+    held = np.zeros(len(detection), dtype=bool)
     direction = None
     blind = bool((~part.ranged).any())
     for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
@@ -94,9 +98,13 @@ def gated_pairs(
                 _picked(scans.measured, rows, cells),
                 _picked(scans.variance, rows, cells),
             )
-            inside = (said.distance <= gate_threshold(rules.gate_probability, kind.size)).nonzero()[
-                0
-            ]
+            gated = said.distance <= gate_threshold(rules.gate_probability, kind.size)
+            held[entry[gated]] = True
+            if not gated.all():
+                settled = (part.status == CONFIRMED) | (part.status == COASTED)
+                near = said.distance <= gate_threshold(rules.widest_gate, kind.size)
+                held[entry[near & settled[track]]] = True
+            (inside,) = gated.nonzero()
             cells = cells[inside]
             found.append(
                 GatedPairs(
@@ -106,7 +114,7 @@ def gated_pairs(
                 )
             )  # fmt: skip
     # Moments of sigma points are means over the points: not where the state itself is seen.
-    return found, direction if rules.bank.sigma is None else None
+    return found, direction if rules.bank.sigma is None else None, held
 
 
 def _near(
@@ -125,7 +133,7 @@ def _near(
     counts = np.bincount(of, minlength=looks)
     first = np.cumsum(counts) - counts
     many = counts[of_detection[mine]]
-    threshold = gate_threshold(rules.gate_probability, kind.size)
+    threshold = gate_threshold(rules.widest_gate, kind.size)
     cells = detection[mine]
     measured = _picked(scans.measured, rows[:3], cells)
     variance = _picked(scans.variance, rows[:3], cells)

@@ -25,6 +25,11 @@ class TrackerParameters(Parameters):
         default=0.997, gt=0, lt=1,
         description="Probability that a target's detection lies in its gate.",
     )  # fmt: skip
+    start_gate_probability: float = Field(
+        default=0.999999, ge=0, lt=1,
+        description="Probability of a wider gate about confirmed tracks: what is detected in it "
+        "starts no track of its own; 0 for none.",
+    )  # fmt: skip
     detection_probability: float = Field(
         default=0.9, gt=0, lt=1, description="Probability that a look at a target detects it."
     )
@@ -112,6 +117,9 @@ class TrackerParameters(Parameters):
             "likelihood_ratio": ("confirm_m", "confirm_n"),
         }
         said += self.idle(*unused[self.initiation], because=f"initiation is '{self.initiation}'")
+        if self.start_gate_probability <= self.gate_probability:
+            because = f"gate_probability is {self.gate_probability:g}"
+            said += self.idle("start_gate_probability", because=because)
         if self.late == "drop":
             said += self.idle("lag_s", because="late is 'drop'")
         return said

@@ -19,6 +19,8 @@ class TrackerRules:
     bank : FilterBank
     association : {"nearest", "gnn", "jpda"}
     gate_probability, detection_probability : float
+    start_gate_probability : float
+        Of the gate of a confirmed track in which no other track starts.
     exact_up_to : int
         Detections in a cluster up to which JPDA is exact.
     life : LifeRules
@@ -44,6 +46,7 @@ class TrackerRules:
     bank: FilterBank
     association: Association
     gate_probability: float
+    start_gate_probability: float
     detection_probability: float
     exact_up_to: int
     life: LifeRules
@@ -58,3 +61,8 @@ class TrackerRules:
     fields: tuple[Reach | None, ...]
     rates_of: int
     ticks_per_s: int
+
+    @property
+    def widest_gate(self) -> float:
+        """Probability of the gate outside of which a track has no say."""
+        return max(self.gate_probability, self.start_gate_probability)

@@ -58,15 +58,15 @@ def step(
     detection, of_detection = detections_of(scans, looks)
     part = _predicted(rules, part, tick[of])
     if len(part):
-        part, gated = looked_at(rules, part, of, scans, places, codes, looks, detection,
+        part, held = looked_at(rules, part, of, scans, places, codes, looks, detection,
                                of_detection)  # fmt: skip
     else:
-        gated = np.zeros(len(detection), dtype=bool)
+        held = np.zeros(len(detection), dtype=bool)
     parts.append(part)
-    if not gated.all():
+    if not held.all():
         born, next_number = started(
             rules, scans, places, codes, looks, replica, next_number,
-            detection[~gated], of_detection[~gated],
+            detection[~held], of_detection[~held],
         )  # fmt: skip
         parts.append(born)
     return TrackStore.joined(parts), next_number
@@ -106,15 +106,12 @@ def looked_at(
     detection: IntArray,
     of_detection: IntArray,
 ) -> tuple[TrackStore, BoolArray]:
-    """Return tracks after association, and which detections lie in the gate of any."""
+    """Return tracks after association, and which detections start no track."""
     place = places.take(looks[of])
     codes_here = codes[detection]
-    kinds, direction = gated_pairs(
+    kinds, direction, held = gated_pairs(
         rules, part, of, place, scans, codes_here, detection, of_detection, len(looks)
     )
-    gated = np.zeros(len(detection), dtype=bool)
-    for one in kinds:
-        gated[one.detection] = True
     looked = _expected_looks(rules, part, of, scans, looks, place, direction)
     sensors = scans.contributors[detection]
     update = updated_by_all if rules.association == "jpda" else updated_by_one
@@ -136,7 +133,7 @@ def looked_at(
     spread = position_variance(changed)
     ended = changed.ranged & (spread > rules.delete_above_m**2)
     ended |= changed.tick - changed.updated_tick > rules.delete_after_ticks
-    return changed.with_columns(status=np.where(ended, DELETED, status)), gated
+    return changed.with_columns(status=np.where(ended, DELETED, status)), held
 
 
 def _looks_in_vain(vain: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
@@ -166,7 +163,8 @@ def position_variance(part: TrackStore) -> FloatArray:
         number = int(part.number[~good][0])
         raise ValueError(
             f"the covariance of track {number} has become singular: the stated variances are "
-            "smaller than what the filter's arithmetic resolves at this range; state larger ones"
+            "smaller than what the filter's arithmetic resolves at this range, or the noise of the "
+            "motion is too large beside them; state larger ones, or less noise"
         )
     return total
 

@@ -155,6 +155,7 @@ class Tracker(Component):
             bank=self.bank(),
             association=self.p.association,
             gate_probability=self.p.gate_probability,
+            start_gate_probability=self.p.start_gate_probability,
             detection_probability=self.p.detection_probability,
             exact_up_to=self.p.jpda_exact_detections,
             life=self.p.life(),

@@ -150,15 +150,20 @@ class TrafficSource(SteeredOwnship):
         """Whether the truth is recorded."""
         return self._says_truth
 
+    @property
+    def flights_asked_for(self) -> bool:
+        """Whether blocks ask for flights at other instants."""
+        return self._flights_asked_for
+
     def together(self, replicas: ReplicaRuns) -> FlownTogether | None:
-        """Return what flies the flights of all replicas, where no other instants are asked for."""
+        """Return what flies the flights of all replicas."""
         terrain = self.context.sections.get("terrain")
         checked = terrain is not None and (
             terrain.height_m is not None or terrain.raster is not None
         )
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
         asked = self._offered is not None and self._offered.asked
-        if checked or asked or self._crabbing or self._flights_asked_for:
+        if checked or asked or self._crabbing:
             return None
         flown = flown_by(self, replicas)
         # What [accuracy] leaves out may rest on what the targets are.
@@ -166,7 +171,9 @@ class TrafficSource(SteeredOwnship):
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
         if flown is None or (allows and flown.roster is not self.roster):
             return None
-        return FlownTogether(self, flown, len(replicas))
+        rates = [p.update_rate_hz for p in replicas.parameters]
+        published = None not in rates
+        return FlownTogether(self, flown, np.array(rates, dtype=np.float64) if published else None)
 
     @property
     def width(self) -> int:
@@ -204,20 +211,10 @@ class TrafficSource(SteeredOwnship):
         if near is not None:
             present &= near
             culled = len(self._all_columns) - near.sum(axis=1)
-        return TrafficStates(
-            tick=wake.ticks,
-            own_lat_deg=own.lat_deg,
-            own_lon_deg=own.lon_deg,
-            own_alt_m=own.alt_m,
-            own_yaw_rad=own.yaw_rad,
-            own_pitch_rad=own.pitch_rad,
-            own_roll_rad=own.roll_rad,
-            lat_deg=states.lat_deg,
-            lon_deg=states.lon_deg,
-            alt_m=states.alt_m,
-            yaw_rad=states.yaw_rad,
-            pitch_rad=states.pitch_rad,
-            roll_rad=states.roll_rad,
+        return TrafficStates.of(
+            wake.ticks,
+            own,
+            states,
             present=present,
             roster=self.roster,
             columns=columns,

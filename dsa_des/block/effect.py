@@ -30,6 +30,12 @@ class Verdict:
     because: str
     bound: Mapping[str, float] = field(default_factory=dict)
 
+    @classmethod
+    def of_flag(cls, parameters: Any, name: str) -> "Verdict":
+        """Return the verdict of a parameter that is true where the effect is asked for."""
+        asked = bool(getattr(parameters, name))
+        return cls(asked, f"{name} is {str(asked).lower()}")
+
 
 class Effect:
     """One effect of a block type; stateless, shared by all blocks of that type."""

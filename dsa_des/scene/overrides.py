@@ -4,6 +4,7 @@ They are two verbs: `--set` changes one value; `--swap` puts another type into a
 name, its wires and the parameters the new type knows, and lists those it dropped.
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +172,7 @@ def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> lis
     Returns
     -------
     list of str
-        A note on each parameter that was dropped.
+        A note on each parameter that was dropped, and on each that is kept and means another thing.
     """
     block = scene.data["blocks"][name]
     notes = []
@@ -184,7 +185,30 @@ def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> lis
                 f"{dotted(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
                 f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
             )
+        elif mine and (meanings := _other_meaning(scene, old, cls, str(parameter))):
+            notes.append(
+                f"{dotted(key)} of {scene.source_of(key)} is kept, though it means another thing: "
+                f"{meanings[0]!r} of {old}, {meanings[1]!r} of {block['type']}, which "
+                f"{scene.source_of(_type_key(name))} makes {name}"
+            )
     return notes
+
+
+def _other_meaning(
+    scene: SceneFile, old: str, cls: type[Component], parameter: str
+) -> tuple[str, str] | None:
+    """Return how two types describe a parameter of one name, where that begins differently."""
+    if ":" in old:  # nothing foreign is imported for a note
+        return None
+    try:
+        fields = find(old, "", (scene.path.parent,)).Parameters.model_fields
+    except UnknownType:
+        return None
+    if parameter not in fields or parameter not in cls.Parameters.model_fields:
+        return None
+    told = [of[parameter].description or "" for of in (fields, cls.Parameters.model_fields)]
+    begin = [re.split(r"[,;:(]", text)[0].strip().rstrip(".") for text in told]
+    return None if begin[0] == begin[1] or not all(begin) else (begin[0], begin[1])
 
 
 def _known_keys(cls: type[Component]) -> set[str]:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from dsa_des.block.component import Parameters, as_written
 from dsa_des.errors import Problem, did_you_mean, nearest
-from dsa_des.scene.disagreements import all_disagreements
+from dsa_des.scene.disagreements import all_disagreements, disagreements_besides
 from dsa_des.scene.scene_file import Key, SceneFile
 
 _MUST = "must be "
@@ -33,7 +33,9 @@ def explain(
     error : ValidationError
     """
     problems = []
+    refused: set[str] = set()
     for item in error.errors(include_url=False):
+        refused.update(_names_meant(model, item))
         at = _existing_path(scene_file, key, item["loc"])
         if item["type"] == "extra_forbidden":
             allowed = _sibling_names(model, item["loc"])
@@ -66,7 +68,22 @@ def explain(
                 close = nearest(str(item["input"]), names)
                 message += f"; did you mean {close!r}?" if close else ""
             problems.append(_refused(scene_file, at, message, item["input"]))
+    given = _at(scene_file, key)
+    if refused and isinstance(given, Mapping):
+        for text in disagreements_besides(model, given, refused):
+            problems.append(_refused(scene_file, key, text, given))
     return _one_by_key(problems)
+
+
+def _names_meant(model: Any, item: Any) -> list[str]:
+    """Return the key of a table that an error speaks of, and of an unknown one what it may mean."""
+    if not item["loc"]:
+        return []
+    name = str(item["loc"][0])
+    if name in model.model_fields:
+        return [name]
+    close = nearest(name, list(model.model_fields))
+    return [name, close] if close else [name]
 
 
 def _one_by_key(problems: list[Problem]) -> list[Problem]:

@@ -84,7 +84,8 @@ def test_back_to_the_first_type_nothing_is_lost(write):
     path = write('[blocks.radar]\ntype = "radar.swerling"\n', base="middle.toml")
     scene = load_scene(path)
     assert scene.blocks["radar"].parameters.calibrate.range_km == 10
-    assert scene.notes == []
+    (note,) = scene.notes
+    assert "range_km" in note and "is kept" in note
 
 
 def test_a_block_that_extends_a_sensor_of_another_type(write, tmp_path):
@@ -232,3 +233,15 @@ def test_a_part_of_a_scene_is_extended_by_its_place_among_the_shipped_ones(write
         load_scene(write(text.format("sensors/no_such_part")))
     with pytest.raises(SceneError, match="there is no file"):
         load_scene(write(text.format("../first_light")))
+
+
+def test_a_key_that_means_another_thing_in_another_type_is_named(write):
+    """A range is where looks end to one radar and where all is seen to the other; a rate is one."""
+    extra = '[blocks.radar]\ntype = "radar.range_boundary"\n'
+    (write("").parent / "base.toml").write_text(BASE.replace("power_w", "range_km = 9\npower_w"))
+    kept = [note for note in load_scene(write(extra)).notes if "is kept" in note]
+    assert len(kept) == 1 and "blocks.radar.range_km of" in kept[0]
+    assert "'Farthest range that is looked at' of radar.swerling" in kept[0]
+    assert "'Range inside which every target is detected' of radar.range_boundary" in kept[0]
+    said = load_scene(write(extra + "range_km = 8\n")).notes
+    assert [note for note in said if "is kept" in note] == []

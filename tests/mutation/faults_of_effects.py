@@ -111,14 +111,16 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/beam_effects.py", "wiring/test_beams_on_mounted_radars.py",
-        ("beam-stands-still", "return Verdict(block.p.beam_sweep, f", "return Verdict(False, f"),
+        ("beam-stands-still", 'return Verdict.of_flag(block.p, "beam_sweep")',
+         'return Verdict(False, "beam_sweep is false")'),
     ),
     *in_file(
         _GROUP, "components/radar/false_alarm_effects.py",
         ("wiring/test_false_alarms_of_radars.py", "wiring/test_radar_detection_keys.py"),
-        ("alarms-of-a-radar-that-is-off", "if block.p.false_alarms and not block.p.enabled:",
+        ("alarms-of-a-radar-that-is-off", "if parameters.false_alarms and not parameters.enabled:",
          "if False:", "a radar that is off sends nothing, alarms neither"),
-        ("no-alarms", "return Verdict(block.p.false_alarms, f", "return Verdict(False, f"),
+        ("no-alarms", 'return Verdict.of_flag(parameters, "false_alarms")',
+         'return Verdict(False, "false_alarms is false")'),
     ),
     *in_file(
         _GROUP, "components/optical/camera.py",
@@ -158,7 +160,7 @@ FAULTS = [
         ("motion-not-called-for", 'return Verdict(weight > 0, f"dynamic_weight',
          'return Verdict(weight > 1e9, f"dynamic_weight'),
         ("motion-forgets-the-last-scan",
-         "if self._last is not None:\n            tick[0]", "if False:\n            tick[0]"),
+         "angles[:, earlier], tick[earlier] = ", "_, tick[earlier] = "),
     ),
     *in_file(
         _GROUP, "components/optical/plume.py", "wiring/test_camera_keys.py",

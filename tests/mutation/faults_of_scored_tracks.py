@@ -132,6 +132,21 @@ FAULTS = [
         ("range-of-another-track", "values[pair[blind]] for", "values[pair[0 * blind]] for"),
     ),
     *in_file(
+        _GROUP, "components/tracking/one_step.py", "tracking/test_late_looks.py",
+        ("tracks-in-another-order", "np.lexsort((whole.number, whole.replica))",
+         "np.lexsort((-whole.number, whole.replica))"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/gated_pairs.py", "wiring/test_tracker_keys.py",
+        ("rivals-of-confirmed-tracks", "held[entry[near & settled[track]]] = True",
+         "held[entry[near & ~settled[track]]] = True"),
+    ),
+    *in_file(
+        _GROUP, "components/tracking/gated_pairs.py", "wiring/test_range_rates_in_tracks.py",
+        ("rates-open-every-gate", "_picked(scans.variance, rows, cells),",
+         "_picked(scans.variance, rows, cells) + 1e6 * (len(rows) > 3),"),
+    ),
+    *in_file(
         _GROUP, "components/tracking/gated_pairs.py", "wiring/test_tracks_without_range.py",
         ("first-range-with-another-variance",
          "(scans.measured[2][cells], scans.variance[2][cells])",

@@ -57,6 +57,23 @@ def test_detections_tell_how_the_ownship_moves_where_a_range_rate_is_measured():
     assert {row[name] for row in found for name in names if row["block"] == "other"} == {None}
 
 
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_who_is_where_the_track_should_be_but_flies_the_other_way_is_not_in_its_gate(kind):
+    """One flies away at 60 m/s and is gone after a look; one comes from where it would be."""
+    away = {"name": "away", "east_m": -1500.0, "north_m": -2000.0, "up_m": 100.0,
+            "heading_deg": 216.87, "speed_mps": 60.0, "end_time_s": 0.5}  # fmt: skip
+    back = {**away, "name": "back", "east_m": -1500.0 - 1.3 * 36.0, "north_m": -2000.0 - 1.3 * 48.0,
+            "heading_deg": 36.87, "start_time_s": 0.7, "end_time_s": 5.0}  # fmt: skip
+    started = []
+    for used in (True, False):
+        found = chain(
+            {"radar": RADAR}, targets=[away, back], duration_s=2,
+            fusion={"type": "fusion.pass_through"}, tracker={"type": kind, "use_range_rate": used},
+        )  # fmt: skip
+        started.append({row["track"] for row in rows(run(found), "state_tracks")})
+    assert started == [{1, 2}, {1}]
+
+
 @pytest.mark.parametrize(
     ("keys", "tracker", "why"),
     [

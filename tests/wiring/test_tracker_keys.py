@@ -63,6 +63,21 @@ def test_a_gate_that_holds_nothing_starts_a_track_at_every_look(kind):
     assert {row["track"] for row in tracks(kind, gate_probability=1e-9)} == {1, 2, 3, 4}
 
 
+@covers("start_gate_probability", of=TRACKERS)
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_beside_a_confirmed_track_none_starts(kind):
+    """With a gate of 90 % one look of ten at the one target falls outside; a first one confirms."""
+    known = {"gate_probability": 0.9, "confirm_m": 1, "duration_s": 8}
+    noisy = {"radar": {**RADAR, "errors": "stated", "quantised": False, "azimuth_error_deg": 0.3,
+                       "elevation_error_deg": 0.3, "range_error_m": 5.0,
+                       "scan_rate_hz": 5}}  # fmt: skip
+    many = {
+        row["track"] for row in tracks(kind, sensors=noisy, start_gate_probability=0.0, **known)
+    }
+    assert len(many) > 2
+    assert {row["track"] for row in tracks(kind, sensors=noisy, **known)} == {1}
+
+
 def odds(kind, **keys):
     """The odds after the second look, both of which hit."""
     found = tracks(kind, start_existence=1e-9, duration_s=2,

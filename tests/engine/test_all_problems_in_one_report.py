@@ -1,0 +1,41 @@
+"""What keys of a table disagree about is told beside keys that are wrong by themselves."""
+
+from pathlib import Path
+
+import pytest
+
+from dsa_des.errors import SceneError
+from dsa_des.scene.scene import load_scene
+
+DISAGREE = "blocks.radar.declare_m = 5: it must be at most declare_n, 3"
+
+
+def problems(tmp_path: Path, configs: Path, radar: str) -> list[str]:
+    path = tmp_path / "scene.toml"
+    base = (configs / "first_light.toml").as_posix()
+    path.write_text(f'extends = "{base}"\n[blocks.radar]\n{radar}\n')
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    return [str(problem).partition(": ")[2] for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ("scan_rate_hz = -1", "blocks.radar.scan_rate_hz = -1: must be greater than 0"),
+        ("quantised = 7", "blocks.radar.quantised = 7: must be true or false"),
+        ("quantisd = 7", "blocks.radar.quantisd: unknown parameter of radar.swerling; did you mean "
+         "'quantised'?"),
+    ],
+)  # fmt: skip
+def test_a_wrong_key_hides_no_disagreement_of_others(tmp_path, configs, wrong, told):
+    found = problems(tmp_path, configs, f"declare_m = 5\ndeclare_n = 3\n{wrong}")
+    assert sorted(found) == sorted([DISAGREE, told])
+
+
+def test_what_rests_on_a_wrong_key_is_not_said(tmp_path, configs):
+    """Not of a wrong key, nor of one whose name may have been misspelt."""
+    (wrong,) = problems(tmp_path, configs, "declare_m = 5\ndeclare_n = 'x'")
+    assert wrong.startswith("blocks.radar.declare_n = 'x': must be")
+    (unknown,) = problems(tmp_path, configs, "declare_m = 5\ndeclare_nn = 5")
+    assert unknown.startswith("blocks.radar.declare_nn: unknown parameter")
