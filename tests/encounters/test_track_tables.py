@@ -8,6 +8,7 @@ import pymap3d
 import pytest
 from scipy.io import savemat
 
+from components.encounters.encounter_flights import encounter_flights
 from components.encounters.set_file import read_set
 from tests.encounters.test_set_file import call
 
@@ -45,7 +46,7 @@ def test_two_files_of_one_aircraft_are_an_encounter(tmp_path: Path) -> None:
             assert (time_s[k], up[k]) == pytest.approx((t, alt * FT))
             assert (north[k], east[k]) == pytest.approx((n, e), abs=1e-6)
     # FlownTracks again, they are where the file says.
-    own, other = found.flights(0)
+    own, other = encounter_flights(found, 0, "euler")
     lat = other.at(np.array([2.0])).lat_deg[0]
     assert lat == pytest.approx(-41.30, abs=2e-7)
     assert own.at(np.array([0.0])).alt_m[0] == pytest.approx(914.4)
