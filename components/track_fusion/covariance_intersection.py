@@ -13,7 +13,7 @@ from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_states import fused_states
-from components.track_fusion.heads import Heads, later_heads
+from components.track_fusion.heads import FusionHeads, later_heads
 from components.track_fusion.ladder import RULE
 from components.track_fusion.local_tracks import LocalTracks, local_tracks
 from components.track_fusion.matching import MatchRules, matched, without_strays
@@ -122,7 +122,7 @@ class CovarianceIntersection(Component):
             self.p.stay_factor,
         )
         none = np.empty(0, dtype=np.int64)
-        self._heads = Heads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
+        self._heads = FusionHeads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
         #: By tracker: of each replica, the newest instant that it told of.
         self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
@@ -163,7 +163,7 @@ class CovarianceIntersection(Component):
         self._remember(heads, local, told, wake)
         return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
 
-    def _remember(self, heads: Heads, local: LocalTracks, told: Told, wake: Wake) -> None:
+    def _remember(self, heads: FusionHeads, local: LocalTracks, told: Told, wake: Wake) -> None:
         """Keep what is held of the replicas that may come again."""
         if wake.side_by_side:
             others = ~np.isin(self._local.replica, heads.replica)
@@ -195,10 +195,10 @@ class CovarianceIntersection(Component):
 
     def _heads_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
-    ) -> Heads:
+    ) -> FusionHeads:
         """Return what is kept of replicas; the frame of a new one is that of its first track."""
         count = len(replicas)
-        heads = Heads(
+        heads = FusionHeads(
             replicas, np.full((3, count), np.nan), np.ones(count, dtype=np.int64),
             np.full(count, -np.inf), np.full((3, count), np.nan),
         )  # fmt: skip
@@ -220,7 +220,7 @@ class CovarianceIntersection(Component):
         return heads
 
     def _reports(
-        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: Heads
+        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: FusionHeads
     ) -> _Reports:
         parts, rows = [], []
         told_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
@@ -244,11 +244,11 @@ class CovarianceIntersection(Component):
     def _taken_in(
         self,
         local: LocalTracks,
-        heads: Heads,
+        heads: FusionHeads,
         reports: _Reports,
         at: IntArray,
         replica: IntArray,
-    ) -> tuple[LocalTracks, Heads]:
+    ) -> tuple[LocalTracks, FusionHeads]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
         new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
@@ -269,7 +269,7 @@ class CovarianceIntersection(Component):
         return LocalTracks.joined([idle, busy]), heads
 
     def _tell(
-        self, local: LocalTracks, heads: Heads, told: Told, at: IntArray, replica: IntArray
+        self, local: LocalTracks, heads: FusionHeads, told: Told, at: IntArray, replica: IntArray
     ) -> Told:
         """Return what is told of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))

@@ -10,7 +10,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Heads:
+class FusionHeads:
     """What is kept of each replica beside its tracks, replicas ascending.
 
     Parameters
@@ -31,23 +31,23 @@ class Heads:
     time_s: FloatArray
     own_m: FloatArray
 
-    def take(self, which: Any) -> "Heads":
+    def take(self, which: Any) -> "FusionHeads":
         """Return those of some replicas."""
-        return Heads(
+        return FusionHeads(
             self.replica[which], self.origin[:, which], self.next_number[which],
             self.time_s[which], self.own_m[:, which],
         )  # fmt: skip
 
-    def kept_with(self, newer: "Heads") -> "Heads":
+    def kept_with(self, newer: "FusionHeads") -> "FusionHeads":
         """Return those of all replicas, as they are in `newer` where they are among them."""
         old = self.take(~np.isin(self.replica, newer.replica))
         names = [field.name for field in fields(self)]
         both = (np.concatenate([getattr(h, n) for h in (old, newer)], axis=-1) for n in names)
-        whole = Heads(*both)
+        whole = FusionHeads(*both)
         return whole.take(np.argsort(whole.replica, kind="stable"))
 
 
-def later_heads(heads: Heads, new: LocalTracks) -> Heads:
+def later_heads(heads: FusionHeads, new: LocalTracks) -> FusionHeads:
     """Return heads that know the newest instant, and where the ownship is then."""
     time_s, own_m = heads.time_s.copy(), heads.own_m.copy()
     order = np.lexsort((-new.tracker, new.time_s))
