@@ -1,5 +1,7 @@
 """In a feedback loop, looking ahead and going back records what scan by scan records."""
 
+from pathlib import Path
+
 import pytest
 
 from dsa_des.errors import BlockFailure
@@ -103,9 +105,25 @@ def test_loops_are_cut_where_an_input_can_be_done_without():
 CUED = "configs/tracking/cueing.toml"
 
 
-def cued():
+BEHIND = """
+extends = "{cued}"
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "radar -> fusion",
+  "eo -> fusion", "fusion -> tracker -> cues", "fusion -> behind",
+  {{ from = "cues", to = "radar", delay_s = 0.5, holds = {{}} }},
+]
+[blocks.behind]
+type = "tracking.ekf"
+"""
+
+
+@pytest.fixture
+def cued(tmp_path):
+    """A cue loop, with another tracker behind it."""
+    path = tmp_path / "scene.toml"
+    path.write_text(BEHIND.format(cued=Path(CUED).resolve()), encoding="utf-8")
     sets = ["blocks.eo.scan_rate_hz=4", "blocks.traffic.intruders[0].north_m=9000"]
-    return load_scene(CUED, sets=sets, duration_s="14")
+    return load_scene(path, sets=sets, duration_s="14")
 
 
 def failing_from(monkeypatch, block, time_s):
@@ -120,9 +138,9 @@ def failing_from(monkeypatch, block, time_s):
     monkeypatch.setattr(block, "run", run)
 
 
-def test_blocks_that_no_loop_leads_to_run_ahead():
+def test_blocks_that_no_loop_leads_to_run_ahead(cued):
     """Few long windows for them, and those of the delay for the loop; the rows are the same."""
-    _, scan_by_scan = run(cued(), window=1)
+    _, scan_by_scan = run(cued, window=1)
     calls = dict.fromkeys(("traffic", "gate", "eo", "radar", "tracker", "cues"), 0)
 
     class Counted(Simulation):
@@ -133,7 +151,7 @@ def test_blocks_that_no_loop_leads_to_run_ahead():
                 calls[name] += node._end_in(window) > window.start
             return found
 
-    simulation = Counted(cued(), recorder=Recorder([sink := MemorySink()]))
+    simulation = Counted(cued, recorder=Recorder([sink := MemorySink()]))
     simulation.run()
     assert all(sink.tables()[name].equals(rows) for name, rows in scan_by_scan.items())
     assert scan_by_scan["state_tracks"].num_rows > 20
@@ -145,7 +163,7 @@ def test_blocks_that_no_loop_leads_to_run_ahead():
     ("gate_s", "cues_s", "said"),
     [(9.0, 6.0, "cues .* t = 6.0"), (9.0, 99.0, "gate .* t = 9.0"), (6.0, 9.0, "gate .* t = 6.0")],
 )
-def test_who_runs_ahead_fails_when_its_time_has_come(monkeypatch, gate_s, cues_s, said):
+def test_who_runs_ahead_fails_when_its_time_has_come(cued, monkeypatch, gate_s, cues_s, said):
     """What fails first in simulated time counts, however far others had run ahead."""
     from components.gate import Gate
     from components.tracking.cues import Cues
@@ -153,4 +171,4 @@ def test_who_runs_ahead_fails_when_its_time_has_come(monkeypatch, gate_s, cues_s
     failing_from(monkeypatch, Gate, gate_s)
     failing_from(monkeypatch, Cues, cues_s)
     with pytest.raises(BlockFailure, match=said):
-        run(cued())
+        run(cued)
