@@ -656,6 +656,15 @@ FAULTS = [
         ("loops-start-anywhere", "self._rewinder.sure_ticks or small", "small"),
     ),
     *in_file(
+        "clocks", "dsa_des/running/rewind.py", "lockstep/test_rewinding_windows.py",
+        ("nobody-runs-ahead", "else self.end_after(self.longest_ticks)", "else end"),
+    ),
+    *in_file(
+        "clocks", "dsa_des/running/loops.py", "lockstep/test_rewinding_windows.py",
+        ("what-a-loop-leads-to-runs-ahead", "set(graph) - behind if looped",
+         "set(graph) - set(looped) if looped"),
+    ),
+    *in_file(
         _GROUP, "components/traffic/row_flights.py",
         ("wiring/test_steered_flights_of_each_row.py",),
         ("truth-of-all-that-is-known",
