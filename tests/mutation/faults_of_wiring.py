@@ -634,9 +634,12 @@ FAULTS = [
         ("born-at-every-report", 'born_s[known] = before["born_s"][old[known]]', "pass"),
     ),
     *in_file(
-        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
+        _GROUP, "components/track_fusion/heads.py", _FUSED,
         ("own-place-of-who-comes-late", "late = new.time_s[order] >= time_s[of]",
          "late = new.time_s[order] < np.inf"),
+    ),
+    *in_file(
+        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
         ("bearing-rate-in-degrees", "math.radians(self.p.bearing_rate_deg_s)",
          "self.p.bearing_rate_deg_s"),
         ("frame-of-any-track", "sooner = row[entries] < first[of]", "sooner = row[entries] >= 0"),
