@@ -208,7 +208,7 @@ def _made(key: tuple[Path, Path, int], number: int) -> EncounterSet:
 
 
 def _make(key: tuple[Path, Path, int], numbers: range) -> None:
-    pairs, rules = _sampler(*key).pairs(numbers), PairingRules()
+    pairs, rules = _sampler(*key).pairs(numbers, paths=False), PairingRules()
     for place, number in enumerate(numbers):
         one = pairs if len(numbers) == 1 else pairs.some(np.array([place]))
         made = set_of_pairs(one, rules.closest_s, (0.0, 0.0), str(key[0]))

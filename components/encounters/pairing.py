@@ -19,7 +19,7 @@ time 0 for one and those at the closest approach for the other).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,9 @@ PAIRS_AT_ONCE = 6144
 _FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 6144, 6, 256
 _COURSES, _COURSES_FROM = 40, 4
 _MOST_ATTEMPTS = 1_000_000
+
+
+_PATHS = ("north_ft", "east_ft", "up_ft", "heading_rad", "speed_ft_s")
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,11 @@ class Pairs:
         """Return some of them, in this order."""
         return Pairs(**{name: values.take(rows, axis=-1) for name, values in vars(self).items()})
 
+    def at_start(self) -> "Pairs":
+        """Return them with their paths at time 0 only; commands stay as they are."""
+        paths = {name: getattr(self, name)[:, :1] for name in _PATHS}
+        return replace(self, **paths)
+
 
 class PairSampler:
     """Makes encounters of two models by their numbers.
@@ -109,12 +117,18 @@ class PairSampler:
         self._draws = EncounterDraws(seed, "pairs")
 
     def batches(self, numbers: range) -> Iterator[Pairs]:
-        """Give pairs in order of their numbers, in batches of a size that suits the memory."""
+        """Give pairs in order of their numbers, `at_start`, in batches that suit the memory."""
         for start in range(0, len(numbers), PAIRS_AT_ONCE):
-            yield self.pairs(numbers[start : start + PAIRS_AT_ONCE])
+            yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 
-    def pairs(self, numbers: range) -> Pairs:
+    def pairs(self, numbers: range, *, paths: bool = True) -> Pairs:
         """Return the pairs with these numbers.
+
+        Parameters
+        ----------
+        numbers : range
+        paths : bool
+            Whether with their whole paths, or as `Pairs.at_start`.
 
         Raises
         ------
@@ -139,7 +153,7 @@ class PairSampler:
             if pairs is not None:
                 # Of several that are accepted the first attempt counts.
                 fresh, first = np.unique(rows[done], return_index=True)
-                parts.append(pairs.some(kept[first]))
+                parts.append((pairs if paths else pairs.at_start()).some(kept[first]))
                 left = np.setdiff1d(left, fresh, assume_unique=True)
             if len(left) and attempt[left].max() > _MOST_ATTEMPTS:
                 raise TrackError(

@@ -72,10 +72,10 @@ class KnownFlights:
         known = self.of_row[row]
         numbers = np.unique(known).tolist()
         if len(numbers) == 1:
-            return _flat(self.flights[numbers[0]](column, time_s[np.newaxis], ahead_s[np.newaxis]))
+            return flat(self.flights[numbers[0]](column, time_s[np.newaxis], ahead_s[np.newaxis]))
         places = [np.flatnonzero(known == number) for number in numbers]
         parts = [
-            _flat(self.flights[number](column[of], time_s[np.newaxis, of], ahead_s[np.newaxis, of]))
+            flat(self.flights[number](column[of], time_s[np.newaxis, of], ahead_s[np.newaxis, of]))
             for number, of in zip(numbers, places, strict=True)
         ]
         joined: Mapping[str, AnyArray] = _joined(
@@ -120,7 +120,7 @@ class _Seen:
         return self.seen(*self.flight(columns, time_s, *ahead_s))
 
 
-def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
+def flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
     """Return the single row of what is seen of targets; what is in tables, with their names."""
     found = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
     for table, columns in seen.items():

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.optical.line_of_sight_rate import line_of_sight_rate
 from components.sensor.look import Cells
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
 
@@ -16,6 +16,7 @@ class DynamicSignature(Effect):
 
     name = "dynamic signature"
     acts_on = "signature"
+    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for the weight b."""
@@ -42,8 +43,10 @@ class MovingTargets:
         self.weight_s = weight_s
         self.model = model
         self._ticks_per_s = ticks_per_s
-        # Tick and NED angles of the last scan, one column per target; NaN where it saw none.
-        self._last: tuple[int, FloatArray, FloatArray] | None = None
+        # Of each replica, tick and NED angles of its last scan, one column per target; NaN where
+        # it saw none.
+        self._tick: IntArray = np.empty(0, dtype=np.int64)
+        self._angles: FloatArray = np.empty((2, 0, 0))
 
     def __call__(self, cells: Cells) -> FloatArray:
         """Return b·V of every cell."""
@@ -54,25 +57,39 @@ class MovingTargets:
 
         A target's first look has none, nor has the first after a scan that did not see it.
         """
-        scans, targets = len(cells.scan_ticks), len(cells.roster)
-        azimuth = np.full((scans + 1, targets), np.nan)
-        elevation = np.full((scans + 1, targets), np.nan)
-        tick = np.concatenate(([0], cells.scan_ticks))
-        if self._last is not None:
-            tick[0], azimuth[0], elevation[0] = self._last
-        azimuth[cells.row + 1, cells.target] = cells.azimuth_rad
-        elevation[cells.row + 1, cells.target] = cells.elevation_rad
-        self._last = (int(tick[-1]), azimuth[-1].copy(), elevation[-1].copy())
-        before = azimuth[cells.row, cells.target]
-        interval = (tick[1:] - tick[:-1])[cells.row] / self._ticks_per_s
+        replica, targets = cells.replica_of_scan, len(cells.roster)
+        self._remember(int(replica.max(initial=0)) + 1, targets)
+        begins = np.append(True, replica[1:] != replica[:-1])
+        # Before the scans of each replica stands its last one.
+        place = np.arange(len(replica)) + np.cumsum(begins)
+        of, earlier = replica[begins], place[begins] - 1
+        angles = np.full((2, len(replica) + len(of), targets), np.nan)
+        tick = np.zeros(len(replica) + len(of), dtype=np.int64)
+        angles[:, earlier], tick[earlier] = self._angles[:, of], self._tick[of]
+        here = place[cells.row]
+        angles[:, here, cells.target] = cells.azimuth_rad, cells.elevation_rad
+        tick[place] = cells.scan_ticks
+        last = np.append(earlier[1:], len(tick)) - 1
+        self._tick[of], self._angles[:, of] = tick[last], angles[:, last]
+        azimuth, elevation = angles[:, here - 1, cells.target]
+        interval = (tick[here] - tick[here - 1]) / self._ticks_per_s
         return np.asarray(
             line_of_sight_rate(
                 cells.azimuth_rad,
                 cells.elevation_rad,
-                before,
-                elevation[cells.row, cells.target],
-                np.where(np.isnan(before), 1.0, interval),
-                seen_before=~np.isnan(before),
+                azimuth,
+                elevation,
+                np.where(np.isnan(azimuth), 1.0, interval),
+                seen_before=~np.isnan(azimuth),
                 model=self.model,
             )
         )
+
+    def _remember(self, replicas: int, targets: int) -> None:
+        """Remember so many replicas at least."""
+        known = len(self._tick)
+        if known < replicas:
+            angles = np.full((2, replicas, targets), np.nan)
+            angles[:, :known] = self._angles.reshape(2, known, targets)
+            self._angles = angles
+            self._tick = np.append(self._tick, np.zeros(replicas - known, dtype=np.int64))

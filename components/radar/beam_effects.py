@@ -26,6 +26,7 @@ class BeamSweep(Effect):
 
     name = "beam sweep"
     acts_on = "report"
+    lockstep = True
     neutral = False
     outside_the_proof = "it fills a column that is null without it"
 
@@ -123,7 +124,7 @@ class Sweep:
         assert isinstance(targets, LitTargets)
         column = np.searchsorted(targets.columns, detections.target[~false])
         offset_s[~false] = targets.offset_s[np.repeat(rows, counts)[~false], column]
-        scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
+        scan_s = np.repeat(self._run_time_s(detections.tick), counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
         own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
         after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
@@ -132,8 +133,13 @@ class Sweep:
     def _start_s(self, targets: RelativeTargets) -> FloatArray:
         """Return when the picture of each row was; one that came late goes on from there."""
         start = targets.tick if targets.state_tick is None else targets.state_tick
-        started: FloatArray = start / self._ticks_per_s
-        return started
+        return self._run_time_s(start)
+
+    def _run_time_s(self, ticks: IntArray) -> FloatArray:
+        """Return the time since the start of the run, of its own replica where many run."""
+        span = self._block.span_ticks
+        time_s: FloatArray = (ticks % span if span else ticks) / self._ticks_per_s
+        return time_s
 
     def _own_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray

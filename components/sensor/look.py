@@ -114,6 +114,13 @@ class Cells:
         return split_scans(self.scan)[0]
 
     @cached_property
+    def replica_of_scan(self) -> IntArray:
+        """Replica of each scan, where many run in lock step; else 0."""
+        if not self._span_ticks:
+            return np.zeros_like(self.scan_ticks)
+        return self.scan_ticks // self._span_ticks
+
+    @cached_property
     def instant_ns(self) -> IntArray:
         """When each cell is looked at, in whole nanoseconds since the start of its run.
 

@@ -186,7 +186,8 @@ class Sensor(Measuring):
             look = self.look(cells)
             for judge in self._judgements:
                 look = judge(cells, look)
-            self._idle = None if len(cells) else look
+            # Where many run, the next scans without cells may be those of other replicas.
+            self._idle = None if len(cells) or wake.span_ticks else look
         found = look.detected.nonzero()[0]
         decided = look
         for measures in self._strengths:

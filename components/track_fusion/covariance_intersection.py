@@ -13,6 +13,7 @@ from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_states import fused_states
+from components.track_fusion.heads import FusionHeads, later_heads
 from components.track_fusion.ladder import RULE
 from components.track_fusion.local_tracks import LocalTracks, local_tracks
 from components.track_fusion.matching import MatchRules, matched, without_strays
@@ -24,7 +25,7 @@ from components.track_fusion.told_tracks import (
     taken,
     told_after,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
@@ -71,35 +72,6 @@ class IntersectionParameters(Parameters):
 
 
 @dataclass(frozen=True, eq=False)
-class _Heads:
-    """What is kept of each replica beside its tracks, replicas ascending.
-
-    Parameters
-    ----------
-    replica : (n,)
-    origin : (3, n)
-        Of its frame (latitude, longitude in deg, height in m); NaN before the first track.
-    next_number : (n,)
-    time_s : (n,)
-        The newest instant that any track spoke of.
-    own_m : (3, n)
-        Where in the frame the ownship was then.
-    """
-
-    replica: IntArray
-    origin: FloatArray
-    next_number: IntArray
-    time_s: FloatArray
-    own_m: FloatArray
-
-    def take(self, which: Any) -> "_Heads":
-        return _Heads(
-            self.replica[which], self.origin[:, which], self.next_number[which],
-            self.time_s[which], self.own_m[:, which],
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
 class _Reports:
     """What came from the trackers in a wake, in the frames of the replicas.
 
@@ -133,6 +105,7 @@ class CovarianceIntersection(Component):
     Parameters = IntersectionParameters
     windowed = True
     lockstep = True
+    side_by_side = True
     rewindable = True
     ladders = (RULE,)
 
@@ -149,8 +122,9 @@ class CovarianceIntersection(Component):
             self.p.stay_factor,
         )
         none = np.empty(0, dtype=np.int64)
-        self._heads = _Heads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
-        self._newest: dict[str, int] = {}
+        self._heads = FusionHeads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
+        #: By tracker: of each replica, the newest instant that it told of.
+        self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
         self._told = nothing_told()
 
@@ -167,7 +141,7 @@ class CovarianceIntersection(Component):
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what the trackers told, instant by instant, and tell the fused tracks."""
-        came = {new.source: self._fresh(new) for new in wake.arrivals("tracks")}
+        came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
         row_of = {name: np.searchsorted(wake.ticks, new.tick) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
@@ -186,28 +160,45 @@ class CovarianceIntersection(Component):
             parts.append(new)
             kept = taken(new, new["track_status"] != DELETED)
             told = joined([taken(told, ~np.isin(told["replica"], replica[at])), kept])
+        self._remember(heads, local, told, wake)
+        return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
+
+    def _remember(self, heads: FusionHeads, local: LocalTracks, told: Told, wake: Wake) -> None:
+        """Keep what is held of the replicas that may come again."""
+        if wake.side_by_side:
+            others = ~np.isin(self._local.replica, heads.replica)
+            self._local = LocalTracks.joined([self._local.take(others), local])
+            others = ~np.isin(self._told["replica"], heads.replica)
+            self._told = joined([taken(self._told, others), told])
+            self._heads = self._heads.kept_with(heads)
+            return
         last = heads.replica[-1]
         self._heads = heads.take(heads.replica == last)
         self._local = local.take(local.replica == last)
         self._told = taken(told, told["replica"] == last)
-        return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
 
-    def _fresh(self, new: Arrivals) -> Arrivals:
+    def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
-        made = new.message.tick
-        before = self._newest.get(new.source, np.iinfo(np.int64).min)
-        kept = made >= np.maximum(np.maximum.accumulate(made), before)
+        made, replica = new.message.tick, wake.replica_of(new.tick)
+        newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
+        more = max(int(replica[-1]) + 1 - len(newest), 0)
+        newest = np.append(newest, np.full(more, np.iinfo(np.int64).min))
+        # Along the common line, nothing of one replica is newer than what is of the next.
+        so_far = np.maximum(np.maximum.accumulate(made), newest[replica])
+        kept = made >= so_far
         kept[:-1] &= ~((new.tick[1:] == new.tick[:-1]) & kept[1:])
-        self._newest = {**self._newest, new.source: max(before, int(made.max()))}
+        ends = np.append(replica[1:] != replica[:-1], True)
+        newest[replica[ends]] = so_far[ends]
+        self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
         return Arrivals(new.source, new.tick[which], new.message.take(which))
 
     def _heads_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
-    ) -> _Heads:
+    ) -> FusionHeads:
         """Return what is kept of replicas; the frame of a new one is that of its first track."""
         count = len(replicas)
-        heads = _Heads(
+        heads = FusionHeads(
             replicas, np.full((3, count), np.nan), np.ones(count, dtype=np.int64),
             np.full(count, -np.inf), np.full((3, count), np.nan),
         )  # fmt: skip
@@ -216,21 +207,20 @@ class CovarianceIntersection(Component):
             message = came[name].message
             row = np.repeat(row_of[name], np.diff(message.offsets))
             of, entries = np.unique(np.searchsorted(replicas, wake.replica[row]), return_index=True)
-            for place, entry in zip(of.tolist(), entries.tolist(), strict=True):
-                if row[entry] < first[place]:
-                    first[place] = row[entry]
-                    heads.origin[:, place] = [getattr(message, c)[entry] for c in _ORIGIN]
-        for old in np.flatnonzero(np.isin(self._heads.replica, replicas)).tolist():
-            here = int(np.searchsorted(replicas, self._heads.replica[old]))
-            heads.next_number[here] = self._heads.next_number[old]
-            heads.time_s[here] = self._heads.time_s[old]
-            heads.own_m[:, here] = self._heads.own_m[:, old]
-            if not np.isnan(self._heads.origin[0, old]):
-                heads.origin[:, here] = self._heads.origin[:, old]
+            sooner = row[entries] < first[of]
+            of, entries = of[sooner], entries[sooner]
+            first[of] = row[entries]
+            heads.origin[:, of] = [getattr(message, column)[entries] for column in _ORIGIN]
+        old = self._heads.take(np.isin(self._heads.replica, replicas))
+        here = np.searchsorted(replicas, old.replica)
+        heads.next_number[here], heads.time_s[here] = old.next_number, old.time_s
+        heads.own_m[:, here] = old.own_m
+        begun = ~np.isnan(old.origin[0])
+        heads.origin[:, here[begun]] = old.origin[:, begun]
         return heads
 
     def _reports(
-        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: _Heads
+        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: FusionHeads
     ) -> _Reports:
         parts, rows = [], []
         told_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
@@ -254,18 +244,18 @@ class CovarianceIntersection(Component):
     def _taken_in(
         self,
         local: LocalTracks,
-        heads: _Heads,
+        heads: FusionHeads,
         reports: _Reports,
         at: IntArray,
         replica: IntArray,
-    ) -> tuple[LocalTracks, _Heads]:
+    ) -> tuple[LocalTracks, FusionHeads]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
         new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reports.told_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.joined([local.take(~gone), new])
-        heads = _later(heads, new)
+        heads = later_heads(heads, new)
         when = heads.time_s[np.searchsorted(heads.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
@@ -279,7 +269,7 @@ class CovarianceIntersection(Component):
         return LocalTracks.joined([idle, busy]), heads
 
     def _tell(
-        self, local: LocalTracks, heads: _Heads, told: Told, at: IntArray, replica: IntArray
+        self, local: LocalTracks, heads: FusionHeads, told: Told, at: IntArray, replica: IntArray
     ) -> Told:
         """Return what is told of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))
@@ -288,14 +278,3 @@ class CovarianceIntersection(Component):
         found = fused_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(heads.replica, found.replica)
         return told_after(before, found, mine, heads.origin[:, of], heads.own_m[:, of], replica, at)
-
-
-def _later(heads: _Heads, new: LocalTracks) -> _Heads:
-    """Return heads that know the newest instant, and where the ownship is then."""
-    time_s, own_m = heads.time_s.copy(), heads.own_m.copy()
-    order = np.lexsort((-new.tracker, new.time_s))
-    of = np.searchsorted(heads.replica, new.replica[order])
-    late = new.time_s[order] >= time_s[of]
-    time_s[of[late]] = new.time_s[order][late]
-    own_m[:, of[late]] = new.own_m[:, order][:, late]
-    return replace(heads, time_s=time_s, own_m=own_m)

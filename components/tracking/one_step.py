@@ -72,7 +72,9 @@ def late_step(
         **named([x for x, _ in moved], [p for _, p in moved]),
     )
     position_variance(changed)
-    return TrackStore.joined([store.take(~known), changed])
+    whole = TrackStore.joined([store.take(~known), changed])
+    # Tracks stand by number, as the search above wants them.
+    return whole.take(np.lexsort((whole.number, whole.replica)))
 
 
 def _then(

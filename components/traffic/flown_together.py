@@ -7,19 +7,18 @@ through: those of the first replica, then those of the second, and so on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.geometry.ellipsoid import line_of_sight
-from components.geometry.state import TrajectoryState
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
 from components.traffic.near_intervals import NearIntervals, near_intervals
 from components.traffic.own_flights import OwnFlights
+from components.traffic.row_flights import AskedFlights, RowFlights
 from components.traffic.steered_culling import closing_speeds_mps, epochs_of
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
@@ -65,27 +64,31 @@ class FlownTogether:
     face : TrafficSource
         The source as the first replica has it, set up.
     flown : AllFlown
-    replicas : int
+    rates_hz : (replicas,) or None
+        As often positions are published, if not always.
     """
 
-    def __init__(self, face: Any, flown: AllFlown, replicas: int) -> None:
+    def __init__(self, face: Any, flown: AllFlown, rates_hz: FloatArray | None) -> None:
         self._flown, self._roster = flown, flown.roster
         self._width = len(face.roster)
         self._columns = np.arange(self._width)
-        self._own = OwnFlights(flown.own, replicas)
+        self._own = OwnFlights(flown.own, len(flown.own_speed_mps))
         self._ticks_per_s = face.context.ticks_per_s
-        self._says_truth = face.says_truth
+        self._says_truth, self._asked_for = face.says_truth, face.flights_asked_for
+        self._rates_hz = rates_hz
         self._intervals: NearIntervals | None = None
         self._epochs: _Epochs | None = None
         #: Manoeuvres that have come and are not flown by any row yet, with their ticks.
         self._told: list[tuple[int, Manoeuvre]] = []
         look = farthest_look(consumer.request for consumer in face.context.consumers)
         culls = not face.context.simulate_everything and face.clock_of(face.p) is None
+        self._lasts_s = look.lasts_s
         if culls and math.isfinite(look.range_m):
-            if face.context.producers:
+            if not face.context.producers:
+                end_s = float(face.context.duration_s) + look.lasts_s
+                self._intervals = self._near_intervals(look.range_m, end_s)
+            elif not self._asked_for:
                 self._epochs = _Epochs(self, flown, self._width, look.range_m)
-            else:
-                self._intervals = self._near_intervals(look.range_m, float(face.context.duration_s))
 
     def _near_intervals(self, reach_m: float, end_s: float) -> NearIntervals:
         flown, width = self._flown, max(1, self._width)
@@ -112,7 +115,7 @@ class FlownTogether:
     def run(self, wake: Wake) -> TrafficStates:
         """Return the state of all aircraft of each row's replica."""
         replica, time_s = wake.replica, wake.time_s
-        truth = self._steer(wake, replica, time_s)
+        known = self._steer(wake, replica)
         shape = len(wake), self._width
         target = replica[:, np.newaxis] * self._width + self._columns
         own = self._own.each(replica, time_s)
@@ -121,7 +124,7 @@ class FlownTogether:
         present = states.present & own.present[:, np.newaxis]
         near: BoolArray | None = None
         if self._intervals is not None:
-            near = self._intervals.holds(each, times).reshape(shape)
+            near = self._intervals.holds(each, times, times + self._lasts_s).reshape(shape)
         elif self._epochs is not None:
             near = self._epochs.near(replica, time_s)
         culled = None
@@ -136,16 +139,38 @@ class FlownTogether:
             roster=self._roster,
             columns=self._columns,
             culled=culled,
-            true_flights=cast(Any, truth),
-            run_time_s=None if truth is None else time_s,
+            flights=cast(Any, self._asked(replica, known)),
+            true_flights=cast(Any, self._truth(replica, known)),
+            run_time_s=time_s if self._says_truth else None,
         )
 
-    def _steer(self, wake: Wake, replica: IntArray, time_s: FloatArray) -> RowFlights | None:
-        """Let ownships fly what has come for them, and return the true flights of each row."""
+    def _truth(self, replica: IntArray, known: IntArray) -> RowFlights | None:
+        """Return the flights of each row for the table of the truth, if it is recorded."""
+        if not self._says_truth:
+            return None
+        return RowFlights(self._own, self._flown.targets, self._width, replica, known)
+
+    def _asked(self, replica: IntArray, known: IntArray) -> AskedFlights | None:
+        """Return the flights as each row knows them, where a block asks for other instants."""
+        if not self._asked_for:
+            return None
+        return AskedFlights(
+            self._own, self._flown.targets, self._width, replica, known,
+            intervals=self._intervals, rates_hz=self._rates_hz,
+        )  # fmt: skip
+
+    def _steer(self, wake: Wake, replica: IntArray) -> IntArray:
+        """Let ownships fly what has come for them.
+
+        Returns
+        -------
+        (rows,) of int
+            How many manoeuvres of its ownship each row knows.
+        """
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
             self._told += zip(new.tick.tolist(), manoeuvres, strict=True)
-        known = self._own.count[replica] if self._says_truth else None
+        known: IntArray = self._own.count[replica]
         if self._told:
             now, self._told = self._due(wake)
             while now:  # the first of every ownship, then the second ones
@@ -160,12 +185,9 @@ class FlownTogether:
                 self._own.steer(ownship, at_s, [told for _, told in first.values()])
                 if self._epochs is not None:
                     self._epochs.forget(ownship)
-                if known is not None:
-                    known = known + _later(replica, wake.ticks, ownship, ticks)
+                known = known + _later(replica, wake.ticks, ownship, ticks)
                 now = later
-        if known is None:
-            return None
-        return RowFlights(self._own, self._flown.targets, self._width, replica, known)
+        return known
 
     def _due(self, wake: Wake) -> tuple[list[tuple[int, Manoeuvre]], list[tuple[int, Manoeuvre]]]:
         """Part what has come into what rows of this wake fly, and what is for later ones."""
@@ -185,54 +207,6 @@ def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray
     place = np.minimum(np.searchsorted(ownship[order], replica), len(ownship) - 1)
     mine = order[place]
     return ((ownship[mine] == replica) & (ticks >= came[mine])).astype(np.int64)
-
-
-class RowFlights:
-    """The flights of all aircraft as each row of a message knows them, for the truth.
-
-    As `components.messages.known_flights.KnownFlights` of `TrueFlights`.
-
-    Parameters
-    ----------
-    own : OwnFlights
-    targets : Fleet
-    width : int
-        Targets of each replica.
-    replica, known : (rows,) of int
-        Each row's replica, and how many manoeuvres of its ownship it knows.
-    """
-
-    def __init__(
-        self, own: OwnFlights, targets: Any, width: int, replica: IntArray, known: IntArray
-    ) -> None:
-        self._own, self._targets, self._width = own, targets, width
-        self._replica, self._known = replica, known
-
-    def __len__(self) -> int:
-        return len(self._replica)
-
-    def __call__(
-        self, columns: IntArray, time_s: FloatArray
-    ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return the ownships' states (rows, 1) and the targets' (rows, n) at times (rows, 1)."""
-        shape = len(time_s), len(columns)
-        target = self._replica[:, np.newaxis] * self._width + columns
-        times = np.repeat(time_s, len(columns), axis=1).reshape(-1)
-        others = self._targets.each(target.reshape(-1), times).reshaped(shape)
-        own = self._own.each(self._replica, time_s.reshape(-1), self._known)
-        return own.reshaped(time_s.shape), others
-
-    def take_rows(self, rows: slice | IntArray) -> RowFlights:
-        """Return the flights of some rows."""
-        known = self._known[rows]
-        return RowFlights(self._own, self._targets, self._width, self._replica[rows], known)
-
-    @classmethod
-    def join_rows(cls, parts: Sequence[RowFlights]) -> RowFlights:
-        """Return the flights of the rows of all parts, in the order given."""
-        first = parts[0]
-        columns = [np.concatenate([getattr(p, n) for p in parts]) for n in ("_replica", "_known")]
-        return cls(first._own, first._targets, first._width, *columns)
 
 
 class _Epochs:

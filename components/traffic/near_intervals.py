@@ -73,15 +73,22 @@ class NearIntervals:
         near: BoolArray = np.cumsum(change[:-1], axis=0, dtype=np.int8) > 0
         return near
 
-    def holds(self, target: IntArray, time_s: FloatArray) -> BoolArray:
-        """Return whether each of some targets (n,) may be near at a time (n,) of its own."""
+    def holds(self, target: IntArray, time_s: FloatArray, until_s: FloatArray) -> BoolArray:
+        """Return whether each of some targets (n,) may be near at some time of its own (n,) look.
+
+        Parameters
+        ----------
+        target : (n,) of int
+        time_s, until_s : (n,)
+            When each look starts and ends.
+        """
         first = np.searchsorted(self.target, target)
         count = np.searchsorted(self.target, target, side="right") - first
         inside: BoolArray = np.zeros(len(target), dtype=bool)
         for k in range(int(count.max(initial=0))):
             rest = np.flatnonzero(count > k)
-            one, time = first[rest] + k, time_s[rest]
-            inside[rest] |= (self.start_s[one] <= time) & (time <= self.end_s[one])
+            one = first[rest] + k
+            inside[rest] |= (self.start_s[one] <= until_s[rest]) & (time_s[rest] <= self.end_s[one])
         return inside
 
     def most_at_once(self) -> int:

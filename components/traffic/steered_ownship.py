@@ -97,7 +97,7 @@ class SteeredOwnship(Component):
         columns_each, times = np.broadcast_to(columns, time_s.shape).reshape(-1), time_s.reshape(-1)
         others = self.fleet.each(columns_each, times)
         if self._culling is not None:
-            near = self._culling.intervals.holds(columns_each, times)
+            near = self._culling.intervals.holds(columns_each, times, times)
             others = replace(others, present=others.present & near)
         seen, others = own.at(time_s), others.reshaped(time_s.shape)
         for crabbing in self._crabbing:

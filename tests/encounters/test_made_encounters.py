@@ -8,6 +8,7 @@ import pymap3d
 import pytest
 from geographiclib.geodesic import Geodesic
 
+from components.encounters.encounter_flights import encounter_flights
 from components.encounters.encounter_set import EncounterSet
 from components.encounters.made_encounters import made_set, read_recipe
 from components.encounters.set_file import read_set
@@ -42,7 +43,7 @@ def changed(old: str, new: str) -> str:
 
 
 def places(found: EncounterSet, place: int, time_s: float) -> list[tuple[float, float, float]]:
-    states = [flight.at(time_s) for flight in found.flights(place)]
+    states = [flight.at(time_s) for flight in encounter_flights(found, place, "euler")]
     return [(float(s.lat_deg), float(s.lon_deg), float(s.alt_m)) for s in states]
 
 

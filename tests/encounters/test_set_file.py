@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from components.encounters.command import encounters
+from components.encounters.encounter_flights import encounter_flights
 from components.encounters.encounter_set import NoSuchEncounter
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
@@ -69,7 +70,7 @@ def test_generated_sets_fly_as_the_pairs_did(model: Path, tmp_path: Path) -> Non
             assert east / FOOT == pytest.approx(pairs.east_ft[aircraft, :, k], abs=1e-6)
             assert altitude / FOOT == pytest.approx(pairs.up_ft[aircraft, :, k], abs=1e-6)
     assert found.extra["horizontal_miss_m"] == pytest.approx(pairs.horizontal_ft * FOOT)
-    own, other = found.flights(0)
+    own, other = encounter_flights(found, 0, "euler")
     at = own.at(150.0)
     assert (float(at.lat_deg), float(at.lon_deg)) == pytest.approx((-41.0, 20.0), abs=1e-9)
     assert other.name == "intruder"
@@ -78,7 +79,7 @@ def test_generated_sets_fly_as_the_pairs_did(model: Path, tmp_path: Path) -> Non
 def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
     found = read_set(written(tmp_path))
     assert (found.kind, len(found), found.weights.tolist()) == ("tracks", 2, [1.5, 0.0])
-    assert [flight.name for flight in found.flights(1)] == ["own", "b", "c"]
+    assert [flight.name for flight in encounter_flights(found, 1, "euler")] == ["own", "b", "c"]
     assert found.path(0)[0].tolist() == [0.0, 1.0, 2.5]
     with pytest.raises(NoSuchEncounter, match="there is no encounter 4; it holds 2, numbered from"):
         found.place(4)
@@ -108,7 +109,7 @@ def test_a_damaged_encounter_is_named_or_skipped_and_counted(
     left = read_set(path, skip_damaged=True)
     assert left.skipped >= 1 and len(left) >= 1
     for place in range(len(left)):
-        assert left.flights(place)
+        assert encounter_flights(left, place, "euler")
 
 
 @pytest.mark.parametrize(

@@ -87,11 +87,12 @@ def test_traffic_that_differs_is_flown_together():
     assert not simulation.timeline.split
 
 
-def test_traffic_that_is_asked_for_other_instants_is_split():
+def test_traffic_that_is_asked_for_other_instants_is_flown_together_too():
     scene = load_scene(FIRST_LIGHT, duration_s="20", sets=["blocks.radar.beam_sweep=true"])
     changes = [{}, {"blocks.traffic.intruders[0].east_m": 900}]
     simulation = assert_equal_to_separate_runs(variants(scene, changes))
-    assert "traffic" in simulation.timeline.split
+    assert list(simulation.timeline.together) == ["traffic"]
+    assert not simulation.timeline.split
 
 
 def test_random_traffic_is_drawn_from_each_seed():

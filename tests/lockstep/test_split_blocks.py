@@ -18,6 +18,8 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"
+COINCIDENCE = "blocks.fusion.coincidence_s"
+TARGET = "blocks.traffic.intruders[0].heading_deg"
 HEADING = "blocks.traffic.ownship.heading_deg"
 
 
@@ -30,22 +32,24 @@ def near(*sets, duration_s="40"):
 def test_a_split_block_is_no_block(lock):
     """It has nothing that the engine could ask in the place of the block itself."""
     assert not issubclass(SplitBlock, Component)
-    scene = near("blocks.radar.beam_sweep=true")
-    scenes = lock.replicas_of(scene, {HEADING: 0.5}, {HEADING: -0.5})
+    scenes = lock.replicas_of(near(), {COINCIDENCE: 0}, {COINCIDENCE: Fraction(1, 5)})
     simulation = lock_step(scenes)
     for name, node in simulation.nodes.items():
         assert type(node.component) is scenes[0].blocks[name].cls
         assert node.component is simulation.components[name]
-    assert simulation.nodes["traffic"].runner is simulation.timeline.split["traffic"]
+    assert simulation.nodes["fusion"].runner is simulation.timeline.split["fusion"]
     public = {name for name in dir(SplitBlock) if not name.startswith("_")}
     assert public == {"run", "close"}
 
 
-@pytest.mark.parametrize("rate", ["0.1", "3"])
-def test_positions_are_published_at_their_rate_when_the_traffic_is_split(lock, rate):
-    scene = near(f"blocks.traffic.update_rate_hz={rate}", "blocks.radar.beam_sweep=true")
-    simulation = lock.same_as_alone(lock.replicas_of(scene, {HEADING: 0.5}, {HEADING: -0.5}))
-    assert "traffic" in simulation.timeline.split
+@pytest.mark.parametrize("rates", [("0.1", "0.1"), ("1.5", "3")])
+def test_positions_are_published_at_their_rate_when_the_traffic_is_flown_together(lock, rates):
+    scene = near(f"blocks.traffic.update_rate_hz={rates[0]}", "blocks.radar.beam_sweep=true")
+    changes = [
+        {HEADING: turn, TARGET: 180 + 30 * turn, "blocks.traffic.update_rate_hz": Fraction(rate)}
+        for turn, rate in zip((0.5, -0.5), rates, strict=True)
+    ]
+    assert not lock.same_as_alone(lock.replicas_of(scene, *changes)).timeline.split
 
 
 def test_the_publishing_rate_itself_can_be_drawn(lock):
@@ -110,7 +114,7 @@ def test_one_instance_serves_clocks_that_differ(lock, change):
 
 @pytest.mark.parametrize("change", CLOCKS)
 def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
-    """Such a radar reads its clock, so it is split; its requests must stay the same."""
+    """Its requests must stay the same."""
     scene = near("blocks.radar.beam_sweep=true", "blocks.gate.latency_s=0.25", duration_s="15")
     changes = {f"blocks.radar.{name}": value for name, value in change.items()}
     scenes = lock.replicas_of(scene, {}, changes, changes)
@@ -118,7 +122,7 @@ def test_a_sweep_lasts_a_scan_of_its_own_replica(lock, change):
         with pytest.raises(NotInLockStep, match="radar asks for something else"):
             lock.same_as_alone(scenes)
     else:
-        assert list(lock.same_as_alone(scenes).timeline.split) == ["radar"]
+        assert not lock.same_as_alone(scenes).timeline.split
 
 
 class Reader(ClockedParameters):

@@ -1,23 +1,52 @@
 """Blocks that remember, and effects that do, serve all replicas at once: none is split."""
 
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import pyarrow.compute as pc
 import pytest
 
 from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene.scene import load_scene
 
+#: Each sensor has a tracker of its own, and their tracks are fused.
+DISTRIBUTED = """\
+extends = "{cueing}"
+wires = [
+  "traffic -> transform -> gate", "gate -> radar -> fusion -> tracker -> whole",
+  "gate -> eo -> other -> second -> whole", "whole -> cues",
+  {{ from = "cues", to = "radar", delay_s = 0.5, holds = {{}} }},
+]
+blocks.other.type = "fusion.pass_through"
+blocks.second.type = "tracking.ekf"
+blocks.whole.type = "fusion.covariance_intersection"
+"""
+#: A camera that looks seldom, and noise enough for tracks of it.
+SEEN_SOON = [
+    "blocks.eo.scan_rate_hz=4", "blocks.radar.false_alarm_probability=0.02",
+    "blocks.traffic.intruders[0].north_m=6000",
+]  # fmt: skip
 #: Scene, length in s, what is set, and the table in which every replica has something.
 SCENES = {
     "alerts of tracks": ("avoidance/crossing_tracked.toml", "8", [
         "blocks.traffic.intruders[0].east_m=2600", "blocks.traffic.intruders[0].north_m=2000",
     ], "alerts"),
     "cues of tracks": ("tracking/cueing.toml", "7", [
-        "blocks.eo.scan_rate_hz=4", "blocks.radar.false_alarm_probability=0.02",
-        "blocks.traffic.intruders[0].north_m=7000",
+        *SEEN_SOON,
     ], "cues"),
     "navigation errors": ("systems/tecvol.toml", "6", [], "detections"),
     "declaration by place": ("tracking/cueing.toml", "5", [
-        "blocks.eo.scan_rate_hz=4", "blocks.radar.false_alarm_probability=0.02",
-        "blocks.traffic.intruders[0].north_m=6000", 'blocks.radar.declare_by="place"',
+        *SEEN_SOON, 'blocks.radar.declare_by="place"',
+    ], "detections"),
+    "a sweeping beam": ("avoidance/crossing.toml", "10", [
+        "blocks.traffic.intruders[0].east_m=2200", "blocks.traffic.intruders[0].north_m=1700",
+        "blocks.radar.beam_sweep=true", "blocks.radar.measures_range_rate=true",
+        "blocks.avoidance.pause_s=2",
+    ], "manoeuvres"),
+    "a camera that weighs motion": ("first_light.toml", "5", [
+        "blocks.eo.dynamic_weight=20", "blocks.traffic.intruders[0].north_m=3000",
     ], "detections"),
 }  # fmt: skip
 
@@ -30,3 +59,38 @@ def test_one_block_serves_all(lock, name):
     assert not lock.same_as_alone(scenes, window=11).timeline.split
     _, tables = lock.tables_of(lock_step, scenes)
     assert len({*tables[table]["replica"].to_pylist()}) == 2
+
+
+def test_flights_over_terrain(lock):
+    """Each is checked to stay above it, and one that does not fails by itself."""
+    sets = ["terrain.height_m=900", "blocks.radar.enabled=false"]  # whose clutter asks as well
+    scene = load_scene("configs/first_light.toml", duration_s="5", sets=sets)
+    own = "blocks.traffic.ownship.alt_m"
+    good = lock.replicas_of(scene, {own: 950}, {own: 1050})
+    simulation = lock.same_as_alone(good)
+    assert list(simulation.timeline.together) == ["traffic"]
+    one, other = run_replicas(scene, [Replica(1, {own: 950}), Replica(1, {own: 850})])
+    assert isinstance(one, Recorded)
+    assert isinstance(other, Failed) and "must be below the ownship" in other.error
+
+
+def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
+    path = tmp_path / "distributed.toml"
+    cueing = Path("configs/tracking/cueing.toml").resolve()
+    path.write_text(DISTRIBUTED.format(cueing=cueing), encoding="utf-8")
+    rates = ["blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1"]
+    scene = load_scene(path, duration_s="8", sets=[*SEEN_SOON, *rates])
+    late = [
+        replace(wire, jitter_s=Fraction(2, 5)) if wire.source == "second" else wire
+        for wire in scene.wires
+    ]
+    # Half a second at a time, some of them tell nothing.
+    phases = [
+        {f"blocks.{sensor}.offset_s": Fraction(tenths, 10) for sensor in ("radar", "eo")}
+        for tenths in (1, 6, 2)
+    ]
+    scenes = lock.replicas_of(replace(scene, wires=late), *phases)
+    assert not lock.same_as_alone(scenes, window=11).timeline.split
+    _, tables = lock.tables_of(lock_step, scenes)
+    fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
+    assert len({*fused["replica"].to_pylist()}) == 3

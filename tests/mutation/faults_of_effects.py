@@ -160,7 +160,7 @@ FAULTS = [
         ("motion-not-called-for", 'return Verdict(weight > 0, f"dynamic_weight',
          'return Verdict(weight > 1e9, f"dynamic_weight'),
         ("motion-forgets-the-last-scan",
-         "if self._last is not None:\n            tick[0]", "if False:\n            tick[0]"),
+         "angles[:, earlier], tick[earlier] = ", "_, tick[earlier] = "),
     ),
     *in_file(
         _GROUP, "components/optical/plume.py", "wiring/test_camera_keys.py",

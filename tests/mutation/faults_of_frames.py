@@ -109,10 +109,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/optical/dynamic_signature.py", "wiring/test_camera_signature.py",
         ("rate-in-body-azimuth",
-         "azimuth[cells.row + 1, cells.target] = cells.azimuth_rad\n"
-         "        elevation[cells.row + 1, cells.target] = cells.elevation_rad",
-         "azimuth[cells.row + 1, cells.target] = cells.body_azimuth_rad\n"
-         "        elevation[cells.row + 1, cells.target] = cells.body_elevation_rad"),
+         "cells.target] = cells.azimuth_rad, cells.elevation_rad",
+         "cells.target] = cells.body_azimuth_rad, cells.body_elevation_rad"),
         ("rate-wholly-in-body-axes", "return self.weight_s * self.rate(cells)",
          "cells.azimuth_rad, cells.elevation_rad = (\n"
          "            cells.body_azimuth_rad, cells.body_elevation_rad)\n"

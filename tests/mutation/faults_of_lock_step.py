@@ -14,6 +14,21 @@ FAULTS = [
     ),
     *in_file(
         _GROUP,
+        "components/track_fusion/covariance_intersection.py",
+        (_TOGETHER,),
+        (
+            "newest-of-any-replica",
+            "newest[replica])",
+            "newest.max())",
+        ),
+        (
+            "tracks-of-others-are-let-go",
+            "LocalTracks.joined([self._local.take(others), local])",
+            "local",
+        ),
+    ),
+    *in_file(
+        _GROUP,
         "components/sensor/declaration_rule.py",
         (_TOGETHER,),
         (
@@ -31,6 +46,47 @@ FAULTS = [
             "known.scan > self._last_scans(detections, known) - self.n + 1",
             "known.scan > int(detections.scan[-1]) - self.n + 1",
         ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/optical/dynamic_signature.py",
+        (_TOGETHER,),
+        (
+            "motion-from-another-replica",
+            "self._angles[:, of], self._tick[of]",
+            "self._angles[:, 0 * of], self._tick[0 * of]",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/traffic/row_flights.py",
+        ("lockstep/test_split_blocks.py", _TOGETHER),
+        (
+            "flights-of-the-first-replica",
+            "target = replica * self._width + column",
+            "target = 0 * replica + column",
+        ),
+        (
+            "rate-of-the-first-replica",
+            "self._rates_hz[replica]",
+            "self._rates_hz[0 * replica]",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/traffic/source.py",
+        (_TOGETHER,),
+        (
+            "terrain-below-the-first-ownship-only",
+            "self._check_terrain(FlightOf(flown.own, number))",
+            "self._check_terrain(FlightOf(flown.own, 0))",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/radar/beam_effects.py",
+        (_TOGETHER,),
+        ("lit-on-the-common-line", "(ticks % span if span else ticks)", "ticks"),
     ),
     *in_file(
         _GROUP,

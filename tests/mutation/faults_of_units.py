@@ -64,10 +64,10 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/optical/dynamic_signature.py", "wiring/test_camera_signature.py",
-        ("interval-in-ticks", "(tick[1:] - tick[:-1])[cells.row] / self._ticks_per_s",
-         "(tick[1:] - tick[:-1])[cells.row] / 1e9 * 2.0"),
-        ("interval-since-the-start", "(tick[1:] - tick[:-1])[cells.row] / self._ticks_per_s",
-         "np.maximum(tick[1:], 1)[cells.row] / self._ticks_per_s"),
+        ("interval-in-ticks", "(tick[here] - tick[here - 1]) / self._ticks_per_s",
+         "(tick[here] - tick[here - 1]) / 1e9 * 2.0"),
+        ("interval-since-the-start", "(tick[here] - tick[here - 1]) / self._ticks_per_s",
+         "np.maximum(tick[here], 1) / self._ticks_per_s"),
     ),
     *in_file(
         _GROUP, "components/radar/radar_equation.py", _BUDGET,

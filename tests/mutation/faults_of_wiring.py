@@ -634,12 +634,15 @@ FAULTS = [
         ("born-at-every-report", 'born_s[known] = before["born_s"][old[known]]', "pass"),
     ),
     *in_file(
-        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
+        _GROUP, "components/track_fusion/heads.py", _FUSED,
         ("own-place-of-who-comes-late", "late = new.time_s[order] >= time_s[of]",
          "late = new.time_s[order] < np.inf"),
+    ),
+    *in_file(
+        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
         ("bearing-rate-in-degrees", "math.radians(self.p.bearing_rate_deg_s)",
          "self.p.bearing_rate_deg_s"),
-        ("frame-of-any-track", "if row[entry] < first[place]:", "if True:"),
+        ("frame-of-any-track", "sooner = row[entries] < first[of]", "sooner = row[entries] >= 0"),
     ),
     *in_file(
         _GROUP, "components/track_fusion/matching.py", _FUSED,
@@ -656,13 +659,26 @@ FAULTS = [
         ("loops-start-anywhere", "self._rewinder.sure_ticks or small", "small"),
     ),
     *in_file(
+        "clocks", "dsa_des/running/rewind.py", "lockstep/test_rewinding_windows.py",
+        ("nobody-runs-ahead", "else self.end_after(self.longest_ticks)", "else end"),
+    ),
+    *in_file(
+        "clocks", "dsa_des/running/loops.py", "lockstep/test_rewinding_windows.py",
+        ("what-a-loop-leads-to-runs-ahead", "set(graph) - behind if looped",
+         "set(graph) - set(looped) if looped"),
+    ),
+    *in_file(
+        _GROUP, "components/traffic/row_flights.py",
+        ("wiring/test_steered_flights_of_each_row.py",),
+        ("truth-of-all-that-is-known",
+         "own = self._own.each(self._replica, time_s.reshape(-1), self._known)",
+         "own = self._own.each(self._replica, time_s.reshape(-1))"),
+    ),
+    *in_file(
         _GROUP, "components/traffic/flown_together.py",
         ("wiring/test_steered_flights_of_each_row.py",),
         ("every-row-knows-the-manoeuvre",
          "known = known + _later(replica, wake.ticks, ownship, ticks)", "known = known + 1"),
-        ("truth-of-all-that-is-known",
-         "own = self._own.each(self._replica, time_s.reshape(-1), self._known)",
-         "own = self._own.each(self._replica, time_s.reshape(-1))"),
         ("epochs-as-long-as-the-first-one-s", "self._epoch_s[of[new]], self._width)",
          "self._epoch_s[of[:1]].repeat(len(new)), self._width)"),
         ("epochs-kept-after-a-turn", "self._epochs.forget(ownship)", "pass",

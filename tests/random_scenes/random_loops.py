@@ -44,7 +44,7 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
     if acts != "turn_away" and dice.chance(0.3, "tracks with states"):
         blocks |= {
             "fusion": {"type": "fusion.pass_through"},
-            "tracker": {"type": dice.pick("tracking.ekf", "tracking.imm")},
+            "tracker": {"type": dice.pick("tracking.ekf", "tracking.imm", "tracking.ukf")},
         }
     actor = "tracker" if acts == "turn_away" else "alerting"
     wires: list[Any] = [
@@ -55,15 +55,65 @@ def loop_of(dice: Dice, root: str) -> dict[str, Any]:
         {**_wire(dice, "actor", "traffic"), "delay_s": dice.pick(0.25, 1, 4)},
     ]  # fmt: skip
     dice.features |= {f"loop of {acts}"}
+    _what_remembers(dice, blocks)
+    if blocks.get("fusion"):
+        wires = _more_of_tracks(dice, blocks, wires)
     if dice.chance(0.4, "ends early"):
         blocks["over"] = closest_approach_passed(dice)
         wires.append({"from": "traffic", "to": "over", **dice.pick({}, {}, {"delay_s": 0.3})})
         dice.features |= {f"{name} of ending" for name in wires[-1] if name == "delay_s"}
     return {
+        **_sections(dice),
         "extends": f"{root}/configs/detect_and_sense.toml", "duration_s": dice.pick(15, 22),
         "seed": dice.randrange(1000), "wires": wires,
         "blocks": {**blocks, "remove": ["ir"]},
     }  # fmt: skip
+
+
+def _what_remembers(dice: Dice, blocks: dict[str, Any]) -> None:
+    """Let sensors do what rests on earlier looks, or on flights at other instants."""
+    radar, eo = blocks["radar"], blocks["eo"]
+    if dice.chance(0.3, "sweeping beam"):
+        radar["beam_sweep"] = True
+    if dice.chance(0.3, "range rate"):
+        radar["measures_range_rate"] = True
+        radar["range_rate_resolution_m_s"] = 2.5
+    if dice.chance(0.3, "declaration"):
+        radar |= {"declare_m": 2, "declare_n": 3, "declare_by": dice.pick("place", "target")}
+    if dice.chance(0.3, "dynamic signature"):
+        eo["dynamic_weight"] = dice.pick(0.5, 20)
+    if dice.chance(0.2, "publishing rate"):
+        blocks["traffic"]["update_rate_hz"] = dice.pick(2, 5)
+
+
+def _more_of_tracks(dice: Dice, blocks: dict[str, Any], wires: list[Any]) -> list[Any]:
+    """Let each sensor have a tracker of its own, and tracks cue the radar, now and then."""
+    if dice.chance(0.4, "distributed trackers"):
+        kind = blocks["tracker"]
+        blocks |= {
+            "fusion_eo": {"type": "fusion.pass_through"}, "radar_tracker": kind, "eo_tracker": kind,
+            "tracker": {"type": "fusion.covariance_intersection"},
+        }  # fmt: skip
+        wires = [
+            {**wire, "to": "fusion_eo"} if isinstance(wire, dict) and wire["from"] == "eo" else wire
+            for wire in wires
+            if wire != "fusion -> tracker"
+        ] + ["fusion -> radar_tracker -> tracker", "fusion_eo -> eo_tracker -> tracker"]
+    if dice.chance(0.4, "cues"):
+        blocks["cues"] = {"type": "tracking.cues", "every_s": dice.pick(0, 1)}
+        blocks["radar"]["cued_dwell_factor"] = 4
+        back = {"from": "cues", "to": "radar", "delay_s": dice.pick(0.3, 1), "holds": {}}
+        wires = [*wires, "tracker -> cues", back]
+    return wires
+
+
+def _sections(dice: Dice) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    if dice.chance(0.3, "navigation"):
+        found["navigation"] = {"position_noise_m": [5, 5, 10], "attitude_noise_deg": [0.5, 0.1, 0]}
+    if dice.chance(0.2, "terrain"):
+        found["terrain"] = {"height_m": dice.pick(0, 120), "horizon": True}
+    return found
 
 
 def _intruder(dice: Dice, name: str) -> dict[str, Any]:

@@ -4,6 +4,15 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 
+import dsa_des
+from components.evidence.track_consistency import (
+    NEARLY,
+    NOISY,
+    OWNSHIP,
+    SENSORS,
+    Case,
+    scene_of_case,
+)
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
@@ -88,12 +97,13 @@ def test_late_looks_change_no_byte_by_window_or_company(late):
     for window in (1, 9):
         assert tracked(Simulation, one, window=window)[1].equals(alone)
     scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(3)]
+    each = [alone, *(tracked(Simulation, single)[1] for single in scenes[1:])]
     for window in (None, 30):
         _, together = tracked(lock_step, scenes, window=window)
-        for number, single in enumerate(scenes):
+        for number, expected in enumerate(each):
             mine = together.filter(pc.equal(together["replica"], number))
             mine = mine.drop_columns(["replica"]).combine_chunks()
-            assert mine.equals(tracked(Simulation, single)[1]), (window, number)
+            assert mine.equals(expected), (window, number)
 
 
 def test_looks_older_than_the_lag_are_left_out_and_counted():
@@ -125,3 +135,19 @@ def test_looks_of_the_future_wait_and_are_counted():
     report = simulation.nodes["tracker"].component.report()
     assert report["early_looks"]["tracker"] == after.sum() > 0
     assert (table["state_s"].to_numpy() <= table["time_s"].to_numpy()).all()
+
+
+def test_one_step_finds_its_tracks_whoever_else_is_there():
+    """Detections miss their tracks, others start and end, and a late look corrects some of them."""
+    case = Case(
+        "", {"type": "tracking.ekf", "late": "one_step", "lag_s": 2, "false_alarms_per_scan": 1.2},
+        NEARLY, sensors={**SENSORS, "radar": NOISY}, wire={"delay_s": 0.3, "jitter_s": 0.2},
+    )  # fmt: skip
+    traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": NEARLY}
+    one = dsa_des.load_scene({**scene_of_case(case, traffic), "duration_s": 5})
+    scenes = [scene_of(one, Replica(1 + i, {})) for i in range(3)]
+    _, together = tracked(lock_step, scenes)
+    _, alone = tracked(Simulation, scenes[0])
+    first = together.filter(pc.equal(together["replica"], 0)).drop_columns(["replica"])
+    assert first.combine_chunks().equals(alone)
+    assert max(alone["track"].to_pylist()) > 2

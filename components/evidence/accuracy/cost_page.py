@@ -16,6 +16,8 @@ from components.examples import folder
 from dsa_des.terminal.interruption import plain_ending
 
 DOCS = Path(__file__).parents[3] / "docs"
+#: Scene of the trackers' ladders, and what is changed in it.
+TRACKERS = ("tracking/architectures.toml", "blocks.eo.latency_s=0.3")
 
 _PAGE = """# What accuracy costs
 
@@ -72,6 +74,16 @@ truth at each instant, which includes the sensors' grids.
 ![Error against cost, one panel per ladder](images/cost_encounter.png)
 
 {encounter}
+
+## Trackers
+
+`dsa-des cost configs/tracking/architectures.toml --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
+a radar at 1 Hz and two cameras, one of them late; two straight flights. Times are those of a tracker
+alone in a single run, where a step's fixed cost counts most ([in lock step](performance.md#track-updates)
+an update is far cheaper). Errors are the distance of the nearest confirmed track; the last rung of
+each ladder is the reference, which is not the truth either. [What they mean](tracking.md#what-filters-association-and-late-looks-cost).
+
+{trackers}
 """
 
 
@@ -103,13 +115,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     compare = comparison()
 
-    def costs_of(scene: str, *sets: str) -> tuple[Variants, list[RungCost]]:
-        variants = Variants(str(folder() / scene), sets=sets)
-        climbs, _ = ladders_to_climb(variants, None, None)
+    def costs_of(
+        scene: str, *sets: str, block: str | None = None, duration_s: object = None
+    ) -> tuple[Variants, list[RungCost]]:
+        variants = Variants(str(folder() / scene), sets=sets, duration_s=duration_s)
+        climbs, _ = ladders_to_climb(variants, block, None)
         return variants, [
             cost
-            for block, ladder in climbs
-            for cost in climb(variants, block, ladder, compare=compare)
+            for name, ladder in climbs
+            for cost in climb(variants, name, ladder, compare=compare)
         ]
 
     variants, first = costs_of("first_light.toml")
@@ -119,6 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     draw_chain(images / "cost_chain.png", variants.scene.title, chain.rows, label)
     flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
     draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
+    _, third = costs_of(*TRACKERS, block="tracker", duration_s="20")
     page = _PAGE.format(
         head=head_lines(second, radar_sees_from(flown.scene)),
         error_map=error_map_section(images),
@@ -127,6 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         encounter=_tables(second),
         encounter_name=options.encounter.name,
         encounter_says=options.encounter_says,
+        trackers=_tables(third),
     )
     write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
