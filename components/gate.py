@@ -70,7 +70,7 @@ class Gate(Component):
             else:
                 place = np.full(len(targets), -1, dtype=np.int64)
                 place[rows] = np.arange(len(rows))
-                seen = [values[rows] for values in where]
+                seen = [values.take(rows, axis=0) for values in where]
             decisions[sensor] = Decision(place, reach.decide(*seen))
         # Behind another gate, that one's decisions were for the sensors there.
         fields = {**vars(targets), "tick": wake.ticks, "decisions": decisions}

@@ -13,7 +13,6 @@ import numpy as np
 from components.encounters.motion import fly_euler, fly_point_mass
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.errors import nearest
 
 EVENTS, TRACKS = "events", "tracks"
 STATE = ("north_m", "east_m", "altitude_m", "speed_mps", "heading_rad", "duration_s")
@@ -84,11 +83,10 @@ class EncounterSet:
         at = int(np.searchsorted(self.numbers, number))
         if at < len(self) and self.numbers[at] == number:
             return at
-        close = nearest(str(number), [str(n) for n in self.numbers[:2000]])
-        hint = f"; did you mean {close}?" if close else ""
+        close = self.numbers[np.abs(self.numbers - number).argmin()]
         raise NoSuchEncounter(
             f"{self.source}: there is no encounter {number}; it holds {len(self)}, numbered from "
-            f"{self.numbers[0]} to {self.numbers[-1]}{hint}"
+            f"{self.numbers[0]} to {self.numbers[-1]}; the nearest is {close}"
         )
 
     def path(

@@ -103,7 +103,7 @@ def read_track_matrices(path: Path) -> Tracks:
         If it cannot be read, or holds none.
     """
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
+    from scipy.io.matlab import MatlabObject, MatlabOpaque, MatReadError
 
     try:
         content = loadmat(io.BytesIO(read_input_bytes(path)))
@@ -114,12 +114,17 @@ def read_track_matrices(path: Path) -> Tracks:
             f"{path}: is no MATLAB file of version 7 or less: {str(error)[:200]}"
         ) from None
     found: list[FloatArray] = []
+    classes: list[str] = []
 
     def number(name: str) -> list[object]:
         return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
     def gather(value: object) -> None:
-        if isinstance(value, np.ndarray) and value.dtype == object:
+        if isinstance(value, MatlabObject):
+            classes.append(value.classname)
+        elif isinstance(value, MatlabOpaque):
+            classes.append(value["s2"].item().decode("latin-1"))
+        elif isinstance(value, np.ndarray) and value.dtype == object:
             for one in value.reshape(-1, order="F"):
                 gather(one)
         elif isinstance(value, np.ndarray) and value.dtype.names:
@@ -137,6 +142,17 @@ def read_track_matrices(path: Path) -> Tracks:
 
     for name in sorted((n for n in content if not n.startswith("__")), key=number):
         gather(content[name])
+    if classes:
+        raise EncounterSetError(
+            f"{path}: holds an object of MATLAB's class {classes[0]!r}, which cannot be read "
+            "outside of MATLAB: its initial states and events are the columns of a set (.parquet), "
+            f"its flown tracks are matrices of {_ROWS} rows"
+        )
+    if not found and any(np.ndim(v) == 2 and np.shape(v)[1] == 4 for v in content.values()):
+        raise EncounterSetError(
+            f"{path}: holds events (4 columns: time, vertical rate, turn rate, acceleration) and "
+            "no initial state: both together are the columns of a set (.parquet)"
+        )
     if not found:
         raise EncounterSetError(
             f"{path}: holds no matrix of {_ROWS} rows (time in s, north, east, altitude in ft, "

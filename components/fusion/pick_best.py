@@ -12,7 +12,7 @@ from components.fusion.fusion_block import Fusion
 from components.fusion.ladder import FUSION
 from components.messages.fused import FusedDetections
 from components.messages.true_entries import true_entries
-from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
@@ -98,6 +98,6 @@ def _keys(new: Arrivals, ticks: IntArray, width: int) -> IntArray:
     """Return instant · width + target of every detection, ascending."""
     if len(ticks) == 1:
         return new.message.target
-    row = np.searchsorted(ticks, new.tick)
+    row = last_at_or_before(ticks, new.tick)  # they are among them
     offsets = new.message.offsets
     return np.repeat(row, np.diff(offsets)) * width + new.message.target

@@ -26,4 +26,4 @@ def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     believed = targets.believed
     if believed is None:
         return {}
-    return {field: believed[name][rows] for name, field in zip(_BELIEVED, POSE, strict=True)}
+    return {field: believed[name].take(rows) for name, field in zip(_BELIEVED, POSE, strict=True)}

@@ -41,7 +41,7 @@ def _per_row(mask: BoolArray) -> IntArray:
     """Return how many are true in each row; of few columns, one at a time is ten times as fast."""
     if mask.shape[1] > _FEW_COLUMNS:
         return mask.sum(axis=1)
-    total = np.zeros(len(mask), dtype=np.int64)
-    for column in mask.T:
+    total = mask[:, 0].astype(np.int64) if mask.shape[1] else np.zeros(len(mask), dtype=np.int64)
+    for column in mask.T[1:]:
         total += column
     return total

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_states import fused_states
+from components.track_fusion.heads import FusionHeads, later_heads
 from components.track_fusion.ladder import RULE
 from components.track_fusion.local_tracks import LocalTracks, local_tracks
 from components.track_fusion.matching import MatchRules, matched, without_strays
@@ -24,7 +25,7 @@ from components.track_fusion.told_tracks import (
     taken,
     told_after,
 )
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
@@ -68,43 +69,6 @@ class IntersectionParameters(Parameters):
         description="Time without a measurement after which a tracker's track takes part no "
         "more, s.",
     )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Heads:
-    """What is kept of each replica beside its tracks, replicas ascending.
-
-    Parameters
-    ----------
-    replica : (n,)
-    origin : (3, n)
-        Of its frame (latitude, longitude in deg, height in m); NaN before the first track.
-    next_number : (n,)
-    time_s : (n,)
-        The newest instant that any track spoke of.
-    own_m : (3, n)
-        Where in the frame the ownship was then.
-    """
-
-    replica: IntArray
-    origin: FloatArray
-    next_number: IntArray
-    time_s: FloatArray
-    own_m: FloatArray
-
-    def take(self, which: Any) -> "_Heads":
-        return _Heads(
-            self.replica[which], self.origin[:, which], self.next_number[which],
-            self.time_s[which], self.own_m[:, which],
-        )  # fmt: skip
-
-    def kept_with(self, newer: "_Heads") -> "_Heads":
-        """Return those of all replicas, as they are in `newer` where they are among them."""
-        old = self.take(~np.isin(self.replica, newer.replica))
-        names = [field.name for field in fields(self)]
-        both = (np.concatenate([getattr(h, n) for h in (old, newer)], axis=-1) for n in names)
-        whole = _Heads(*both)
-        return whole.take(np.argsort(whole.replica, kind="stable"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +122,7 @@ class CovarianceIntersection(Component):
             self.p.stay_factor,
         )
         none = np.empty(0, dtype=np.int64)
-        self._heads = _Heads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
+        self._heads = FusionHeads(none, np.empty((3, 0)), none, np.empty(0), np.empty((3, 0)))
         #: By tracker: of each replica, the newest instant that it told of.
         self._newest: dict[str, IntArray] = {}
         self._local = LocalTracks.none()
@@ -199,7 +163,7 @@ class CovarianceIntersection(Component):
         self._remember(heads, local, told, wake)
         return state_tracks(joined(parts), rows, wake.ticks[rows], self.sensors)
 
-    def _remember(self, heads: _Heads, local: LocalTracks, told: Told, wake: Wake) -> None:
+    def _remember(self, heads: FusionHeads, local: LocalTracks, told: Told, wake: Wake) -> None:
         """Keep what is held of the replicas that may come again."""
         if wake.side_by_side:
             others = ~np.isin(self._local.replica, heads.replica)
@@ -231,10 +195,10 @@ class CovarianceIntersection(Component):
 
     def _heads_of(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
-    ) -> _Heads:
+    ) -> FusionHeads:
         """Return what is kept of replicas; the frame of a new one is that of its first track."""
         count = len(replicas)
-        heads = _Heads(
+        heads = FusionHeads(
             replicas, np.full((3, count), np.nan), np.ones(count, dtype=np.int64),
             np.full(count, -np.inf), np.full((3, count), np.nan),
         )  # fmt: skip
@@ -256,7 +220,7 @@ class CovarianceIntersection(Component):
         return heads
 
     def _reports(
-        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: _Heads
+        self, wake: Wake, came: dict[str, Arrivals], row_of: dict[str, IntArray], heads: FusionHeads
     ) -> _Reports:
         parts, rows = [], []
         told_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
@@ -280,18 +244,18 @@ class CovarianceIntersection(Component):
     def _taken_in(
         self,
         local: LocalTracks,
-        heads: _Heads,
+        heads: FusionHeads,
         reports: _Reports,
         at: IntArray,
         replica: IntArray,
-    ) -> tuple[LocalTracks, _Heads]:
+    ) -> tuple[LocalTracks, FusionHeads]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
         new = reports.tracks.take(np.isin(reports.row, at)).with_systems_of(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reports.told_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.joined([local.take(~gone), new])
-        heads = _later(heads, new)
+        heads = later_heads(heads, new)
         when = heads.time_s[np.searchsorted(heads.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
@@ -305,7 +269,7 @@ class CovarianceIntersection(Component):
         return LocalTracks.joined([idle, busy]), heads
 
     def _tell(
-        self, local: LocalTracks, heads: _Heads, told: Told, at: IntArray, replica: IntArray
+        self, local: LocalTracks, heads: FusionHeads, told: Told, at: IntArray, replica: IntArray
     ) -> Told:
         """Return what is told of the replicas of some rows."""
         mine = local.take(np.isin(local.replica, replica))
@@ -314,14 +278,3 @@ class CovarianceIntersection(Component):
         found = fused_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(heads.replica, found.replica)
         return told_after(before, found, mine, heads.origin[:, of], heads.own_m[:, of], replica, at)
-
-
-def _later(heads: _Heads, new: LocalTracks) -> _Heads:
-    """Return heads that know the newest instant, and where the ownship is then."""
-    time_s, own_m = heads.time_s.copy(), heads.own_m.copy()
-    order = np.lexsort((-new.tracker, new.time_s))
-    of = np.searchsorted(heads.replica, new.replica[order])
-    late = new.time_s[order] >= time_s[of]
-    time_s[of[late]] = new.time_s[order][late]
-    own_m[:, of[late]] = new.own_m[:, order][:, late]
-    return replace(heads, time_s=time_s, own_m=own_m)

@@ -106,8 +106,9 @@ class Cues(Component):
         """Return the rows at which cues are told, given at which of them there are some."""
         replica, tick = wake.replica, wake.own_ticks(wake.ticks)
         more = max(int(replica[-1]) + 1 - len(self._silent), 0)
-        self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
-        self._silent = np.append(self._silent, np.ones(more, dtype=bool))
+        if more:
+            self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
+            self._silent = np.append(self._silent, np.ones(more, dtype=bool))
         due = np.zeros(len(tick), dtype=bool)
         turn = np.arange(len(tick)) - np.searchsorted(replica, replica)
         order = np.argsort(turn, kind="stable")

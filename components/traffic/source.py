@@ -29,7 +29,7 @@ from components.traffic.replica_flights import flown_by
 from components.traffic.sample_times import SampleTimes
 from components.traffic.steered_culling import SteeredCulling
 from components.traffic.steered_ownship import SteeredOwnship
-from components.traffic.terrain_check import check_above_terrain, check_on_raster
+from components.traffic.terrain_check import FlightOf, check_above_terrain, check_on_raster
 from components.traffic.true_flights import truth_is_recorded
 from components.traffic.wind import Wind, scene_wind
 from dsa_des.arrays.types import FloatArray
@@ -106,16 +106,7 @@ class TrafficSource(SteeredOwnship):
 
     def setup(self) -> None:
         """Learn how far sensors look; what stays beyond it is not moved."""
-        terrain = self.context.sections.get("terrain")
-        if terrain is not None and terrain.height_m is not None:
-            check_above_terrain(self.own, terrain.height_m, float(self.context.duration_s))
-        if terrain is not None and terrain.raster is not None:
-            check_on_raster(
-                self.own,
-                terrain.raster.raster,
-                terrain.raster_offset_m,
-                float(self.context.duration_s),
-            )
+        self._check_terrain(self.own)
         self._all_columns = np.arange(len(self.roster))
         self._crabbing = self.built("attitude")
         self._steered_culling: SteeredCulling | None = None
@@ -125,6 +116,14 @@ class TrafficSource(SteeredOwnship):
             self._cull(look)
         self._says_truth = truth_is_recorded(self.context, len(self.roster))
         self._be_steered()
+
+    def _check_terrain(self, own: Any) -> None:
+        """Refuse terrain that an ownship does not fly above."""
+        terrain, end_s = self.context.sections.get("terrain"), float(self.context.duration_s)
+        if terrain is not None and terrain.height_m is not None:
+            check_above_terrain(own, terrain.height_m, end_s)
+        if terrain is not None and terrain.raster is not None:
+            check_on_raster(own, terrain.raster.raster, terrain.raster_offset_m, end_s)
 
     def _cull(self, look: FarthestLook) -> None:
         """Learn which targets matter, where it is known how far sensors look."""
@@ -157,13 +156,9 @@ class TrafficSource(SteeredOwnship):
 
     def together(self, replicas: ReplicaRuns) -> FlownTogether | None:
         """Return what flies the flights of all replicas."""
-        terrain = self.context.sections.get("terrain")
-        checked = terrain is not None and (
-            terrain.height_m is not None or terrain.raster is not None
-        )
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
         asked = self._offered is not None and self._offered.asked
-        if checked or asked or self._crabbing:
+        if asked or self._crabbing:
             return None
         flown = flown_by(self, replicas)
         # What [accuracy] leaves out may rest on what the targets are.
@@ -171,6 +166,9 @@ class TrafficSource(SteeredOwnship):
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
         if flown is None or (allows and flown.roster is not self.roster):
             return None
+        # A flight into the ground is said of its own replica, by itself.
+        for number in range(len(replicas)):
+            self._check_terrain(FlightOf(flown.own, number))
         rates = [p.update_rate_hz for p in replicas.parameters]
         published = None not in rates
         return FlownTogether(self, flown, np.array(rates, dtype=np.float64) if published else None)

@@ -18,6 +18,24 @@ class OwnshipFlight(Protocol):
         """Return its state at some times."""
 
 
+class FlightOf:
+    """One flight of many that are evaluated together.
+
+    Parameters
+    ----------
+    fleet : object with `each(aircraft, time_s)`
+    aircraft : int
+    """
+
+    def __init__(self, fleet: Any, aircraft: int) -> None:
+        self._fleet, self._aircraft = fleet, aircraft
+
+    def at(self, time_s: Any) -> TrajectoryState:
+        """Return its state at times (n,)."""
+        state: TrajectoryState = self._fleet.each(np.full(len(time_s), self._aircraft), time_s)
+        return state
+
+
 def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float) -> None:
     """Refuse terrain that the ownship does not fly above.
 

@@ -19,6 +19,8 @@ from dsa_des.terminal.terminal import say_lines
 from dsa_des.text.safe_text import printable
 
 COMMANDS = "dsa_des.commands"
+# What click (from 8.2 on) raises where a command is missing: its message is the whole help.
+HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 
 
 @contextmanager
@@ -26,6 +28,8 @@ def _printable_errors() -> Iterator[None]:
     """Escape what click repeats of the arguments in its own errors."""
     try:
         yield
+    except HELP:
+        raise
     except click.ClickException as error:
         attributes = vars(error)  # click calls them final
         for name in ("message", "ui_filename"):

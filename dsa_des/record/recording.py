@@ -18,6 +18,8 @@ from dsa_des.record.declared_columns import DeclaredColumns
 from dsa_des.time.run_ends import RunEnds
 from dsa_des.time.timeline import own_scans
 
+# So many rows, or pieces of them, are handed on at a time: a few would cost as much.
+_ROWS_AT_ONCE, _PIECES_AT_ONCE = 16_384, 2048
 _LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
 
 
@@ -59,6 +61,8 @@ class Recorder:
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
         self._ends: RunEnds | None = None
+        #: Rows and pieces noted since some were handed on; more where a window was undone.
+        self._noted = [0, 0]
 
     def open(
         self,
@@ -113,6 +117,8 @@ class Recorder:
             self._declared.check(block, table, columns, type(message).__name__)
             if table in self._pending and len(columns["tick"]):
                 self._pending[table].append((block, columns))
+                self._noted[0] += len(columns["tick"])
+                self._noted[1] += 1
 
     def mark(self) -> dict[str, int]:
         """Return how much was noted since the last `advance`, for `rewind`."""
@@ -124,9 +130,12 @@ class Recorder:
             del self._pending[table][count:]
 
     def advance(self, tick: int) -> None:
-        """Hand on every row before `tick`; no more of them will come."""
-        if tick <= 0:
-            return
+        """Hand on the rows before `tick`, of which no more will come, once there are enough."""
+        if tick > 0 and (self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE):
+            self._hand_on_before(tick)
+
+    def _hand_on_before(self, tick: int) -> None:
+        self._noted = [0, 0]
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
@@ -145,7 +154,7 @@ class Recorder:
 
     def close(self) -> None:
         """Hand on everything that is left and close the sinks."""
-        self.advance(np.iinfo(np.int64).max)
+        self._hand_on_before(np.iinfo(np.int64).max)
         for sink in self.sinks:
             sink.close()
 

@@ -37,7 +37,9 @@ class Channel:
         self.source = source
         self.delay_ticks = delay_ticks
         self._faults = faults
+        #: Arrivals of rows, which are the last ones of the message beside them.
         self._waiting: deque[tuple[IntArray, Message]] = deque()
+        #: The last row of it is held.
         self._last: tuple[IntArray, Message] | None = None
         #: First arrival of every message pushed since `state` or `set_state`.
         self._pushed: list[int] | None = None
@@ -118,12 +120,12 @@ class Channel:
         while self._waiting:
             arrivals, message = self._waiting.popleft()
             count = len(arrivals) if arrivals[-1] < end else int(np.searchsorted(arrivals, end))
-            if count == len(arrivals):
-                taken.append((arrivals, message))
-                continue
+            start = len(message) - len(arrivals)
             if count:
-                taken.append((arrivals[:count], message.take(slice(0, count))))
-            left.append((arrivals[count:], message.take(slice(count, len(message)))))
+                taken.append((arrivals[:count], message.take(slice(start, start + count))))
+            if count == len(arrivals):
+                continue
+            left.append((arrivals[count:], message))
             if self._faults is None:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
@@ -145,13 +147,17 @@ class Channel:
         new = self.collect(end)
         last = self._last
         if new is not None:
-            self._last = (new[0][-1:], new[1].take(slice(len(new[1]) - 1, len(new[1]))))
+            self._last = new
             if new[0][0] <= ticks[0]:
                 last = None  # superseded before the first instant asked about: spare the copy
+        if last is not None:
+            last = last[0][-1:], last[1].take(slice(len(last[1]) - 1, len(last[1])))
         held = joined([part for part in (last, new) if part is not None])
         if held is None:
             return None
         arrivals, message = held
+        if new is None:
+            self._last = held
         return message, last_at_or_before(arrivals, ticks)
 
 

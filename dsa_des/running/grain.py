@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from dsa_des.errors import SceneError
-from dsa_des.running.loops import cannot_rewind, cut_loops
+from dsa_des.running.loops import before_loops, cannot_rewind, cut_loops
 from dsa_des.scene.graph import in_cycles, window_order
 from dsa_des.scene.scene import Scene
 
@@ -28,6 +28,9 @@ class Grain:
     rehearsed : bool
         Whether what shared processors do is rehearsed before each window, which is undone where
         that was wrong.
+    ahead : set of str
+        Blocks that no loop leads to: what comes back is nothing to them, and they run ahead in
+        longer windows.
     """
 
     windowed: set[str]
@@ -36,6 +39,7 @@ class Grain:
     unwound: dict[str, str]
     queues: dict[str, list[str]] = field(default_factory=dict)
     rehearsed: bool = False
+    ahead: set[str] = field(default_factory=set)
 
     def order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
         """Return the place of each block and each queue in a window (`window_order`)."""
@@ -53,7 +57,10 @@ def grain_of(scene: Scene, window: int | None, check_rewinding: bool) -> Grain:
     queued = {name for name, block in scene.blocks.items() if block.options.processor}
     unwound = cannot_rewind(scene.classes, queued)
     if window != 1 and not unwound and (check_rewinding or in_cycles(scene.graph)):
-        return Grain(set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound)
+        return Grain(
+            set(scene.blocks), True, cut_loops(scene.graph, scene.classes), unwound,
+            ahead=before_loops(scene.graph),
+        )  # fmt: skip
     if check_rewinding:
         raise _nothing_rewinds(scene, unwound)
     if window == 1:

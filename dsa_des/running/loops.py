@@ -39,6 +39,13 @@ def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[
     return cut
 
 
+def before_loops(graph: nx.DiGraph) -> set[str]:
+    """Return the blocks that no loop leads to; none where there is no loop."""
+    looped = in_cycles(graph)
+    behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
+    return set(graph) - behind if looped else set()
+
+
 def _optional(
     graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: tuple[str, str]
 ) -> bool:

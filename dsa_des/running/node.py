@@ -66,6 +66,8 @@ class Node:
     cpu_s: float = 0.0
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
+    #: Whether it may run ahead of the window (`Window.ahead`).
+    ahead: bool = False
 
     def __post_init__(self) -> None:
         self.name = self.component.name
@@ -90,7 +92,8 @@ class Node:
             yield self._bell
             self._bell = Bell(self.simulation.env)
             if self.windowed:
-                self._run_window(self.simulation.window.start, self.simulation.window.end)
+                window = self.simulation.window
+                self._run_window(window.start, self._end_in(window))
             else:
                 self._run_at(int(self.simulation.env.now))
 
@@ -143,7 +146,8 @@ class Node:
         if self.processor is not None:
             self.processor.open_window(start, end)
         if self.windowed:
-            self.wake_at(start)
+            if self._end_in(window) > start:
+                self.wake_at(start)
             return
         if self.clock is not None:
             scans, ticks = self.clock.between(start, end)
@@ -153,6 +157,10 @@ class Node:
         elif self.on_demand:
             for tick in self._demanded(start, end).tolist():
                 self.wake_at(tick)
+
+    def _end_in(self, window: Window) -> int:
+        """Return up to when it runs in a window."""
+        return window.end if window.ahead is None or not self.ahead else window.ahead
 
     def own_ticks(self, start: int, end: int) -> IntArray:
         """Return the instants in [start, end) at which it runs without being sent anything."""

@@ -58,6 +58,7 @@ def build_nodes(
         node.runner = timeline.runner(component)
         node.clock = timeline.clock(name, component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
+        node.ahead = name in grain.ahead
         node.on_demand = component.clocked == "demand" and node.clock is None
         nodes[name] = node
     return nodes

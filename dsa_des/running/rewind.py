@@ -107,6 +107,8 @@ class RewindingWindows(EqualWindows):
         self._least = rewinder.sure_ticks
         self._came = 0  # when something came back last
         self._right: Window | None = None  # what is right of a window that was undone
+        self._ahead = 0  # up to when blocks before the loops have run
+        self._careful = False  # whether they run no farther than the rest, after a failure
 
     def next(self) -> Window | None:
         """Return what was right of the last window, or a new one that may be undone."""
@@ -114,12 +116,22 @@ class RewindingWindows(EqualWindows):
             return self._right
         self._rewinder.mark()
         length = max(self._length or self._small(), self._least)
-        return Window(self.start, self.end_after(min(length, self.longest_ticks)), True)
+        end = self.end_after(min(length, self.longest_ticks))
+        ahead = end if self._careful else self.end_after(self.longest_ticks)
+        if self._ahead > self.start:
+            # A window does not reach beyond what is there of them.
+            end, ahead = min(end, self._ahead), self.start
+        return Window(self.start, end, True, ahead)
 
     def heard(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
         back = self._rewinder.came_back()
         early = window.end if back is None else back
+        if failure is not None and window.ahead is not None and window.ahead > window.end:
+            # Perhaps it lies beyond the window: again, and nobody runs ahead.
+            self._rewinder.restore()
+            self._right, self._careful = None, True
+            return None
         if self._right is None and failure is not None:
             if early < window.end or len(failure.ticks) > 1:
                 # What failed may never have happened: look less far.
@@ -129,9 +141,11 @@ class RewindingWindows(EqualWindows):
                 return None
         elif self._right is None and early < window.end:
             self._rewinder.restore()
-            self._right = Window(self.start, early, True)
+            self._right = Window(self.start, early, True, window.ahead)
             return None
         self._right, self._least = None, self._rewinder.sure_ticks
+        self._ahead = max(self._ahead, window.end if window.ahead is None else window.ahead)
+        self._careful = False
         if back is None:
             self._length = min(2 * (self._length or self._small()), self.longest_ticks)
         else:  # what comes back often comes regularly; at first, or after a hurry, start small

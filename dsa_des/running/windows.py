@@ -18,12 +18,14 @@ class Window(NamedTuple):
     """The ticks [start, end) that run at a time.
 
     All of a provisional window runs at its start, and may be undone: what a block raises in it
-    counts only when the windows let it stand.
+    counts only when the windows let it stand. Blocks that no loop leads to run from its start up to
+    `ahead`, not at all where that is the start: they have come farther. None is the end.
     """
 
     start: int
     end: int
     provisional: bool = False
+    ahead: int | None = None
 
 
 @dataclass(frozen=True)

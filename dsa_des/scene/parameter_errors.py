@@ -44,6 +44,10 @@ def explain(
         elif length := _list_length(model, item):
             given = _at(scene_file, at)
             problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
+        elif item["type"] == "too_short":
+            least, given = item["ctx"]["min_length"], _at(scene_file, at)
+            if not isinstance(given, list) or len(given) < least:  # else its items were refused
+                problems.append(scene_file.problem(at, f"must be at least {least} values", given))
         elif item["type"].startswith("union_tag"):
             problems.append(_wrong_kind(scene_file, at, item["ctx"]))
         elif item["type"] == "missing":
@@ -62,7 +66,7 @@ def explain(
             )
             message = message.replace("a valid boolean, unable to interpret input", "true or false")
             message = re.sub(r"a valid dictionary.*", "a table", message)
-            message = message.replace("a valid list", "a list")
+            message = re.sub("a valid (list|tuple)", "a list", message)
             if item["type"] == "literal_error":
                 names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
                 close = nearest(str(item["input"]), names)
@@ -139,7 +143,8 @@ def _list_length(model: Any, item: Any) -> int:
             continue
         annotation = found.annotation
         if typing.get_origin(annotation) is tuple and name == path[-1]:
-            return len(typing.get_args(annotation))
+            items = typing.get_args(annotation)
+            return 0 if items[-1] is Ellipsis else len(items)
         model = _nested_model(annotation) or model
     return 0
 

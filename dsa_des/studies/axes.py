@@ -106,12 +106,13 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
     _refuse_many(len(values))
     if key.startswith(SWAP):
         return _swap(key, values, scene)
-    labels = tuple(_label(value) for value in values)
+    labels = tuple(label_of(value) for value in values)
     _refuse_twice(labels)
     return Axis(key, labels, tuple(((key, value),) for value in values), ((),) * len(values))
 
 
-def _label(value: Any) -> Any:
+def label_of(value: Any) -> Any:
+    """Return what a study calls a value of an axis: a flag and a list are texts."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str) and len(value) < _LONGEST_FRACTION and _FRACTION.fullmatch(value):
@@ -204,7 +205,7 @@ def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
     for name, column in columns.items():
         if not isinstance(column, list) or len(column) != len(labels):
             raise ValueError(f"set: {name} must be a list of {len(labels)} values, one per value")
-    shown = tuple(_label(label) for label in labels)
+    shown = tuple(label_of(label) for label in labels)
     _refuse_twice(shown)
     sets = tuple(
         tuple((name, column[i]) for name, column in columns.items()) for i in range(len(labels))

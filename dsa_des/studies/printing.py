@@ -119,7 +119,7 @@ def _show_answers(console: Any, tables: Tables) -> None:
 #: Columns of the table of ratios, behind those of the axes.
 RATIO_HEADS = (
     "ratio of events", "unresolved", "induced", "delta", "bootstrap", "effective size",
-    "below, above, induced", "without",
+    "nominal, mitigated, induced", "without",
 )  # fmt: skip
 
 

@@ -161,8 +161,8 @@ def _ratios(tables: Tables) -> str:
     rows = [(*map(short, line.at), *ratio_cells(line)) for line in tables.ratios()[:_MOST_ROWS]]
     return (
         "<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. "
-        "Below, above, induced: units with the event without and with the remedy, and with it "
-        "alone. Effective size: Kish's, of the weights.</p>"
+        "Nominal, mitigated, induced: units with the event without and with the remedy, and with "
+        "it alone. Effective size: Kish's, of the weights.</p>"
         + table((*tables.rows.axes, *RATIO_HEADS), rows)
         if rows
         else ""

@@ -25,6 +25,8 @@ from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
 _MOST_DRAWN = 10_000
+#: In so many scenes the last value of a sequence is tried.
+_MOST_SCENES = 64
 
 
 def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
@@ -78,7 +80,29 @@ def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -
         _check_names(study, results, add)
     if not problems:
         problems += _check_set_up(study, scenes, file)
+    if not problems:
+        _check_ends(study, scenes, add)
     return problems
+
+
+def _check_ends(study: Study, scenes: list[Scene], add: Callable[..., None]) -> None:
+    """Set up the last run of each sequence: what it counts may end before, as a file does."""
+    last = study.replicas - 1
+    for draw in study.draws:
+        if draw.kind != "sequence" or not last:
+            continue
+        value = draw.value(study.seed, last, study.batch)
+        for scene in scenes[:_MOST_SCENES]:
+            try:
+                _ = Simulation(scene_of(scene, Replica(0, {draw.key: value}))).components
+            except SceneError as error:
+                text = "; ".join(problem.message for problem in error.problems)
+            except BlockFailure as error:
+                text = str(error)
+            else:
+                continue
+            add(("draws", draw.key), f"of the last of {study.replicas} replicas: {text}", value)
+            break
 
 
 def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
@@ -193,6 +217,8 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     """
     if draw.kind == "choice":
         return list(draw.values)
+    if draw.kind == "sequence":
+        return [draw.value(study.seed, number, study.batch) for number in (0, study.replicas - 1)]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
     cells = range(len(study.cells) if study.over else 1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))

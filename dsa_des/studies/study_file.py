@@ -18,7 +18,7 @@ from dsa_des.scene.overrides import apply_set
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile, read_scene_file
-from dsa_des.studies.axes import Axis, flatten_axes, parse_axis
+from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
 from dsa_des.studies.figure_tables import read_figures
 from dsa_des.studies.metric import METRICS, find_metric
@@ -289,12 +289,18 @@ class _StudyReader:
         if column is None:
             return None
         axis = next(axis for axis in axes if axis.column == column)
-        if table["baseline"] not in axis.labels:
+        wanted = table["baseline"]
+        try:
+            known_so = wanted in axis.labels and not isinstance(wanted, bool)
+            label = wanted if known_so else label_of(wanted)
+        except ValueError:
+            label = wanted
+        if label not in axis.labels:
             shown = ", ".join(map(str, axis.labels[:12]))
             message = f"is no value of that axis; allowed: {shown}"
-            self.add(("compare", "baseline"), message, table["baseline"])
+            self.add(("compare", "baseline"), message, wanted)
             return None
-        return column, axis.labels[axis.labels.index(table["baseline"])]
+        return column, axis.labels[axis.labels.index(label)]
 
     def compare_weight(self) -> str | None:
         table = self.data.get("compare")

@@ -90,3 +90,13 @@ def test_a_stream_that_knows_few_letters_gets_escapes(capfd: pytest.CaptureFixtu
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [r"\xb5 \xe9 \u6f22", r"\xb5 \u6f22"]
+
+
+def test_help_for_want_of_a_command_keeps_its_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    from dsa_des.cli import main
+
+    for words in ([], ["encounters"]):
+        with pytest.raises(SystemExit):
+            main(words)
+        said = "".join(capsys.readouterr())
+        assert "\n  -h, --help" in said and "\\n" not in said

@@ -43,6 +43,19 @@ def made(folder: Path, count: int, more: str = "") -> tuple[Path, Path]:
     return file, scene
 
 
+def test_a_sequence_beyond_the_end_of_a_set_is_one_error_before_any_run(tmp_path: Path) -> None:
+    file, _ = made(tmp_path, 6)  # numbered from 0: the sixth replica has none
+    study = tmp_path / "study.toml"
+    study.write_text(STUDY, encoding="utf-8")
+    with pytest.raises(dsa_des.SceneError) as error:
+        dsa_des.study(study, out=tmp_path / "out", workers=1)
+    (problem,) = error.value.problems
+    for said in ("last of 6 replicas", f"{file}: there is no encounter 6", "holds 6,", "0 to 5"):
+        assert said in str(problem)
+    assert "draws.blocks.traffic.encounter" in str(problem)
+    assert not (tmp_path / "out").exists()
+
+
 def test_every_replica_flies_its_encounter_and_says_its_weight(tmp_path: Path) -> None:
     file, _ = made(tmp_path, 8)
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")

@@ -7,6 +7,7 @@ import numpy as np
 import pymap3d
 import pytest
 from scipy.io import savemat
+from scipy.io.matlab import MatlabObject
 
 from components.encounters.encounter_flights import encounter_flights
 from components.encounters.set_file import read_set
@@ -133,5 +134,10 @@ def test_what_is_wrong_names_file_and_line_and_can_be_skipped(tmp_path: Path) ->
     assert "is no MATLAB file" in refused(tmp_path / "none.mat")
     savemat(tmp_path / "other.mat", {"x": np.zeros((3, 9))})
     assert "holds no matrix of 7 rows" in refused(tmp_path / "other.mat")
+    savemat(tmp_path / "events.mat", {"event": np.zeros((3, 4))})
+    assert "holds events" in refused(tmp_path / "events.mat")
+    states = np.zeros((1, 1), dtype=[("v_ftps", "O")])
+    savemat(tmp_path / "object.mat", {"enc": MatlabObject(states, "ScriptedEncounter")})
+    assert "MATLAB's class 'ScriptedEncounter'" in refused(tmp_path / "object.mat")
     savemat(tmp_path / "back.mat", {"a": matrix(1)[:, ::-1], "b": matrix(2)})
     assert "aircraft 1: times must rise" in refused(tmp_path / "back.mat")

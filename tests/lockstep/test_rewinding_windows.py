@@ -1,5 +1,7 @@
 """In a feedback loop, looking ahead and going back records what scan by scan records."""
 
+from pathlib import Path
+
 import pytest
 
 from dsa_des.errors import BlockFailure
@@ -98,3 +100,75 @@ def test_loops_are_cut_where_an_input_can_be_done_without():
     open_loop = [wire for wire in scene.wires if wire.source != "avoidance"]
     graph = build_graph(list(scene.blocks), open_loop)
     assert cut_loops(graph, scene.classes) == set()
+
+
+CUED = "configs/tracking/cueing.toml"
+
+
+BEHIND = """
+extends = "{cued}"
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "radar -> fusion",
+  "eo -> fusion", "fusion -> tracker -> cues", "fusion -> behind",
+  {{ from = "cues", to = "radar", delay_s = 0.5, holds = {{}} }},
+]
+[blocks.behind]
+type = "tracking.ekf"
+"""
+
+
+@pytest.fixture
+def cued(tmp_path):
+    """A cue loop, with another tracker behind it."""
+    path = tmp_path / "scene.toml"
+    path.write_text(BEHIND.format(cued=Path(CUED).resolve()), encoding="utf-8")
+    sets = ["blocks.eo.scan_rate_hz=4", "blocks.traffic.intruders[0].north_m=9000"]
+    return load_scene(path, sets=sets, duration_s="14")
+
+
+def failing_from(monkeypatch, block, time_s):
+    """Let a type of block fail at its first instant from a time on."""
+    runs = block.run
+
+    def run(self, wake):
+        if (wake.time_s >= time_s).any():
+            raise RuntimeError("not any longer")
+        return runs(self, wake)
+
+    monkeypatch.setattr(block, "run", run)
+
+
+def test_blocks_that_no_loop_leads_to_run_ahead(cued):
+    """Few long windows for them, and those of the delay for the loop; the rows are the same."""
+    _, scan_by_scan = run(cued, window=1)
+    calls = dict.fromkeys(("traffic", "gate", "eo", "radar", "tracker", "cues"), 0)
+
+    class Counted(Simulation):
+        def run_window(self, window):
+            found = super().run_window(window)
+            for name in calls:
+                node = self.nodes[name]
+                calls[name] += node._end_in(window) > window.start
+            return found
+
+    simulation = Counted(cued, recorder=Recorder([sink := MemorySink()]))
+    simulation.run()
+    assert all(sink.tables()[name].equals(rows) for name, rows in scan_by_scan.items())
+    assert scan_by_scan["state_tracks"].num_rows > 20
+    assert calls["traffic"] == calls["gate"] == calls["eo"] == 1
+    assert calls["radar"] == calls["tracker"] == calls["cues"] >= 14 / 0.5
+
+
+@pytest.mark.parametrize(
+    ("gate_s", "cues_s", "said"),
+    [(9.0, 6.0, "cues .* t = 6.0"), (9.0, 99.0, "gate .* t = 9.0"), (6.0, 9.0, "gate .* t = 6.0")],
+)
+def test_who_runs_ahead_fails_when_its_time_has_come(cued, monkeypatch, gate_s, cues_s, said):
+    """What fails first in simulated time counts, however far others had run ahead."""
+    from components.gate import Gate
+    from components.tracking.cues import Cues
+
+    failing_from(monkeypatch, Gate, gate_s)
+    failing_from(monkeypatch, Cues, cues_s)
+    with pytest.raises(BlockFailure, match=said):
+        run(cued)

@@ -8,6 +8,7 @@ import pyarrow.compute as pc
 import pytest
 
 from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Failed, Recorded, Replica, run_replicas
 from dsa_des.scene.scene import load_scene
 
 #: Each sensor has a tracker of its own, and their tracks are fused.
@@ -58,6 +59,19 @@ def test_one_block_serves_all(lock, name):
     assert not lock.same_as_alone(scenes, window=11).timeline.split
     _, tables = lock.tables_of(lock_step, scenes)
     assert len({*tables[table]["replica"].to_pylist()}) == 2
+
+
+def test_flights_over_terrain(lock):
+    """Each is checked to stay above it, and one that does not fails by itself."""
+    sets = ["terrain.height_m=900", "blocks.radar.enabled=false"]  # whose clutter asks as well
+    scene = load_scene("configs/first_light.toml", duration_s="5", sets=sets)
+    own = "blocks.traffic.ownship.alt_m"
+    good = lock.replicas_of(scene, {own: 950}, {own: 1050})
+    simulation = lock.same_as_alone(good)
+    assert list(simulation.timeline.together) == ["traffic"]
+    one, other = run_replicas(scene, [Replica(1, {own: 950}), Replica(1, {own: 850})])
+    assert isinstance(one, Recorded)
+    assert isinstance(other, Failed) and "must be below the ownship" in other.error
 
 
 def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):

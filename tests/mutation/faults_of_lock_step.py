@@ -76,6 +76,16 @@ FAULTS = [
     ),
     *in_file(
         _GROUP,
+        "components/traffic/source.py",
+        (_TOGETHER,),
+        (
+            "terrain-below-the-first-ownship-only",
+            "self._check_terrain(FlightOf(flown.own, number))",
+            "self._check_terrain(FlightOf(flown.own, 0))",
+        ),
+    ),
+    *in_file(
+        _GROUP,
         "components/radar/beam_effects.py",
         (_TOGETHER,),
         ("lit-on-the-common-line", "(ticks % span if span else ticks)", "ticks"),

@@ -634,9 +634,12 @@ FAULTS = [
         ("born-at-every-report", 'born_s[known] = before["born_s"][old[known]]', "pass"),
     ),
     *in_file(
-        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
+        _GROUP, "components/track_fusion/heads.py", _FUSED,
         ("own-place-of-who-comes-late", "late = new.time_s[order] >= time_s[of]",
          "late = new.time_s[order] < np.inf"),
+    ),
+    *in_file(
+        _GROUP, "components/track_fusion/covariance_intersection.py", _FUSED,
         ("bearing-rate-in-degrees", "math.radians(self.p.bearing_rate_deg_s)",
          "self.p.bearing_rate_deg_s"),
         ("frame-of-any-track", "sooner = row[entries] < first[of]", "sooner = row[entries] >= 0"),
@@ -654,6 +657,15 @@ FAULTS = [
     *in_file(
         "clocks", "dsa_des/running/rewind.py", "tracking/test_cued_declaration.py",
         ("loops-start-anywhere", "self._rewinder.sure_ticks or small", "small"),
+    ),
+    *in_file(
+        "clocks", "dsa_des/running/rewind.py", "lockstep/test_rewinding_windows.py",
+        ("nobody-runs-ahead", "else self.end_after(self.longest_ticks)", "else end"),
+    ),
+    *in_file(
+        "clocks", "dsa_des/running/loops.py", "lockstep/test_rewinding_windows.py",
+        ("what-a-loop-leads-to-runs-ahead", "set(graph) - behind if looped",
+         "set(graph) - set(looped) if looped"),
     ),
     *in_file(
         _GROUP, "components/traffic/row_flights.py",

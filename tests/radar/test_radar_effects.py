@@ -116,7 +116,7 @@ VARIANTS = [
 
 @pytest.mark.parametrize("changes", VARIANTS)
 def test_neither_windows_nor_neutral_effects_change_a_bit(scene, rcs_file, changes):
-    path = scene(**changes)
+    path = scene(**changes, duration_s=6)
     _, whole = simulate(path)
     assert radar_rows(whole)
     for options in ({"window": 1}, {"window": 7}, {"simulate_everything": True}):

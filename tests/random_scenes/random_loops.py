@@ -111,6 +111,8 @@ def _sections(dice: Dice) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if dice.chance(0.3, "navigation"):
         found["navigation"] = {"position_noise_m": [5, 5, 10], "attitude_noise_deg": [0.5, 0.1, 0]}
+    if dice.chance(0.2, "terrain"):
+        found["terrain"] = {"height_m": dice.pick(0, 120), "horizon": True}
     return found
 
 

@@ -97,12 +97,13 @@ def test_late_looks_change_no_byte_by_window_or_company(late):
     for window in (1, 9):
         assert tracked(Simulation, one, window=window)[1].equals(alone)
     scenes = [scene_of(one, Replica(one.seed + i, {})) for i in range(3)]
+    each = [alone, *(tracked(Simulation, single)[1] for single in scenes[1:])]
     for window in (None, 30):
         _, together = tracked(lock_step, scenes, window=window)
-        for number, single in enumerate(scenes):
+        for number, expected in enumerate(each):
             mine = together.filter(pc.equal(together["replica"], number))
             mine = mine.drop_columns(["replica"]).combine_chunks()
-            assert mine.equals(tracked(Simulation, single)[1]), (window, number)
+            assert mine.equals(expected), (window, number)
 
 
 def test_looks_older_than_the_lag_are_left_out_and_counted():
