@@ -94,3 +94,33 @@ def test_the_tracks_of_two_trackers_are_fused_together(lock, tmp_path):
     _, tables = lock.tables_of(lock_step, scenes)
     fused = tables["state_tracks"].filter(pc.equal(tables["state_tracks"]["block"], "whole"))
     assert len({*fused["replica"].to_pylist()}) == 3
+
+
+#: Pilots tell nobody.
+OPEN = """\
+extends = "{tracked}"
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "gate -> ir",
+  "radar -> fusion", "eo -> fusion", "ir -> fusion", "fusion -> tracker -> alerting",
+  "traffic -> alerting -> pilot", "traffic -> true_alerting",
+]
+"""
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_alerts_of_tracks_at_instants_of_their_own(lock, tmp_path, closed):
+    """In some stretches of time only some replicas have scans; or one lasts for several windows."""
+    name, _, sets, _ = SCENES["alerts of tracks"]
+    path = Path("configs", name)
+    if not closed:
+        path = tmp_path / "open.toml"
+        path.write_text(OPEN.format(tracked=Path("configs", name).resolve()), encoding="utf-8")
+        # Its first scans in a window rest on what came in the one before.
+        seen = [f"blocks.{name}.offset_s=0.5" for name in ("radar", "eo", "ir")]
+        sets = [*sets, *seen, "blocks.alerting.scan_rate_hz=5"]
+    scene = load_scene(path, duration_s="7", sets=sets)
+    phases = [{"blocks.alerting.offset_s": Fraction(tenths, 10)} for tenths in (1, 6, 2)]
+    scenes = lock.replicas_of(scene, *phases)
+    simulation = lock.same_as_alone(scenes, window=None if closed else 2)
+    assert simulation.side_by_side == closed
+    assert not simulation.timeline.split

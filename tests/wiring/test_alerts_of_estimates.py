@@ -13,7 +13,7 @@ from components.alerting.estimated_flights import EstimatedFlights
 from components.alerting.memory import MemoryRule
 from components.alerting.track_memory import TrackMemory
 from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import CONFIRMED, TENTATIVE, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, TENTATIVE, StateTracks
 
 SIGMA_M = 25.0
 #: A short lookahead, over which an error of a vertical speed does not grow far.
@@ -121,15 +121,16 @@ def tracks(number, status=CONFIRMED, **values):
 def test_an_estimate_is_carried_on_with_its_covariance():
     flights = EstimatedFlights()
     flights.add(np.array([40]), tracks(7))
-    flights.add(np.array([41]), tracks(8, TENTATIVE))
+    flights.add(np.array([41, 42]), two(tracks(8, TENTATIVE), tracks(9, COASTED)))
     own = crooked.OWNSHIP
     place = np.array([*np.radians([own["lat_deg"], own["lon_deg"]]), own["alt_m"]])
-    # Before it came, when it did, and when a tentative one has come, which counts for nothing.
-    now = np.array([39, 40, 41])
+    # Before it came, when it did, and when a tentative one has come, which counts for nothing; one
+    # that is carried on without looks counts.
+    now = np.array([39, 40, 41, 42])
     instant, number, state, wrong = flights.states(
-        now, np.full(3, 5.0), np.zeros(3, dtype=int), np.stack([place] * 3, axis=1)
+        now, np.full(4, 5.0), np.zeros(4, dtype=int), np.stack([place] * 4, axis=1)
     )
-    assert (instant.tolist(), number.tolist()) == ([1], [7])
+    assert (instant.tolist(), number.tolist()) == ([1, 3], [7, 9])
     # 2 s later; the sphere's plane is up to half a percent off, and the frame's down 0.1 m.
     wanted = [-400.0 + 60.0, 1000.0 + 40.0, -50.0 + 4.0, 30.0, 20.0, 2.0]
     assert state[:, 0] == pytest.approx(wanted, rel=0.006, abs=0.11)
