@@ -6,7 +6,7 @@ import pymap3d
 import pytest
 
 import dsa_des
-from components.display.outcomes import TrackSummary
+from components.display.outcomes import ManoeuvreSummary, TrackSummary
 from components.display.terminal import outcome_lines, unseen_lines
 from components.messages.state_tracks import STATUSES
 from dsa_des.block.message import Text
@@ -112,6 +112,17 @@ def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
     assert summary["manoeuvres"]["pilot"] == {
         "count": len(flown), "first_s": flown[0], "last_s": flown[-1]
     }  # fmt: skip
+
+
+def test_manoeuvres_come_piece_by_piece():
+    summary = ManoeuvreSummary(["a", "b"])
+    for codes, times_s in (([0, 1, 0], [1.0, 2.0, 3.0]), ([0, 0], [5.0, 8.0])):
+        block = Text(np.array(codes), ("a", "b"))
+        summary.update("manoeuvres", {"block": block, "time_s": np.array(times_s)})
+    assert summary.result()["manoeuvres"] == {
+        "a": {"count": 4, "first_s": 1.0, "last_s": 8.0},
+        "b": {"count": 1, "first_s": 2.0, "last_s": 2.0},
+    }
 
 
 def test_without_recorded_truth_nothing_is_said_of_it_and_without_such_blocks_nothing(configs):

@@ -38,7 +38,8 @@ SCENES = {
     ], "cues"),
     "navigation errors": ("systems/tecvol.toml", "6", [], "detections"),
     "declaration by place": ("tracking/cueing.toml", "5", [
-        *SEEN_SOON, 'blocks.radar.declare_by="place"',
+        *SEEN_SOON, 'blocks.radar.declare_by="place"', "blocks.radar.false_alarm_probability=0.4",
+        "blocks.radar.declare_m=2", "blocks.eo.declare_m=2", "blocks.eo.declare_n=3",
     ], "detections"),
     "a sweeping beam": ("avoidance/crossing.toml", "10", [
         "blocks.traffic.intruders[0].east_m=2200", "blocks.traffic.intruders[0].north_m=1700",

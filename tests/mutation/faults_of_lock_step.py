@@ -203,4 +203,39 @@ FAULTS = [
             "until_s = float(group.duration_s[0])",
         ),
     ),
+    *in_file(
+        _GROUP,
+        "components/alerting/followed_tracks.py",
+        (_TOGETHER,),
+        (
+            "tracks-of-runs-without-a-scan-go",
+            "kept = (of_scan[ends][there] != run) | (",
+            "kept = (of_scan[ends][there] == run) & (",
+        ),
+        (
+            "tracks-of-this-run-have-passed",
+            "kept & (run >= of_scan[-1])",
+            "kept & (run > of_scan[-1])",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/sensor/declaration_by_place.py",
+        (_TOGETHER,),
+        (
+            "the-latest-of-all-replicas-are-asked",
+            "np.flatnonzero(order >= len(self._memory))",
+            "np.arange(len(self._memory), len(known))",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/encounters/ending.py",
+        (_ENDED, _ENDS),
+        (
+            "who-was-there-is-forgotten",
+            "there[starts] = np.maximum(there[starts], before)",
+            "pass",
+        ),
+    ),
 ]

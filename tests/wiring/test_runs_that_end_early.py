@@ -128,6 +128,36 @@ def test_metrics_are_of_the_run_as_far_as_it_went():
     assert targets["diving"]["closest_approach"]["time_s"] < end_s
 
 
+@pytest.mark.parametrize("targets", [(BACK, crooked.ROLLING), (crooked.ROLLING, BACK)])
+def test_the_first_of_several_losses_counts_up_to_the_end(targets):
+    """Looked for between samples too; what is lost after the end is not."""
+
+    def loss_s(after_s, horizontal_m=1500, **keys):
+        asked = {"metric": "well_clear", "horizontal_m": horizontal_m, "vertical_m": 2000, **keys}
+        return measured(scene(targets, after_s=after_s), asked)["well_clear_loss_time_s"]
+
+    back_s, rolling_s = (loss_s(2, target=name) for name in ("diving", "rolling"))
+    assert back_s + 5.0 < rolling_s
+    assert loss_s(2) == back_s
+    assert loss_s(3600, horizontal_m=800) == pytest.approx(25.7, abs=0.01)
+    assert np.isnan(loss_s(2, horizontal_m=800))
+
+
+def test_an_end_is_early_only_if_it_is(tmp_path):
+    """Of one who comes nearer all the time: the closest approach is at the end."""
+    behind = {**crooked.OWNSHIP, "name": "behind", "east_m": 700, "north_m": 0, "up_m": 9}
+    for key in ("lat_deg", "lon_deg", "alt_m"):
+        del behind[key]
+    found = scene([{**behind, "heading_deg": 217.3}])
+    (tmp_path / "scene.toml").write_text(to_toml(found), encoding="utf-8")
+    base = load_scene(tmp_path / "scene.toml")
+    metric = ClosestApproach(ClosestApproach.Parameters(), base)
+    one = [Replica(1, {})]
+    ran = replicas.run_replicas(base, one, wanted=wanted_by([metric]))
+    told = metric.measure(Group(base, one, ran, wanted_by([metric])))
+    assert told["closest_approach_cut_off"].tolist() == ["at the end of the run"]
+
+
 @pytest.mark.parametrize("rules_s", [(3600.0, 2.0, 5.0, 3600.0, 8.0), (2.0, 3600.0, 3.0)])
 def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
     """Runs of a chunk share flights, batches and tables; each is measured as if it were alone."""

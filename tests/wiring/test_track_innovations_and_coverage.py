@@ -139,6 +139,7 @@ def test_coverage_is_entered_where_range_and_field_say():
         assert 0.5 < known < 5.0, name
         found = Coverage(loaded).entered_s(0.5)["diving"]
         assert found == pytest.approx(known, abs=2e-3), name
+        assert Coverage(loaded).entered_s(0.5, known - 0.1) == {}  # the run ended before
         result = measured(scene({"radar": sensor}, 6, (crooked.DIVING,)),
                           {"metric": "tracking", "step_s": 0.25})  # fmt: skip
         # Four scans a second: the third one after the entry confirms.

@@ -275,6 +275,28 @@ def test_what_cannot_be_is_refused(keys, said):
         tracks(**{"kind": keys.pop("type", "tracking.ekf"), **keys})
 
 
+@pytest.mark.parametrize("kind", TRACKERS)
+def test_who_follows_is_one_track_on_both_sides_of_astern(kind):
+    """Azimuths near 180 deg, of one sign and of the other, are of one place."""
+    level = {"heading_deg": 217.0, "speed_mps": 70.0}
+    own = {"lat_deg": -41.3, "lon_deg": 170.0, "alt_m": 2400.0, **level}
+    astern = math.radians(37.0)
+    behind = {**level, "name": "behind", "east_m": 1500 * math.sin(astern),
+              "north_m": 1500 * math.cos(astern), "up_m": 0.0}  # fmt: skip
+    radar = {
+        "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
+        "quantised": False, "azimuth_error_deg": 0.5, "elevation_error_deg": 0.5,
+        "range_error_m": 10.0, "azimuth_deg": [-180, 180],
+    }  # fmt: skip
+    scene = chain({"radar": radar}, ownship=own, targets=[behind], duration_s=6, fusion=PASS,
+                  tracker={"type": kind})  # fmt: skip
+    found = run(scene)
+    assert {math.copysign(1, row["azimuth_rad"]) for row in rows(found)} == {-1.0, 1.0}
+    told = rows(found, "state_tracks")
+    assert {row["track"] for row in told} == {1}
+    assert {row["track_status"] for row in told} == {"tentative", "confirmed"}
+
+
 def test_jpda_lives_with_looks_whose_detections_fall_just_beside_every_gate():
     """Attitude that errs beyond the stated variances: near enough to be compared, and too far."""
     scene = chain(
