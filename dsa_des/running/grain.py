@@ -1,5 +1,6 @@
 """At which grain each block of a scene runs: scan by scan, in windows, or in windows rewound."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from dsa_des.errors import SceneError
@@ -40,9 +41,9 @@ class Grain:
     rehearsed: bool = False
     ahead: set[str] = field(default_factory=set)
 
-    def order(self, scene: Scene) -> dict[str, int]:
+    def order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
         """Return the place of each block and each queue in a window (`window_order`)."""
-        return window_order(scene.graph, self.windowed, self.cut_edges, self.queues)
+        return window_order(scene.graph, self.windowed, self.cut_edges, self.queues, first)
 
 
 def grain_of(scene: Scene, window: int | None, check_rewinding: bool) -> Grain:

@@ -45,12 +45,12 @@ def build_nodes(
         See `Simulation`.
     """
     scene = timeline.scene
-    depth, order = depths(scene.graph), grain.order(scene)
+    # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
+    ending = [name for name, block in components.items() if ends_its_run(type(block))]
+    depth, order = depths(scene.graph, ending), grain.order(scene, ending)
     shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
     nodes = {}
-    # Who ends runs comes first in its depth: who comes later need not run beyond the end.
-    ordered = sorted(components.items(), key=lambda i: (not ends_its_run(type(i[1])), i[0]))
-    for number, (name, component) in enumerate(ordered):
+    for number, (name, component) in enumerate(sorted(components.items())):
         windowed = name in grain.windowed
         base = WINDOW_PRIORITY + order[name] if windowed else DEPTH_PRIORITY + depth[name]
         by_name = base + number / (len(components) + 1)

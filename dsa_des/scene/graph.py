@@ -125,13 +125,22 @@ def in_cycles(graph: nx.DiGraph) -> dict[str, int]:
     return looped
 
 
-def depths(graph: nx.DiGraph) -> dict[str, int]:
-    """Return the depth of each block: the longest path to it over undelayed edges."""
-    now = undelayed(graph)
+def depths(graph: nx.DiGraph, first: Collection[str] = ()) -> dict[str, int]:
+    """Return the depth of each block: the longest path to it over undelayed edges.
+
+    Whatever the blocks in `first` do not depend on is deeper than they are.
+    """
+    return _depths(undelayed(graph), first)
+
+
+def _depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:
     depth: dict[str, int] = {}
-    for name in nx.topological_sort(now):
-        depth[name] = max((depth[before] + 1 for before in now.predecessors(name)), default=0)
-    return depth
+    for name in nx.topological_sort(graph):
+        depth[name] = max((depth[before] + 1 for before in graph.predecessors(name)), default=0)
+    mine = set(first).intersection(graph)
+    needed = mine.union(*(nx.ancestors(graph, name) for name in mine))
+    later = 1 + max((depth[name] for name in mine), default=-1)
+    return {name: place if name in needed else place + later for name, place in depth.items()}
 
 
 def windowed_blocks(
@@ -159,21 +168,19 @@ def window_order(
     windowed: set[str],
     cut: Collection[tuple[str, str]] = (),
     queues: Mapping[str, Collection[str]] | None = None,
+    first: Collection[str] = (),
 ) -> dict[str, int]:
     """Return the depth of windowed blocks over all their edges, delayed ones included.
 
     A window is handled block by block, so a sender must be done with it before its receiver
     starts, whatever the delay between them; over the edges in `cut` it need not be. A queue (name
     to the blocks that line up in it) comes after all of its blocks and before their receivers; its
-    depth stands under `queue_key`.
+    depth stands under `queue_key`. Whatever the blocks in `first` do not depend on is deeper.
     """
     part = nx.DiGraph(graph.subgraph(windowed))
     part.remove_edges_from(cut)
     part = with_queues(part, queues or {})
-    depth: dict[str, int] = {}
-    for name in nx.topological_sort(part):
-        depth[name] = max((depth[before] + 1 for before in part.predecessors(name)), default=0)
-    return depth
+    return _depths(part, first)
 
 
 def queue_key(name: str) -> str:

@@ -118,6 +118,26 @@ def test_a_single_run_ends_at_the_same_tick_in_any_window(lock, tmp_path, text, 
     assert first == second
 
 
+def test_what_is_under_way_at_the_end_does_not_come(lock, tmp_path):
+    """Messages are under way for a second: some would come at the very end, others later."""
+    text = HEAD_ON
+    for source, target in (("radar", "fusion"), ("fusion", "tracker")):
+        wire = f'{{{{ from = "{source}", to = "{target}", delay_s = 1 }}}}'
+        text = text.replace(f'"{source} -> {target}"', wire)
+    text += (
+        '[blocks.fusion]\ntype = "fusion.pass_through"\n[blocks.tracker]\ntype = "tracking.ekf"\n'
+    )
+    NEAR[text] = NEAR[HEAD_ON]
+    scene = loaded(tmp_path, text)
+    simulation = lock.same_as_alone(lock.replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0}))
+    assert simulation.ends.early
+    one, first = lock.tables_of(Simulation, scene)
+    assert first["state_tracks"].num_rows > 0
+    _, second = lock.tables_of(Simulation, scene, window=1)
+    assert first == second
+    assert one.recorder.rows == {name: table.num_rows for name, table in first.items()}
+
+
 def test_an_end_found_in_a_window_that_is_undone_does_not_count(tmp_path):
     """Every window runs twice; the second time nothing is known of the end that was found."""
     text = HEAD_ON.replace(

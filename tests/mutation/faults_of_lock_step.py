@@ -4,6 +4,8 @@ from fault import in_file
 
 _GROUP = "lock step"
 _TOGETHER = "lockstep/test_what_runs_together.py"
+_ENDS = "lockstep/test_runs_that_end_early.py"
+_ENDED = "wiring/test_runs_that_end_early.py"
 
 FAULTS = [
     *in_file(
@@ -98,5 +100,107 @@ FAULTS = [
             "nanosecond_of(states.tick, block",
         ),
         ("noise-of-the-first-seed", "stream.of_rows(replica)", "stream.of_rows(0 * replica)"),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/running/nodes.py",
+        (_ENDED,),
+        ("sensors-run-at-the-end", "depths(scene.graph, ending)", "depths(scene.graph)"),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/running/node.py",
+        (_ENDED, _ENDS),
+        (
+            "scan-by-scan-at-the-end",
+            "if ends.early and ends.passed(tick, tick + 1):",
+            "if ends.early and ends.passed(tick - 1, tick):",
+        ),
+        (
+            "all-that-is-under-way-comes",
+            "scans[kept], ends.cut(end)",
+            "scans[kept], end",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/channel.py",
+        (_ENDS,),
+        (
+            "what-is-under-way-comes-to-replicas",
+            "kept = self._ends.before(found[0])\n        if kept.all():",
+            "kept = self._ends.before(found[0])\n        if len(kept):",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/record/recording.py",
+        (_ENDS,),
+        (
+            "rows-counted-past-the-end",
+            "self.rows[table] += count",
+            "self.rows[table] += len(ticks)",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/replicas.py",
+        (_ENDED,),
+        ("all-ended-early", "n in ended,\n            shared", "bool(ended),\n            shared"),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/drawn_columns.py",
+        ("studies/test_drawn_columns.py",),
+        (
+            "differing-by-the-last",
+            "any(v != column.values[0] for v in column.values)",
+            "column.values[-1] != column.values[0]",
+        ),
+        (
+            "two-names-of-one-key",
+            ") < len(columns):\n            return None",
+            ") < 0:\n            return None",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/studies/metric.py",
+        (_ENDED,),
+        (
+            "second-batch-as-the-first",
+            '"replica": columns["replica"] + start if start else',
+            '"replica": columns["replica"] if start else',
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/arrays/sorted_union.py",
+        ("engine/test_places_in_order.py",),
+        (
+            "a-guess-is-not-checked",
+            "if guess is not None and bool(np.array_equal(values[guess], asked)):",
+            "if guess is not None:",
+        ),
+        (
+            "guessed-among-equal-values",
+            "len(asked) < _WORTH_A_GUESS or not bool((values[1:] > values[:-1]).all()):",
+            "len(asked) < _WORTH_A_GUESS:",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/metrics/encounter.py",
+        (_ENDED,),
+        (
+            "ended-early-as-the-first",
+            "to_the_end and group.ended_early[number]",
+            "to_the_end and group.ended_early[0]",
+        ),
+        (
+            "until-the-end-of-the-first",
+            "until_s = float(group.duration_s[number])",
+            "until_s = float(group.duration_s[0])",
+        ),
     ),
 ]

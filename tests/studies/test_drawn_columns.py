@@ -28,6 +28,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "seeds only": {},
     "offsets": {"radar.offset_s": lambda k: Fraction(k, 10**3),
                 "ir.offset_s": lambda k: Fraction(0)},
+    "the last as the first": {"radar.offset_s": lambda k: Fraction(k % (_MANY - 1), 10**3)},
     "in a list": {"traffic.intruders[0].east_m": lambda k: 0.25 * k - 1.0,
                   "traffic.intruders.one.speed_mps": lambda k: 50 + k},
     "of several tables": {"traffic.ownship.heading_deg": lambda k: 3.0 * k,
@@ -50,7 +51,14 @@ def test_scenes_are_those_of_each_replica_by_itself(small: Path, drawn: dict[str
                 assert repr(mine) == repr(block.parameters)  # a float where one by one is one
                 assert mine.model_fields_set == block.parameters.model_fields_set
     for name in base.blocks:
-        assert together.parameters_of(name) == [s.blocks[name].parameters for s in together]
+        mine = [scene.blocks[name].parameters for scene in together]
+        assert together.parameters_of(name) == mine
+        fields = type(mine[0]).model_fields
+        assert together.differing(name) == {
+            field
+            for field in fields
+            if any(getattr(p, field) != getattr(mine[0], field) for p in mine)
+        }
 
 
 #: What is not checked as columns: a table, a value of no number, an option of the engine, one that
@@ -61,6 +69,10 @@ ONE_BY_ONE: dict[str, dict[str, Any]] = {
     "a rate": {"radar.scan_rate_hz": lambda k: Fraction(5 + k)},
     "ticks of their own": {"radar.offset_s": lambda k: Fraction(1, 7)},
     "a truth": {"radar.enabled": lambda k: k % 2 == 0},
+    "one of two names": {
+        "traffic.intruders[0].speed_mps": lambda k: 50.0 + k,
+        "traffic.intruders.one.speed_mps": lambda k: 60.0 + k,
+    },
     "a whole table": {"traffic.intruders[0]": lambda k: {"name": "one"}},
 }
 

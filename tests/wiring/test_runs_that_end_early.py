@@ -7,6 +7,14 @@ from covering import covers
 from wired import chain, measured, rows, run, sensor
 
 import dsa_des
+from components.metrics.encounter import ClosestApproach, WellClear
+from components.metrics.severity import Severity
+from dsa_des.files.toml_text import to_toml
+from dsa_des.replicas import replicas
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import load_scene
+from dsa_des.studies.metric import Group, wanted_by
 
 KIND = ("encounters.closest_approach_passed",)
 MEANT_S = 40.0
@@ -97,16 +105,19 @@ def test_the_last_one_to_pass_decides_and_who_stays_near_holds_the_run():
     assert run(scene([*crooked.TARGETS, closing], after_s=2)).info["duration_s"] == MEANT_S
 
 
+#: A target that is passed, turns round fast and comes nearer than before, but later.
+BACK = {
+    **crooked.DIVING, "climb_mps": 0.0, "up_m": -40.0, "heading_deg": 300.0, "speed_mps": 150,
+    "legs": [
+        {"kind": "straight", "duration_s": 15},
+        {"kind": "turn", "rate_deg_s": -25, "angle_deg": 200},
+        {"kind": "straight"},
+    ],
+}  # fmt: skip
+
+
 def test_metrics_are_of_the_run_as_far_as_it_went():
-    """A target that is passed, turns round fast and comes nearer than before, but later."""
-    back = {
-        **crooked.DIVING, "climb_mps": 0.0, "up_m": -40.0, "heading_deg": 300.0, "speed_mps": 150,
-        "legs": [
-            {"kind": "straight", "duration_s": 15},
-            {"kind": "turn", "rate_deg_s": -25, "angle_deg": 200},
-            {"kind": "straight"},
-        ],
-    }  # fmt: skip
+    back = BACK
     early = scene([back], after_s=2)
     end_s = run(early).info["duration_s"]
     asked = ("closest_approach", {"metric": "well_clear", "horizontal_m": 2000, "vertical_m": 900})
@@ -115,6 +126,34 @@ def test_metrics_are_of_the_run_as_far_as_it_went():
     assert found["closest_approach_m"] > whole["closest_approach_m"]
     targets = run(early).info["summary"]["targets"]
     assert targets["diving"]["closest_approach"]["time_s"] < end_s
+
+
+@pytest.mark.parametrize("rules_s", [(3600.0, 2.0, 5.0, 3600.0, 8.0), (2.0, 3600.0, 3.0)])
+def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
+    """Runs of a chunk share flights, batches and tables; each is measured as if it were alone."""
+    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 2)
+    wanted = scene([BACK, crooked.ROLLING])
+    (tmp_path / "scene.toml").write_text(to_toml(wanted), encoding="utf-8")
+    base = load_scene(tmp_path / "scene.toml")
+    limits = {"horizontal_m": 2000, "vertical_m": 900}
+    metrics = [
+        ClosestApproach(ClosestApproach.Parameters(), base),
+        WellClear(WellClear.Parameters(**limits), base),
+        Severity(Severity.Parameters(**limits), base),
+    ]
+
+    def results(some):
+        ran = replicas.run_replicas(base, some, wanted=wanted_by(metrics))
+        rules = [one.changes["blocks.over.after_s"] for one in some]
+        assert [run.ended_early for run in ran] == [rule < MEANT_S for rule in rules]
+        group = Group(base, some, ran, wanted_by(metrics))
+        return {k: v for metric in metrics for k, v in metric.measure(group).items()}
+
+    runs = [Replica(k, {"blocks.over.after_s": rule}) for k, rule in enumerate(rules_s)]
+    together, each = results(runs), [results([one]) for one in runs]
+    for name, values in together.items():
+        assert values.tolist() == pytest.approx([one[name][0] for one in each], nan_ok=True), name
+    assert len({*together["closest_approach_m"]}) > 1
 
 
 def test_who_is_gone_has_passed_and_who_is_yet_to_come_has_not(tmp_path):
@@ -128,6 +167,26 @@ def test_who_is_gone_has_passed_and_who_is_yet_to_come_has_not(tmp_path):
     found["blocks"]["traffic"] = {"type": "traffic.csv", "file": path, "ownship": "own"}
     # At 15 s it is there for the first time; from then on it goes, for 3 s and more.
     assert run(found).info["duration_s"] == 18.0
+    for window in (1, 5):  # it remembers who has been there
+        assert simulated(found, tmp_path, window=window).run().duration_s == 18.0
+
+
+@pytest.mark.parametrize("window", [None, 1])
+def test_nobody_runs_at_the_end(tmp_path, window):
+    """A radar whose first scan is at that instant, and hears of it without waiting for anybody."""
+    found = scene(after_s=2)
+    end_s = run(found).info["duration_s"]
+    found["blocks"]["radar"] |= {"offset_s": end_s, "declare_m": 1, "declare_n": 1}
+    found["wires"].remove("gate -> radar")
+    found["wires"].append({"from": "gate", "to": "radar", "delay_s": 0.1})
+    simulation = simulated(found, tmp_path, window=window)
+    assert simulation.run().report["declarations"] == {"radar": {}}
+
+
+def simulated(tables, tmp_path, **options):
+    path = tmp_path / "scene.toml"
+    path.write_text(to_toml(tables), encoding="utf-8")
+    return Simulation(load_scene(path), **options)
 
 
 @pytest.mark.parametrize("processor", [None, "cpu"])
