@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from components.encounters.any_format import SET
 from components.encounters.made_encounters import made_set, read_recipe
 from components.encounters.pair_densities import PairingRules, StepDensity
 from components.encounters.pair_sets import set_of_pairs
@@ -13,7 +14,7 @@ from components.encounters.sample_command import open_model
 from components.encounters.set_file import set_writer
 from components.encounters.track_rules import TrackError
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file
+from dsa_des.files.output_file import check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
 
@@ -52,6 +53,7 @@ def generate_set(
     own = open_model(model)
     intruder = own if intruder_model is None else open_model(intruder_model)
     path = named(out)
+    check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
@@ -100,6 +102,7 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
 def _write_made(made: str, out: str) -> None:
     recipe = read_recipe(made)
     path = named(out)
+    check_ending(path, [SET])
     check_file(path)
     found = made_set(recipe)
     try:

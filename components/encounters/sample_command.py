@@ -47,6 +47,10 @@ def sample_tracks(
     path = named(out)
     check_file(path)
     seconds = int(duration_s)
+    if seconds != duration_s:
+        raise UsageError(
+            f"--duration-s {duration_s:g}: must be a whole number, as tracks have 1 Hz"
+        )
     batches = _raw(found, seed, range(first, first + count), seconds)
     if not raw:
         batches = _flown(found, seed, range(first, first + count), seconds, dynamics)

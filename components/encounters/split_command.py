@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from components.encounters.any_format import SET
 from components.encounters.encounter_set import EncounterSet
 from components.encounters.set_file import EncounterSetError, read_set, set_writer
 from components.encounters.splitting import expected_copies, nearness, split_set
@@ -11,7 +12,7 @@ from components.encounters.table_file import kept_rows, numbers, read_table
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, resolve_home
-from dsa_des.files.output_file import check_file
+from dsa_des.files.output_file import check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
 
@@ -37,6 +38,7 @@ def split_encounters(
     if (scores is None) != (score is None):
         raise UsageError("--scores TABLE and --score COLUMN belong together: give both, or neither")
     path = named(out)
+    check_ending(path, [SET])
     check_file(path)
     try:
         found = read_set(resolve_home(file))

@@ -104,3 +104,8 @@ def test_errors_leave_nothing_behind(model: Path, tmp_path: Path) -> None:
     assert done.exit_code == 2 and f"error: {model}: " in done.stderr
     assert "Traceback" not in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["small.txt"]
+
+
+def test_tracks_last_whole_seconds(model: Path, tmp_path: Path) -> None:
+    done = call(model, tmp_path / "t.csv", "--count", 1, "--duration-s", 4.5, "--raw")
+    assert done.exit_code == 2 and "--duration-s 4.5: must be a whole number" in done.stderr

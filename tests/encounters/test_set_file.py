@@ -191,3 +191,14 @@ def test_densities_that_are_none(words, said: str, model: Path, tmp_path: Path) 
     out = tmp_path / "s.parquet"
     done = call("generate", "--model", model, "--count", 2, "--out", out, *words)
     assert done.exit_code == 2 and said in done.stderr and not out.exists()
+
+
+def test_sets_are_written_to_names_of_sets(model: Path, tmp_path: Path) -> None:
+    out = tmp_path / "s.bin"
+    for words in (("generate", "--model", model, "--count", 2), ("split", out, "--levels", "8",
+                  "--copies", "1,2")):  # fmt: skip
+        done = call(*words, "--out", out)
+        assert (
+            done.exit_code == 2 and "s.bin: a name that ends in .parquet is needed" in done.stderr
+        )
+        assert not out.exists()
