@@ -183,4 +183,28 @@ FAULTS = [
         ("variances-of-the-look-s-first", "variances[:, rows_of], says)",
          "variances[:, [rows_of[0]] * len(rows_of)] if rows_of else variances[:, rows_of], says)"),
     ),
+    *in_file(
+        _GROUP,
+        "components/metrics/coverage.py",
+        (_COVER,),
+        ("entered-after-the-end", "end_s = min(self.duration_s, until_s)", "end_s = self.duration_s"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/tracking/gated_pairs.py",
+        ("wiring/test_tracker_keys.py",),
+        ("astern-is-two-places", "inside |= apart >= 2.0 * np.pi", "pass"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/estimated_flights.py",
+        ("wiring/test_alerts_of_estimates.py",),
+        ("coasted-tracks-alert-of-nothing", "(CONFIRMED, COASTED))", "(CONFIRMED,))"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/display/outcomes.py",
+        ("display/test_outcomes.py",),
+        ("last-manoeuvre-is-the-first", "float(time_s[rows[-1]])", "float(time_s[rows[0]])"),
+    ),
 ]  # fmt: skip
