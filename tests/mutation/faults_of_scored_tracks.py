@@ -187,7 +187,7 @@ FAULTS = [
         _GROUP,
         "components/metrics/coverage.py",
         (_COVER,),
-        ("entered-after-the-end", "end_s = min(self.duration_s, until_s)", "end_s = self.duration_s"),
+        ("entered-later", "min(self.duration_s, until_s)", "self.duration_s"),
     ),
     *in_file(
         _GROUP,
