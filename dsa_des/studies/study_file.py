@@ -231,7 +231,8 @@ class _StudyReader:
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
             except SceneError as error:  # what else is wrong is then said of the scene as it is
-                self.problems += error.problems
+                known = {str(problem) for problem in self.problems}
+                self.problems += [one for one in error.problems if str(one) not in known]
         return None, None
 
     # -- axes and draws --------------------------------------------------------------------

@@ -171,3 +171,10 @@ def test_one_damaged_encounter_of_many_stops_no_study(tmp_path: Path, configs: P
         read_study(study, sets=[files])
     (tmp_path / "b.daa").write_text(good)
     assert len(read_study(study, sets=[files]).axes[0].labels) == 2
+
+
+def test_what_is_wrong_with_the_scene_is_said_once(small: Path) -> None:
+    Path("study.toml").write_text('scene = "small.toml"\nmetrics = ["first_detection"]\n')
+    text = Path("small.toml").read_text()
+    Path("small.toml").write_text(text.replace("[blocks.radar]", "[blocks.radar]\nofset_s = 1", 1))
+    assert refused("study.toml").count("blocks.radar.ofset_s") == 1
