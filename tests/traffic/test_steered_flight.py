@@ -7,6 +7,7 @@ import pytest
 
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
+from components.metrics.steered import flown_as_told
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.steered_flight import SteeredFlight
 
@@ -102,3 +103,15 @@ def test_a_speed_does_not_become_negative():
     told = Manoeuvre(speed_mps=-80.0, acceleration_mps2=4.0)
     state = SteeredFlight(STRAIGHT).steered(0.0, told).at(np.array([16.0, 50.0]))
     assert state.lon_deg[0] == state.lon_deg[1]
+
+
+def test_who_is_told_more_often_than_others_flies_as_if_alone():
+    left, right = Manoeuvre(-0.5, 0.05), Manoeuvre(0.4, 0.05)
+    told = [[(10.0, left)], [(5.0, right), (30.0, left)], [(8.0, left), (9.0, right), (40.0, left)]]
+    times = np.linspace(0.0, 80.0, 33)
+    for one, found in zip(told, flown_as_told([STRAIGHT] * 3, told), strict=True):
+        alone = SteeredFlight(STRAIGHT)
+        for time_s, manoeuvre in one:
+            alone = alone.steered(time_s, manoeuvre)
+        for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
+            assert np.array_equal(got, expected)
