@@ -193,13 +193,19 @@ def test_compare_makes_its_folder_first_and_removes_it_if_nothing_came(
 def test_graph_replaces_links_and_no_devices(places: Path, first_light: Path) -> None:
     (places / "precious").write_text("work")
     (places / "graph.png").symlink_to("precious")
-    for name in ("graph.png", "dangling"):
+    (places / "dangling.png").symlink_to("nowhere")
+    for name in ("graph.png", "dangling.png"):
         assert call("graph", first_light, "--png", "--out", name).exit_code == 0
         assert not (places / name).is_symlink()
         assert (places / name).read_bytes().startswith(b"\x89PNG")
     assert (places / "precious").read_text() == "work" and not (places / "nowhere").exists()
+    os.mkfifo(places / "pipe.png")
+    (places / "run.png").mkdir()
+    for link, end in (("link.png", "run.png"), ("loop.png", "loop.png")):
+        (places / link).symlink_to(end)
     before = everything_in(places)
-    for name in ("pipe", "run", "link", "no/x.png", "a" * 300, "loop", ""):
+    ending = ("pipe.png", "run.png", "link.png", "no/x.png", "a" * 300 + ".png", "loop.png")
+    for name in (*ending, "pipe", "run", ""):
         result = call("graph", first_light, "--png", "--out", name)
         assert result.exit_code == 2, (name, result.output)
         assert len(result.stderr.splitlines()) == 1

@@ -1,6 +1,7 @@
 """Analytic answers of timing metrics: against simulation, against brute force, and as axes."""
 
 import math
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_inte
 from dsa_des.cli import main
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.identity import description
+from dsa_des.studies.identity import description, record_of
 from dsa_des.studies.output import Tables
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
@@ -24,20 +25,22 @@ TICKS = 10**9
 
 
 class Finished:
-    """A study's folder in memory: every part is run when the results are asked for."""
+    """A study's folder in memory: every part is run when it is made."""
 
     def __init__(self, study: Study) -> None:
-        self.study = study
+        self.study, self.record = study, record_of(study)
+        chunks = study.chunks(0, range(len(study.cells)))
+        self.parts = [run_chunk(study, chunk).content for chunk in chunks]
 
-    def results(self) -> object:
+    def each_part(
+        self, before_round: int | None = None, columns: Sequence[str] | None = None
+    ) -> Iterator[object]:
         import io
 
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        chunks = self.study.chunks(0, range(len(self.study.cells)))
-        parts = [io.BytesIO(run_chunk(self.study, chunk).content) for chunk in chunks]
-        return pa.concat_tables([pq.read_table(part) for part in parts])
+        for part in self.parts:
+            yield pq.read_table(io.BytesIO(part), columns=columns)
 
 
 def lines_of(name: str, *sets: str) -> dict[tuple[str, tuple[object, ...]], object]:
