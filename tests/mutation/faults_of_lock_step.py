@@ -238,4 +238,25 @@ FAULTS = [
             "pass",
         ),
     ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/channel.py",
+        ("lockstep/test_what_inputs_hold.py",),
+        (
+            "the-first-tells-for-all",
+            "return self._ends.running(np.unique(replica)) == self._ends.running(every)",
+            "return True",
+        ),
+        (
+            "the-very-start-is-not-kept",
+            "np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span))",
+            'np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span, side="right"))',
+        ),
+        (
+            "the-oldest-goes-unremembered",
+            "elif len(self._passed) > _MOST_PASSED:\n                    self._remember()",
+            "elif len(self._passed) > _MOST_PASSED:\n"
+            "                    self._passed = self._passed[1:]",
+        ),
+    ),
 ]
