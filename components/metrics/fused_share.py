@@ -21,6 +21,7 @@ from components.metrics.rows import (
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Text
+from dsa_des.block.run_end import ends_its_run
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
 from dsa_des.time.clock import ClockSpec
@@ -82,7 +83,8 @@ class FusedShare(TargetMetric):
         """Return the share of two periodic clocks, if every scan detects.
 
         Exact clocks are counted in rational numbers, in the long run; of clocks that jitter or
-        drift it is the expected share of this run.
+        drift it is the expected share of this run, and there is none where a block may end the run
+        before its time.
         """
         fusion = scene.blocks[self.fusion].parameters
         gate = getattr(fusion, "coincidence_s", getattr(fusion, "time_gate_s", None))
@@ -113,7 +115,8 @@ def _expected_share(
     """Return the share of one clock's scans that meet the other's; each with its delay (s)."""
     (own, delay_s), (theirs, other_delay_s) = one, other
     if any(clock.jitter_s or clock.rate_error_ppm for clock in (own, theirs)):
-        if scene.duration_s is None:
+        # How long a run is that a block may end is not known before it.
+        if scene.duration_s is None or any(ends_its_run(b.cls) for b in scene.blocks.values()):
             return None
         return mean_coincidence_share(
             own,

@@ -169,7 +169,8 @@ class TrackTally:
         found["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
         there = [name for name in covered_s if names.index(name) in self.steps_present]
         found["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
-        found["track_false_per_hour"] = 3600.0 * len(self.confirmed - self.owned) / duration_s
+        false = len(self.confirmed - self.owned)
+        found["track_false_per_hour"] = _ratio(3600.0 * false, duration_s)
         return found
 
     def last_nees(self, after_s: float, up_to_s: float) -> float:

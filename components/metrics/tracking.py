@@ -169,7 +169,7 @@ class Tracking(Metric):
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
         place = np.searchsorted(instants, grid, side="right") - 1
         told = np.unique(place[(place >= 0) & (grid >= self.p.from_s)])
-        kept = held & columns["has_range"]
+        kept = held & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
         confirmed = _first_of_each(columns, rows[kept[rows]])
         messages = [rows[start[i] : ends[i]] for i in told.tolist()]
         messages = [m[kept[m]] for m in messages]

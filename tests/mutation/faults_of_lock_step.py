@@ -4,6 +4,7 @@ from fault import in_file
 
 _GROUP = "lock step"
 _TOGETHER = "lockstep/test_what_runs_together.py"
+_MEMORIES = "lockstep/test_memories_of_replicas.py"
 _ENDS = "lockstep/test_runs_that_end_early.py"
 _ENDED = "wiring/test_runs_that_end_early.py"
 
@@ -236,6 +237,63 @@ FAULTS = [
             "who-was-there-is-forgotten",
             "there[starts] = np.maximum(there[starts], before)",
             "pass",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/channel.py",
+        ("lockstep/test_what_inputs_hold.py",),
+        (
+            "the-first-tells-for-all",
+            "return self._ends.running(np.unique(replica)) == self._ends.running(every)",
+            "return True",
+        ),
+        (
+            "the-very-start-is-not-kept",
+            "np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span))",
+            'np.searchsorted(arrivals, ticks[-1] - ticks[-1] % self._span, side="right"))',
+        ),
+        (
+            "the-oldest-goes-unremembered",
+            "elif len(self._passed) > _MOST_PASSED:\n                    self._remember()",
+            "elif len(self._passed) > _MOST_PASSED:\n"
+            "                    self._passed = self._passed[1:]",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/sensor/declaration_by_place.py",
+        (_MEMORIES,),
+        (
+            "places-go-by-another-replica",
+            "np.where(split_scans(last)[0] == split_scans(known.scan)[0], last, known.scan)",
+            "last",
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/track_memory.py",
+        (_MEMORIES,),
+        ("tracks-go-by-the-first-run", "times_s[last] - self._seen_s", "times_s[0] - self._seen_s"),
+    ),
+    *in_file(
+        _GROUP,
+        "components/alerting/followed_tracks.py",
+        (_MEMORIES,),
+        (
+            "named-by-the-look-before",
+            'np.searchsorted(self._true_came, ticks, side="right") - 1, 0)',
+            'np.searchsorted(self._true_came, ticks, side="left") - 1, 0)',
+        ),
+    ),
+    *in_file(
+        _GROUP,
+        "dsa_des/replicas/lockstep.py",
+        (_MEMORIES,),
+        (
+            "reports-of-the-first-end",
+            "int(self.ends.ticks[number]), self.scene",
+            "int(self.ends.ticks[0]), self.scene",
         ),
     ),
 ]

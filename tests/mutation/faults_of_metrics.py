@@ -7,6 +7,7 @@ _SEPARATION = "wiring/test_separation_metrics.py"
 _KEYS = "wiring/test_metric_keys.py"
 _BY_HAND = "studies/test_metrics_by_hand.py"
 _EACH = "wiring/test_metrics_of_each_flight.py"
+_MIXED = "wiring/test_metrics_of_mixed_chunks.py"
 _SEVERAL = "wiring/test_metrics_of_several_targets.py"
 
 FAULTS = [
@@ -269,5 +270,35 @@ FAULTS = [
          "mitigated = read_flights(group, self.p.step_s, None, read, told)[:2]",
          "mitigated = read_flights(group, self.p.step_s, None, read, "
          "{0: told[0]} if 0 in told else {})[:2]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/encounter.py", (_MIXED,),
+        ("steered-from-the-first-ownship", "[runs[place[number]][0].own for number in steered]",
+         "[runs[0][0].own for number in steered]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/steered.py", (_MIXED,),
+        ("told-after-the-end", "if came_s < group.duration_s[replica]:", "if True:"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/flights_together.py", (_MIXED,),
+        ("losses-of-other-flights", "found[rows[some], k]", "found[rows[: len(some)], k]"),
+        ("times-of-the-first-flight",
+         "grids.setdefault((flight.step_s, flight.grid_end_s), [])",
+         "grids.setdefault((flight.step_s, flights[0].grid_end_s), [])"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/alert_times.py", (_MIXED,),
+        ("losses-after-an-early-end", "parameters.steered or all(", "parameters.steered and all("),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/run_ends.py", (_MIXED,),
+        ("only-the-first-rows-are-looked-at", "left = left[~seen & inside[:, -1]]",
+         "left = left[:0]"),
+    ),
+    *in_file(
+        _GROUP, "components/metrics/rows.py", (_MIXED,),
+        ("two-at-an-instant-at-most", "place = place[same] + 1",
+         "place = place[same] + 1 if place is starts else place[:0]"),
     ),
 ]  # fmt: skip

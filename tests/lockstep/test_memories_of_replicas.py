@@ -1,0 +1,93 @@
+"""What blocks remember of replicas whose instants differ, and what they report of each."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from components.alerting.followed_tracks import FollowedTracks
+from components.alerting.memory import MemoryRule
+from components.alerting.track_memory import TrackMemory
+from components.tracking.stub import TrackerStub
+from dsa_des.files.toml_text import to_toml
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.scene.scene import load_scene
+
+SETS = [
+    "blocks.eo.scan_rate_hz=4", "blocks.traffic.intruders[0].north_m=6000",
+    'blocks.radar.declare_by="place"', "blocks.radar.false_alarm_probability=0.4",
+    "blocks.radar.declare_m=2", "blocks.radar.declare_n=4", "blocks.radar.scan_rate_hz=1",
+]  # fmt: skip
+
+OVER = {"type": "encounters.closest_approach_passed", "after_s": 2}
+WIRES = """\
+wires = [
+  "traffic -> transform -> gate", "gate -> radar", "gate -> eo", "gate -> ir",
+  "radar -> fusion", "eo -> fusion", "ir -> fusion", "fusion -> tracker", "traffic -> over",
+]
+"""
+
+
+def test_places_of_a_replica_that_has_no_scan_for_a_while(lock):
+    """Half a second at a time; the first replica is the one that is left out at first."""
+    scene = load_scene("configs/tracking/cueing.toml", duration_s="5", sets=SETS)
+    phases = [{"blocks.radar.offset_s": Fraction(tenths, 10)} for tenths in (7, 1, 6)]
+    scenes = lock.replicas_of(scene, *phases)
+    assert not lock.same_as_alone(scenes, window=11).timeline.split
+    _, tables = lock.tables_of(lock_step, scenes)
+    found = tables["detections"].to_pylist()
+    mine = [row["declared"] for row in found if row["block"] == "radar" and row["replica"] == 0]
+    assert {*mine} == {True, False}
+
+
+def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
+    """Two targets change places from one look to the next."""
+    tracks = FollowedTracks()
+    here, there = [0.0, 0.0, 0.0], [500.0, 0.0, 0.0]
+    tracks.add_truth(
+        np.array([10, 20, 30]), np.array([[here, there], [there, here], [here, there]])
+    )
+    named = tracks._nearest(np.array([10, 15, 20, 29, 30]), np.full((5, 3), 10.0))
+    assert named.tolist() == [0, 0, 1, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("times_s", "left"), [((3.0, 14.0), 2), ((3.0, 12.0), 3), ((9.0, 12.0), 2)]
+)
+def test_tracks_are_gone_by_the_time_of_their_own_run(times_s, left):
+    """A run is at 0 s when another one is at 8 s, and a third has no scan at all."""
+    memory = TrackMemory(MemoryRule(hysteresis_s=5.0, persistence_s=0.0, m=0, n=1))
+    due = np.ones((3, 2), dtype=bool)
+    memory.levels(np.array([0, 1, 2]), np.full(3, 7), np.array([0.0, 8.0, 0.0]), due, due)
+    memory.forget(np.array([0, 1]), np.array(times_s))
+    assert len(memory) == left
+
+
+class OfAStranger(TrackerStub):
+    """Knows nothing of replicas, and reports how long its run was."""
+
+    def report(self):
+        return {"lasted_s": {"here": float(self.context.duration_s)}}
+
+
+def test_each_of_split_blocks_reports_of_its_own_length(tmp_path):
+    extended = str(Path("configs/benchmark/monte_carlo.toml").resolve())
+    kinds = {"over": OVER, "tracker": {"type": f"{__name__}:OfAStranger"}}
+    text = to_toml({"extends": extended, "duration_s": 40, "blocks": kinds})
+    text = text.replace("[blocks", f"{WIRES}\n[blocks", 1)
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    near = ["blocks.traffic.intruders[0].north_m=1300"]
+    base, told = load_scene(tmp_path / "scene.toml", sets=near), {}
+    rules = [{"blocks.over.after_s": Fraction(after_s)} for after_s in (2, 5, 300)]
+    simulation = lock_step(
+        [scene_of(base, Replica(4 + k, rule)) for k, rule in enumerate(rules)],
+        report=lambda number, said: told.update({(number, *said): said}) if said else None,
+    )
+    simulation.run()
+    assert "tracker" in simulation.timeline.split
+    ends_s = (simulation.ends.ticks / simulation.ticks_per_s).tolist()
+    assert len({*ends_s}) == 3
+    lasted = {key[0]: said["lasted_s"]["here"] for key, said in told.items() if "lasted_s" in said}
+    assert lasted == dict(enumerate(ends_s))
