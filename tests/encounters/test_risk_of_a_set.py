@@ -60,7 +60,6 @@ def test_weights_families_and_classes_count(tmp_path: Path) -> None:
     dsa_des.study(tmp_path / "study.toml", out=tmp_path / "out", workers=1)
     runs = pq.read_table(tmp_path / "out" / "parts").to_pydict()
     assert runs["encounter_family"] == [3, 1, 2, 2, 0, 5]
-    # The manoeuvres of each replica are those of its own ownship.
     assert runs["nmac_nominal"] == [1] * 5 + [0]
     assert runs["nmac_mitigated"] == [0, 1, 1, 1, 0, 0]
     kinds = ["head-on"] * 2 + ["crossing from the left"] * 4

@@ -81,7 +81,8 @@ truth at each instant, which includes the sensors' grids.
 a radar at 1 Hz and two cameras, one of them late; two straight flights. Times are those of a tracker
 alone in a single run, where a step's fixed cost counts most ([in lock step](performance.md#track-updates)
 an update is far cheaper). Errors are the distance of the nearest confirmed track; the last rung of
-each ladder is the reference, which is not the truth either. [What they mean](tracking.md#what-filters-association-and-late-looks-cost).
+each ladder is the reference, which is not the truth either. Two flights of 20 s tell what
+rungs cost; they are too short to tell which is better. [What they mean](tracking.md#what-filters-association-and-late-looks-cost).
 
 {trackers}
 """
@@ -183,7 +184,7 @@ def _line(cost: Any) -> str:
     error = cost.error
     cells = [
         name + (" (scene)" if cost.in_scene else ""),
-        f"{cost.cpu_us_per_target_scan:.3g} ± {cost.cpu_spread_us:.1g}",
+        f"{cost.cpu_us_per_target_scan:.3g} ± {float(f'{cost.cpu_spread_us:.1g}'):g}",
         *(f"{value:.2g}" for value in (error.mean, error.p95, error.maximum)),
     ]
     for key, form in (
