@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from comparisons import recorded
 
 import dsa_des
-from comparisons import recorded
 from dsa_des.errors import BlockFailure, OutputError, RunRefused, SceneError, UsageError
 from dsa_des.scene.examples import examples
 
