@@ -58,6 +58,8 @@ class Map:
 
     def __init__(self, file: Path) -> None:
         self.seconds: dict[str, float] = {}
+        #: Processor time, with that of processes that ended within the test.
+        self.cpu_s: dict[str, float] = {}
         self._texts: dict[str, list[str]] = {}
         self._lines: dict[str, dict[str, list[int]]] = {}
         self._tests: list[str] = []
@@ -65,6 +67,7 @@ class Map:
             with gzip.open(file, "rt", encoding="utf-8") as stream:
                 kept = json.load(stream)
             self.seconds, self._texts = kept["seconds"], kept["texts"]
+            self.cpu_s = kept.get("cpu_s", {})
             self._lines, self._tests = kept["lines"], list(self.seconds)
 
     def executed(self, file: str, text: str) -> dict[int, list[str]]:
@@ -207,7 +210,7 @@ def _keep(file: Path, folder: Path) -> None:
     }
     kept = {
         "seconds": seconds,
-        "cpu": {test: round(row[1], 4) for test, row in told.items()},
+        "cpu_s": known.cpu_s | {test: round(row[1], 2) for test, row in told.items()},
         "texts": {path: text.splitlines() for path, text in texts.items()},
         "lines": lines,
     }
