@@ -13,6 +13,7 @@ from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import (
     CLASS,
+    FRACTION,
     NUMBER,
     SHARE,
     TRIALS,
@@ -168,9 +169,10 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
             message += did_you_mean(str(figure["metric"]), names)
             add(("figures", number, "metric"), message, str(figure["metric"]))
         elif figure["kind"] in ("histogram", "cdf") and (
-            results[figure["metric"]].kind not in (NUMBER, SHARE)
+            results[figure["metric"]].kind not in (NUMBER, FRACTION, SHARE)
         ):
-            numbers = [name for name in names if results[name].kind in (NUMBER, SHARE)]
+            spread = (NUMBER, FRACTION, SHARE)
+            numbers = [name for name in names if results[name].kind in spread]
             what = {"event": "an event, 0 or 1"}.get(results[figure["metric"]].kind, "a ratio")
             message = f"is {what}: a {figure['kind']} shows how numbers are spread"
             message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""
