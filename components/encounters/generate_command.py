@@ -14,12 +14,15 @@ from components.encounters.sample_command import open_model
 from components.encounters.set_file import is_place, set_writer
 from components.encounters.track_rules import TrackError
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import foreseen
 from dsa_des.files.output_file import check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
 
 #: Edges of miss distances: farther than any aircraft sees another.
 _FARTHEST_FT = 1e6
+# Processor time (s) and bytes of an encounter, as measured with a small model.
+_PAIR = (1e-3, 900.0)
 
 
 def generate_set(
@@ -59,6 +62,8 @@ def generate_set(
     check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
+    if long := foreseen(f"--count {count}", count, *_PAIR):
+        say(f"note: {long}", err=True)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0
     try:

@@ -27,6 +27,7 @@ from components.encounters.set_file import is_place
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
+from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, read_input_text, resolve_home
 from dsa_des.files.toml_input import parse_toml
 
@@ -155,6 +156,9 @@ class _Recipes:
             raise UsageError(*self.wrong)
         if count * math.prod(map(len, swept.values())) > _MOST:
             raise UsageError(f"{self.path}: makes more than {_MOST:,} encounters")
+        total = count * math.prod(map(len, swept.values()))
+        asked = f"{self.path}: {total:,} encounters of {duration:g} s"
+        refuse_samples(asked, 2.0 * total * (duration + 1.0))
         every = [
             dict(zip(swept, values, strict=True)) for values in itertools.product(*swept.values())
         ]

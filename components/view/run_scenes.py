@@ -26,7 +26,7 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 Table = Mapping[str, Any]
 
 
-class _Columns(dict[str, Any]):
+class _TableColumns(dict[str, Any]):
     """A table's columns; one that is asked for and not there is said with the file."""
 
     def __init__(self, path: Path) -> None:
@@ -148,7 +148,7 @@ def _table(path: Path) -> Table | None:
         table = pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
         raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
-    found = _Columns(path)
+    found = _TableColumns(path)
     for name in table.column_names:
         column = table[name]
         if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
