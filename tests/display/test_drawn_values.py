@@ -10,11 +10,16 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from scipy.stats import chi2
 
 import dsa_des
+from components.display.fields_of_view import draw_outline, outline_of
 from components.display.report import DetectAndSenseReport
+from components.messages.reach import Reach
+from components.sensor.marks import EO, RADAR
+from components.sensor.mounting import BodyAxes
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import ObserverSink, Recorder
 from dsa_des.running.simulation import Simulation
@@ -455,3 +460,20 @@ def test_how_wrong_tracks_are_and_say(drawn):
         f"Innovation squared by its covariance (NIS): {nis.sum() / freedom.sum():.3g} per quantity "
         f"(honest: 1), {np.mean(good):.0%} of stretches inside"
     )
+
+
+@pytest.mark.parametrize("everywhere", [False, True])
+def test_a_field_of_view_without_end_is_its_two_edges(everywhere):
+    azimuth_rad = (-math.pi, math.pi) if everywhere else (math.radians(-30), math.radians(50))
+    reach = Reach(azimuth_rad, (-1.0, 1.0), math.inf)
+    outline = outline_of(math.radians(217), reach, BodyAxes())
+    axes = Figure().add_subplot()
+    draw_outline(axes, outline, {"a": RADAR, "eo": EO}, "eo", 40.0)
+    wanted = [] if everywhere else [187, 267]
+    assert not outline.closed and not axes.patches and len(axes.lines) == len(wanted)
+    for line, bearing_deg in zip(axes.lines, wanted, strict=True):
+        ends = line.get_xydata()
+        assert ends[0] == pytest.approx((0, 0))
+        angle = math.radians(bearing_deg)
+        assert ends[1] == pytest.approx((40 * math.sin(angle), 40 * math.cos(angle)))
+        assert to_hex(line.get_color()) == COLOURS["eo"] and line.get_linestyle() == "--"
