@@ -90,7 +90,7 @@ FAULTS = [
          "signature = self.p.dynamic_weight * pixels * contrast"),
         ("picture-of-one-row", "float(self.p.azimuth_pixels * self.p.elevation_pixels)",
          "float(self.p.azimuth_pixels * self.p.azimuth_pixels)"),
-        ("threshold-ignored", "            return self.p.threshold\n", "            return 1.0\n"),
+        ("threshold-ignored", "            return self.detector.threshold\n        return np", "            return 1.0\n        return np"),
         ("whole-circle-of-pixels", "width = sector_width_rad(*self.reach.azimuth_rad)",
          "width = 2.0 * 3.141592653589793"),
     ),
