@@ -39,7 +39,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/optical/camera.py", "wiring/test_calibrated_cameras.py",
-        ("samples-without-noise", "signature + noise * self._noise", "signature + 0.0 * self._noise"),
+        ("samples-without-noise", "signature + noise * self._noise",
+         "signature + 0.0 * self._noise"),
         ("cameras-of-the-usual-blur", "spot = noise_equivalent_pixels(self.p.blur_pixels)",
          "spot = noise_equivalent_pixels(0.5)"),
         ("the-faint-are-seen", "(margin >= 0.0) & (signature >", "(margin >= 0.0) | (signature >"),
