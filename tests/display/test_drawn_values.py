@@ -477,3 +477,11 @@ def test_a_field_of_view_without_end_is_its_two_edges(everywhere):
         angle = math.radians(bearing_deg)
         assert ends[1] == pytest.approx((40 * math.sin(angle), 40 * math.cos(angle)))
         assert to_hex(line.get_color()) == COLOURS["eo"] and line.get_linestyle() == "--"
+
+
+def test_a_field_of_view_all_around_is_a_ring_without_a_corner_at_the_ownship():
+    around = Reach((-math.pi, math.pi), (-1.0, 1.0), 5000.0)
+    corners = outline_of(1.0, around, BodyAxes()).corners_km
+    assert np.hypot(*corners.T) == pytest.approx(5.0)
+    most = Reach((-math.radians(170), math.radians(170)), (-1.0, 1.0), 5000.0)
+    assert outline_of(1.0, most, BodyAxes()).corners_km[-1] == pytest.approx((0.0, 0.0))
