@@ -306,7 +306,7 @@ def test_the_program_run_as_a_module_runs_nothing_of_the_working_directory(shado
     for name in ("dsa_des", *found.stdout.split()):
         (shadows / f"{name}.py").unlink(missing_ok=True)
     plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
-    done = subprocess.run([sys.executable, "-m", "dsa_des", "check", "s.toml"], cwd=shadows,
+    done = subprocess.run([sys.executable, "-m", "dsa_des", "check", "first_light"], cwd=shadows,
                           capture_output=True, text=True, timeout=60, env=plain,
                           check=False)  # fmt: skip
     assert (done.returncode, ran(shadows)) == (0, []), done.stderr
