@@ -241,7 +241,7 @@ def test_a_geotiff_is_the_same_raster(tmp_path):
     raster = read_raster(written())
     assert (raster.south_deg, raster.west_deg) == pytest.approx((45.6, 7.0))
     assert raster.height_m[::-1].tolist() == heights.tolist()
-    with pytest.raises(ValueError, match="1 holes"):
+    with pytest.raises(ValueError, match="1 hole "):
         read_raster(written(missing=5, name="holes.tif"))
     with pytest.raises(ValueError, match="must be in longitude and latitude"):
         read_raster(written(crs="EPSG:32633", name="utm.tif"))
