@@ -248,7 +248,8 @@ def common_errors(
             moved[place] = selected(expected[place], track) - part.seen[row, there[place], track]
     moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
     moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
-    return rules.lasting.common(rows, there, _picked(scans.variance, rows, cells), moved, since_s)
+    variance = scans.variance[rows][:, cells]
+    return rules.lasting.common(rows, there, variance, moved, since_s)
 
 
 def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
