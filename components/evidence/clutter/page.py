@@ -109,13 +109,14 @@ ground). Of the radar below, at 5 km and 3 cm, by rain rate:
 
 {rain}
 
-Drops scatter after Rayleigh: up to 35 GHz, where the formula is within 4 dB of Mie's up to 25 mm/h; above, `check`
-says that it gives too much. A linear wave hears all of it; of a circular one the antenna rejects
-`rain_rejection_db`. Rain is noise that differs from look to look, and from pulse to pulse. Before a
-filter it moves with the wind and falls (2.6 Z^0.107 m/s), spread by turbulence (1 m/s), shear over
-the beam (0.42 · 4 m/s/km · R φ) and the platform: a notch that is locked to the ground leaves rain
-that the wind blows. An average of cells follows rain as it follows the ground, and a threshold that
-stays reports it in every cell. A radar whose cells have no size hears no rain, and `check` says so.
+Drops scatter after Rayleigh: up to 35 GHz, where the formula is within 4 dB of Mie's up to 25 mm/h;
+above, `check` says that it gives too much. A linear wave hears all of it; of a circular one the
+antenna rejects `rain_rejection_db`. Rain is noise that differs from look to look, and from pulse to
+pulse. Before a filter it moves with the wind and falls (2.6 Z^0.107 m/s), spread by turbulence (1
+m/s), shear over the beam (0.42 · 4 m/s/km · R φ) and the platform: a notch that is locked to the
+ground leaves rain that the wind blows. An average of cells follows rain as it follows the ground,
+and a threshold that stays reports it in every cell. A radar whose cells have no size hears no rain,
+and `check` says so.
 
 ## Doppler
 
