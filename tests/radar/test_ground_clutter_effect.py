@@ -19,6 +19,8 @@ extends = "{base}"
 duration_s = 20
 {terrain}
 [blocks.radar]
+azimuth_beamwidth_deg = 1
+elevation_beamwidth_deg = 1
 {radar}
 [blocks.traffic]
 ownship = {{ lat_deg = 52.0, lon_deg = 4.4, alt_m = 1000, heading_deg = 0, climb_mps = {climb}, \
