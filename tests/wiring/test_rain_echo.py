@@ -86,6 +86,7 @@ def noise_like(kind: str, row: dict, clear: dict) -> float:
     return 10.0 ** (0.1 * (clear["confidence"] - row["confidence"])) - 1.0
 
 
+@covers("range_cell_m", of=LINK_BUDGETS)
 @pytest.mark.parametrize("top_m", [9000.0, 2450.0, 1850.0])
 @pytest.mark.parametrize("kind", LINK_BUDGETS)
 def test_rain_in_the_cell_is_noise_beside_the_target(kind, top_m):
