@@ -185,7 +185,10 @@ BAD = [
     ({"terrain": "[terrain]\nheight_m = 1000"}, r"\[terrain\] height_m is 1000: it must be below"),
     ({"terrain": "[terrain]\nheight_m = 500", "climb": -40}, r"500: .* is at 480 m at 13 s"),
     ({"radar": "range_resolution_m = 0"}, "range_resolution_m is 0: ground clutter"),
-    ({"radar": NO_BEAM + "elevation_resolution_deg = 0"}, "elevation_resolution_deg is 0: ground clutter"),
+    (
+        {"radar": NO_BEAM + "elevation_resolution_deg = 0"},
+        "elevation_resolution_deg is 0: ground clutter",
+    ),
     ({"radar": "pulses = 3\nintegration_gain_db = 0"}, "pulses is 3: ground clutter"),
     ({"terrain": '[terrain]\nclutter_mean = "wavering"'}, "constant"),
     ({"terrain": "[terrain]\nheight_m = 99999"}, "less than or equal to 10000"),
