@@ -98,6 +98,24 @@ def state_then(
     return StateThen(then + times(back, now[0] - ahead), covariance, _divided(across, covariance))
 
 
+def state_back(model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray) -> StateThen:
+    """Return the state at an instant before anything was known of it, by what it is now.
+
+    Parameters
+    ----------
+    model : Motion
+    now : (state (d, n), covariance (d, d, n))
+    since_s : (n,)
+        Time from the instant to now.
+    """
+    state, spread = now
+    step = model.jacobian(state, -since_s)
+    covariance = symmetric(product_transposed(product(step, spread + model.noise(since_s)), step))
+    return StateThen(
+        model.move(state, -since_s), covariance, _divided(product(step, spread), covariance)
+    )
+
+
 def _divided(left: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return leftᵀ · matrix⁻¹ for symmetric matrices (d, d, n)."""
     root = cholesky(matrix)

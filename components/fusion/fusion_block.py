@@ -1,5 +1,7 @@
 """The base class of fusion blocks: the ranking, the memory, and how rows are built."""
 
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -78,8 +80,19 @@ class Fusion(Component):
         return [FusedWithPose if navigation_errs(self.context) else FusedDetections]
 
     def offer(self, port: str) -> Any:
-        """Hand on what the sensors say of themselves, by name."""
-        return {producer.block: producer.offer for producer in self.context.producers}
+        """Hand on what the sensors say of themselves, by name, and how late they come."""
+        waits_s = Fraction(self.window_s())
+        return {
+            one.block: replace(
+                one.offer,
+                latest_s=one.latest_s + waits_s,
+                jitter_s=one.jitter_s + waits_s,
+                unforeseen=one.unforeseen,
+            )
+            if isinstance(one.offer, SensorOffer)
+            else one.offer
+            for one in self.context.producers
+        }
 
     def serves_replicas(self) -> bool:
         """Say no to a gate that would reach from one replica into the one before."""

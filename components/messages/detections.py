@@ -5,6 +5,7 @@ elevation upward.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from components.messages.every_look import look_columns
 from components.messages.reach import Reach
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import Columns, Message, Text, per_entry, per_row, static
+from dsa_des.time.clock import ClockSpec
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.
 _SKIPPED = {
@@ -87,6 +89,13 @@ class SensorOffer:
         Whether range rates beyond what is unambiguous are told as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
+    clock : ClockSpec or None
+        When it looks.
+    latest_s, jitter_s : Fraction
+        How late its looks come at most to whom a fusion offers them, and how much of that is by
+        chance; None where nobody says.
+    unforeseen : bool
+        Whether they may come later still, as they queue.
     """
 
     measures_range: bool
@@ -98,6 +107,10 @@ class SensorOffer:
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
     folds_range_rate: bool = False
+    clock: ClockSpec | None = None
+    latest_s: Fraction | None = None
+    jitter_s: Fraction = Fraction(0)
+    unforeseen: bool = False
 
 
 def target_names(message: Any) -> Text:

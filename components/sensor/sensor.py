@@ -107,8 +107,9 @@ class Sensor(Measuring):
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
             reach = Mounting().build(self).reach(reach)
         return SensorOffer(
-            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach, **constant
-        )
+            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
+            clock=self.p.clock_spec(), **constant,
+        )  # fmt: skip
 
     @cached_property
     def _reach_from_body(self) -> Reach:

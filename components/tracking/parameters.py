@@ -1,6 +1,5 @@
 """Parameters of every tracker that estimates states."""
 
-from fractions import Fraction
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
@@ -86,15 +85,16 @@ class TrackerParameters(Parameters):
     )  # fmt: skip
 
     late: Literal["drop", "one_step", "rerun"] = Field(
-        default="drop",
-        description="What becomes of a look that comes after a later one: it is left out, tracks "
-        "are corrected by one step back and forth, or all looks since it are worked on again in "
-        "order.",
+        default="one_step",
+        description="What becomes of a look that comes after a later one: tracks that the later "
+        "one updated do without it (`drop`), tracks are corrected by one step back and forth "
+        "(`one_step`), or all looks since it are worked on again in order (`rerun`).",
     )
-    lag_s: NonNegativeRational = Field(
-        default=Fraction(1),
-        description="How much older than the newest a look may be to be worked on after all "
-        "(`one_step`, `rerun`), s; older ones are left out and counted.",
+    lag_s: NonNegativeRational | None = Field(
+        default=None,
+        description="How much older than the newest a look may be to be worked on after all, s; "
+        "older ones are left out and counted. By default as late as the scene says that one may "
+        "come, and 1 s at least.",
     )
 
     @model_validator(mode="after")
@@ -120,8 +120,6 @@ class TrackerParameters(Parameters):
         if self.start_gate_probability <= self.gate_probability:
             because = f"gate_probability is {self.gate_probability:g}"
             said += self.idle("start_gate_probability", because=because)
-        if self.late == "drop":
-            said += self.idle("lag_s", because="late is 'drop'")
         return said
 
     def life(self) -> LifeRules:

@@ -56,7 +56,7 @@ def step(
         of = of[alive]
     tick = scans.tick[looks]
     detection, of_detection = detections_of(scans, looks)
-    part = _predicted(rules, part, tick[of])
+    part = predicted(rules, part, tick[of])
     if len(part):
         part, held = looked_at(rules, part, of, scans, places, codes, looks, detection,
                                of_detection)  # fmt: skip
@@ -81,7 +81,8 @@ def detections_of(scans: Scans, looks: IntArray) -> tuple[IntArray, IntArray]:
     return np.arange(len(of)) + (first - starts)[of], of
 
 
-def _predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
+def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
+    """Return tracks at instants (tracks,) that are not before their own."""
     if len(part) == 0:
         return part
     dt_s = (tick - part.tick) / rules.ticks_per_s

@@ -1,6 +1,7 @@
 """A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
+from components.tracking.lateness import left_out, warning
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -107,6 +109,16 @@ class StoneSoupTracker(Component):
             key_of(getattr(self.context.streams, "seed", 0), self.name, "stone soup")
         )
         self._tracker = self._built()
+
+    def warnings(self) -> list[str]:
+        """Say whose looks will be left out as too late, and how many."""
+        offers: dict[str, Any] = {}
+        for producer in self.context.producers:
+            if isinstance(producer.offer, dict):
+                offers |= producer.offer
+        shares = left_out(offers, Fraction(0), self.context.duration_s)
+        why = "no look is worked on after a later one"
+        return super().warnings() + [warning(name, share, why) for name, share in shares.items()]
 
     def _built(self) -> Any:
         name = self.p.builder

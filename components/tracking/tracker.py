@@ -1,6 +1,7 @@
 """The base class of trackers that estimate states: parameters, memory, and the order of looks."""
 
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from components.tracking.late_looks import (
     stores_before,
     straight_plan,
 )
+from components.tracking.lateness import latest_s, left_out, may_come_late, warning
 from components.tracking.one_step import late_step
 from components.tracking.parameters import TrackerParameters
 from components.tracking.replica_memory import Heads, Past
@@ -100,12 +102,27 @@ class Tracker(Component):
         self._heads = Heads.none()
         self._past: Past | None = None
         self._ahead: Scans | None = None
-        self._lag_ticks = int(self.p.lag_s * self.context.ticks_per_s)
+        self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
+        # Where nothing can come late there is nothing to remember, whatever `late` says.
+        self._remembers = may_come_late(self._offers(), self.context.producers)
         self._late, self._early = 0, 0
 
     def goes_side_by_side(self) -> bool:
         """Say no where looks are worked on again: one replica's are remembered."""
-        return super().goes_side_by_side() and self.p.late == "drop"
+        return super().goes_side_by_side() and not self._remembers
+
+    def _lag_s(self) -> Fraction:
+        if self.p.lag_s is not None:
+            return Fraction(self.p.lag_s)
+        return max(Fraction(1), latest_s(self._offers(), self.context.producers))
+
+    def warnings(self) -> list[str]:
+        """Say whose looks will be left out as too late, and how many."""
+        lag_s, why = self._lag_s(), f"lag_s is {float(self._lag_s()):g}"
+        if self.p.late == "drop":
+            lag_s, why = Fraction(0), "late is 'drop'"
+        shares = left_out(self._offers(), lag_s, self.context.duration_s)
+        return super().warnings() + [warning(n, share, why) for n, share in shares.items()]
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -201,7 +218,7 @@ class Tracker(Component):
             scans = Scans.joined([past.scans, scans])
             replica = np.concatenate([np.full(begin, past.replica), replica])
         of = np.searchsorted(heads.replica, replica)
-        if self.p.late == "drop":
+        if not self._remembers:
             plan, left_out = straight_plan(scans, of, heads.tick)
         else:
             planned = rerun_plan if self.p.late == "rerun" else one_step_plan
@@ -214,16 +231,18 @@ class Tracker(Component):
         reported: list[Reported] = []
         for works in _turns(plan.of):
             works_now = works
-            if self.p.late == "one_step":
-                late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
-            if self.p.late == "one_step" and len(late):
-                replicas = heads.replica[plan.of[late]]
+            late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
+            if len(late):
+                places_of = plan.of[late]
+                replicas = heads.replica[places_of]
                 old = stores_before(before, plan.since[late].tolist(), replicas.tolist())
-                store = late_step(
-                    self.rules, store, old, scans, places, codes, plan.look[late], replicas
-                )
+                store, heads.next_number[places_of], gone = late_step(
+                    self.rules, store, old, scans, places, codes, plan.look[late], replicas,
+                    heads.next_number[places_of], unless_updated=self.p.late == "drop",
+                )  # fmt: skip
+                self._late += int(gone.sum())
             looks, mine = plan.look[works_now], plan.of[works_now]
-            if self.p.late != "drop":
+            if self._remembers:
                 store = self._remember(store, heads, plan, works_now, before)
             if len(looks):
                 store, heads.next_number[mine] = step(

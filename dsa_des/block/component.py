@@ -64,14 +64,19 @@ class Producer:
     offer : object
         What its `Component.offer` returned for the output it feeds us from.
     latest_s : Fraction
-        How late its messages come at most: latency, delay and jitter of the wire; what waits for
-        a processor may come later still.
+        How late its messages come at most: latency, delay and jitter of the wire.
+    jitter_s : Fraction
+        How much of that is drawn anew for every message.
+    unforeseen : bool
+        Whether they may come later still: they wait for a processor, or for a number of scans.
     """
 
     block: str
     port: str
     offer: Any
     latest_s: Fraction = Fraction(0)
+    jitter_s: Fraction = Fraction(0)
+    unforeseen: bool = False
 
 
 @dataclass

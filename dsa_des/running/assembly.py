@@ -95,6 +95,8 @@ class Assembly:
                     wire.input,
                     self._asked(wire.source, "offer", wire.output),
                     wire.total_delay_s + Fraction(wire.jitter_s),
+                    Fraction(wire.jitter_s),
+                    wire.queued or wire.delay_scans > 0,
                 )
                 for wire in self._scene.wires
                 if wire.target == name

@@ -1,7 +1,9 @@
 """The page of the docs that says what became of the faults."""
 
+import math
 import subprocess
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from fault import Fault
 from faulty_copy import CAUGHT, ROOT, SURVIVED, Outcome
@@ -25,6 +27,73 @@ what was found before is kept for the page. The suite itself checks only that ev
 its file.
 
 """
+
+
+_RANDOM = """
+## Drawn at random
+
+The list above was written beside its tests. These faults nobody chose: a line is drawn of all that
+the tests execute, all alike, then a kind of mistake that it allows (a constant, a comparison, a
+sign, swapped arguments or operands, a dropped term, condition, keyword, filter or statement, one
+off, `and` for `or`, swapped branches, minimum for maximum, sine for cosine, degrees for radians).
+Tests that execute the line run until one fails, the nearest first, within a budget of time.
+
+<!-- not run: takes an hour, and coverage.py to make the map of lines -->
+```
+python tests/mutation/coverage_map.py --workers 2
+python tests/mutation/random_faults.py --workers 2 --count 300 --page docs/mutation.md
+```
+
+The share noticed is of those that are not marked equivalent (`tests/mutation/equivalent.json`, each
+with its reason); beside it stands its 95 % interval by Wilson. What is not seen: lines that no test
+executes, what classes declare outside their methods, texts, errors raised, and mistakes of more
+than one place; a test that needs more time than the budget counts as one that notices nothing.
+
+"""
+
+
+def with_random(file: Path, rows: Sequence[Mapping]) -> str:
+    """Return the page in a file with its second part made anew."""
+    text = file.read_text(encoding="utf-8").removesuffix(random_part(file))
+    days = sorted({row["at"] for row in rows})
+    seeds = ", ".join(str(seed) for seed in sorted({row["seed"] for row in rows}))
+    lines = [f"Seed {seeds}, {' to '.join(dict.fromkeys((days[0], days[-1])))}{_commit()}:\n"]
+    lines += [table_of_rooms(rows)]
+    left = [row for row in rows if row["result"] == SURVIVED and not row["equivalent"]]
+    if left:
+        lines += ["", "Not noticed:", ""]
+        lines += [f"- `{row['place']}`, {row['operator']}: `{row['change']}`" for row in left]
+    return text + _RANDOM + "\n".join(lines) + "\n"
+
+
+def random_part(file: Path) -> str:
+    """Return the second part of a page as it stands, empty if it has none."""
+    text = file.read_text(encoding="utf-8") if file.exists() else ""
+    return "".join(text.partition(_RANDOM[:20])[1:])
+
+
+def table_of_rooms(rows: Sequence[Mapping]) -> str:
+    """Return the share noticed in each room as a table in Markdown."""
+    lines = ["| room | drawn | equivalent | noticed | survived | share | from | to |"]
+    lines += ["|---|--:|--:|--:|--:|--:|--:|--:|"]
+    for room in [*sorted({row["room"] for row in rows}), ""]:
+        mine = [row for row in rows if room in (row["room"], "")]
+        real = [row["result"] for row in mine if not row["equivalent"]]
+        caught, survived = real.count(CAUGHT), real.count(SURVIVED)
+        counts = f"{len(mine)} | {len(mine) - len(real)} | {caught} | {survived}"
+        shares = [f"{100.0 * share:.0f} %" for share in _wilson(caught, caught + survived)]
+        lines.append(f"| {room or '**all**'} | {counts} | {' | '.join(shares)} |")
+    return "\n".join(lines)
+
+
+def _wilson(found: int, of: int) -> tuple[float, float, float]:
+    """Return a share and its 95 % interval."""
+    if of == 0:
+        return math.nan, 0.0, 1.0
+    z, share = 1.959964, found / of
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + (z / (2 * of)) ** 2) / (1 + z * z / of)
+    return share, middle - half, middle + half
 
 
 def page(faults: Sequence[Fault], outcomes: Mapping[str, Outcome]) -> str:

@@ -159,9 +159,10 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/one_step.py", "wiring/test_late_looks_in_one_step.py",
-        ("not-of-the-instant-of-another-look", "& (before.tick <= tick[", "& (before.tick < tick["),
+        ("not-of-the-instant-of-another-look", "(before.tick[place] <= tick)",
+         "(before.tick[place] < tick)"),
         ("models-as-before-the-late-look",
-         "weights=_weights_now(weights, then.weights, seen.weights, now.weights)",
+         "weights=_weights_now(back, then.weights, seen.weights, now.weights)",
          "weights=now.weights"),
     ),
     *in_file(

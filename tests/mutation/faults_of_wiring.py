@@ -651,8 +651,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/tracking/tracker.py", _CUES,
         ("one-step-s-memory-of-all-replicas",
-         'goes_side_by_side() and self.p.late == "drop"',
-         'goes_side_by_side() and self.p.late != "rerun"'),
+         "goes_side_by_side() and not self._remembers", "goes_side_by_side()"),
     ),
     *in_file(
         "clocks", "dsa_des/running/rewind.py", "tracking/test_cued_declaration.py",

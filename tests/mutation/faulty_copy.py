@@ -9,7 +9,8 @@ import signal
 import sys
 import time
 import types
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,10 +28,11 @@ _PARTS = (
 _LOADED_ONCE = (
     "numpy", "scipy.special", "scipy.optimize", "pydantic", "pyarrow.parquet", "simpy", "networkx",
     "rich.console", "rich.table", "click", "mpmath", "pymap3d", "geographiclib.geodesic",
-    "hypothesis.strategies", "_hypothesis_pytestplugin",
+    "hypothesis.strategies", "_hypothesis_pytestplugin", "matplotlib.figure", "scipy.stats",
 )  # fmt: skip
 # Pytest warns that it can no longer rewrite the assertions of what is loaded already.
 _QUIET = ("-W", "ignore::pytest.PytestAssertRewriteWarning", "-q", "--tb=no")
+_NO_TESTS = 5  # what pytest ends with where none is left
 _TOLD = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 
 
@@ -62,12 +64,19 @@ class TestRun:
         Of pytest.
     limit_s : float
         After this time it is ended.
+    plugins : sequence
+        Of pytest.
     """
 
     __test__ = False
 
     def __init__(
-        self, folder: Path, tests: Iterable[str], *options: str, limit_s: float = 180.0
+        self,
+        folder: Path,
+        tests: Iterable[str],
+        *options: str,
+        limit_s: float = 180.0,
+        plugins: Sequence[object] = (),
     ) -> None:
         self._said = folder / ".said"
         self._begun, self._limit_s = time.monotonic(), limit_s
@@ -77,7 +86,7 @@ class TestRun:
         sys.stdout.flush()
         self._process = os.fork()
         if self._process == 0:
-            _run_here(folder, arguments, self._said)
+            _run_here(folder, arguments, plugins, self._said)
 
     @property
     def seconds(self) -> float:
@@ -108,7 +117,7 @@ def _load_libraries() -> None:
     gc.freeze()
 
 
-def _run_here(folder: Path, arguments: list[str], said: Path) -> None:
+def _run_here(folder: Path, arguments: list[str], plugins: Sequence[object], said: Path) -> None:
     """Run pytest in this process, a fork, and end it."""
     code = 70
     try:
@@ -124,7 +133,7 @@ def _run_here(folder: Path, arguments: list[str], said: Path) -> None:
         sys.argv = ["pytest", *arguments]
         # Processes that tests spawn would load this tool again.
         sys.modules["__main__"] = types.ModuleType("__main__")
-        code = int(pytest.main(arguments))
+        code = int(pytest.main(arguments, plugins=list(plugins)))
         sys.stdout.flush()
     finally:
         os._exit(code)
@@ -178,39 +187,86 @@ class FaultyCopy:
 
 
 class Trial:
-    """A fault in a copy, and its tests that run there."""
+    """A fault in a copy, and its tests that run there, one round after another.
 
-    def __init__(self, fault: Fault, copy: FaultyCopy) -> None:
+    Parameters
+    ----------
+    fault : Fault or DrawnFault
+    copy : FaultyCopy
+    rounds : sequence of callable
+        Each starts a round of tests in a folder; the first that notices the fault is the last.
+    """
+
+    def __init__(
+        self, fault: Fault, copy: FaultyCopy, rounds: Sequence[Callable[[Path], TestRun]] = ()
+    ) -> None:
         self.fault, self.copy = fault, copy
         self._wrong, self._run = "", None
+        self._left = deque(rounds or [lambda folder: TestRun(folder, fault.tests, "-x")])
+        self._seconds = 0.0
         try:
             copy.put_in(fault)
         except ValueError as error:
             self._wrong = str(error)
             return
-        self._run = TestRun(copy.folder, fault.tests, "-x")
+        self._run = self._left.popleft()(copy.folder)
 
     def outcome(self) -> Outcome | None:
         """Return what became of the fault, and take it out; None while its tests run."""
         if self._run is None:
-            return self._told(OF_THE_LIST, self._wrong, 0.0)
+            return self._told(OF_THE_LIST, self._wrong)
         ended = self._run.ended()
         if ended is None:
             return None
-        self.copy.take_out(self.fault)
+        self._seconds += self._run.seconds
         result, by = _judged(*ended)
-        return self._told(result, by, round(self._run.seconds, 1))
+        if result == SURVIVED and self._left:
+            self._run = self._left.popleft()(self.copy.folder)
+            return None
+        self.copy.take_out(self.fault)
+        return self._told(result, by)
 
-    def _told(self, result: str, by: str, seconds: float) -> Outcome:
-        fault = self.fault
+    def _told(self, result: str, by: str) -> Outcome:
+        fault, seconds = self.fault, round(self._seconds, 1)
         return Outcome(fault.name, result, by, seconds, fault.digest, f"{datetime.now(UTC):%F}")
+
+
+def tried(
+    faults: Iterable[Fault],
+    copies: Iterable[FaultyCopy],
+    rounds: Callable[[Fault], Sequence[Callable[[Path], TestRun]]] = lambda fault: (),
+) -> Iterator[tuple[Fault, Outcome]]:
+    """Yield each fault and what became of it, as many at once as there are copies."""
+    waiting, free, running = deque(faults), deque(copies), []
+    while waiting or running:
+        while waiting and free:
+            fault = waiting.popleft()
+            running.append(Trial(fault, free.popleft(), rounds(fault)))
+        for trial in list(running):
+            outcome = trial.outcome()
+            if outcome is not None:
+                running.remove(trial)
+                free.append(trial.copy)
+                yield trial.fault, outcome
+        time.sleep(0.02)
+
+
+def copies_in(folder: Path, count: int) -> list[FaultyCopy]:
+    """Make copies; data that lie beside the project lie beside them as well."""
+    beside = ROOT.parent / "shared"
+    if beside.exists():
+        (folder / "shared").symlink_to(beside.resolve())
+    places = [folder / str(number) for number in range(count)]
+    for place in places:
+        place.mkdir()
+    return [FaultyCopy(place) for place in places]
 
 
 def _judged(code: int | None, said: str) -> tuple[str, str]:
     """Tell what pytest's exit code (None: out of time) means for a fault."""
     if code is None:
         return CAUGHT, "the time limit"
-    if code == 0:
+    if code in (0, _NO_TESTS):
         return SURVIVED, ""
     told = _TOLD.search(said)
     if code in (1, 2) and told:

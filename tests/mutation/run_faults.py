@@ -10,16 +10,15 @@ to those of earlier runs, for the page to be made of all of them.
 import json
 import sys
 import tempfile
-import time
 from argparse import ArgumentParser, Namespace
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import fault_page
 from fault import Fault
 from faults import FAULTS
-from faulty_copy import CAUGHT, SURVIVED, FaultyCopy, Outcome, Trial
+from faulty_copy import CAUGHT, SURVIVED, Outcome, copies_in, tried
 
 
 def main() -> int:
@@ -38,7 +37,8 @@ def main() -> int:
         return 1
     known = {outcome.name: outcome for outcome in [*_earlier(asked.json), *outcomes]}
     if asked.page is not None:
-        asked.page.write_text(fault_page.page(FAULTS, known), encoding="utf-8")
+        text = fault_page.page(FAULTS, known) + fault_page.random_part(asked.page)
+        asked.page.write_text(text, encoding="utf-8")
     return _summary(faults, outcomes)
 
 
@@ -96,34 +96,21 @@ def _is_one(fault: Fault, only: Sequence[str]) -> bool:
 
 def _run_all(faults: Sequence[Fault], asked: Namespace, folder: Path) -> list[Outcome]:
     """Return outcomes in the order of the faults; none if the tests fail without a fault."""
-    copies = deque()
-    for number in range(asked.workers):
-        place = folder / str(number)
-        place.mkdir()
-        copies.append(FaultyCopy(place))
+    copies = copies_in(folder, asked.workers)
     if not asked.unchecked:
         said = copies[0].clean(test for fault in faults for test in fault.tests)
         if said:
             print(said, "\nthe tests fail without any fault", sep="")
             return []
-    waiting, running = deque(faults), []
     found: dict[str, Outcome] = {}
-    while waiting or running:
-        while waiting and copies:
-            running.append(Trial(waiting.popleft(), copies.popleft()))
-        for trial in list(running):
-            outcome = trial.outcome()
-            if outcome is not None:
-                running.remove(trial)
-                copies.append(trial.copy)
-                found[outcome.name] = outcome
-                _keep(outcome, asked.json)
-                print(
-                    f"{outcome.seconds:5.1f} s  {outcome.result:9} {trial.fault.group}: "
-                    f"{outcome.name}  {outcome.by}",
-                    flush=True,
-                )
-        time.sleep(0.02)
+    for fault, outcome in tried(faults, copies):
+        found[outcome.name] = outcome
+        _keep(outcome, asked.json)
+        print(
+            f"{outcome.seconds:5.1f} s  {outcome.result:9} {fault.group}: {outcome.name}  "
+            f"{outcome.by}",
+            flush=True,
+        )
     return [found[fault.name] for fault in faults]
 
 

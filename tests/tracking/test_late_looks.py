@@ -58,8 +58,9 @@ def test_the_state_at_the_end_is_the_same_to_the_bit(kind):
     assert rows[0].keys() == rows[1].keys() and len(rows[0]) >= 2
     for number, row in rows[0].items():
         assert {**row, "tick": 0} == {**rows[1][number], "tick": 0}
-    _, dropped = tracked(Simulation, scene(*stop, *delays, kind=kind, duration_s="3.45"))
-    assert "eo" not in "".join(dropped["contributors"].to_pylist())
+    drop = ["blocks.tracker.late='drop'"]
+    _, dropped = tracked(Simulation, scene(*stop, *delays, *drop, kind=kind, duration_s="3.45"))
+    assert "radar+eo" not in "".join(dropped["contributors"].to_pylist())
 
 
 @pytest.mark.parametrize("kind", ["tracking.ekf", "tracking.imm"])
@@ -119,7 +120,8 @@ def test_looks_older_than_the_lag_are_left_out_and_counted():
         rerun, "blocks.tracker.lag_s=0.2"
     )  # fmt: skip
     assert most > some > 0
-    assert left_out() >= most
+    assert left_out("blocks.tracker.late='drop'") > some
+    assert left_out() == left_out("blocks.tracker.lag_s=0.31") == 0
 
 
 def test_looks_of_the_future_wait_and_are_counted():

@@ -175,7 +175,7 @@ def test_a_late_look_is_left_out_or_worked_on_again(kind):
         names = [row["contributors"] for row in tracks(kind, sensors=sensors, **keys)]
         return {name for joined in names for name in joined.split("+")}
 
-    assert updated_by() == updated_by(late="rerun", lag_s=0.5) == {"radar"}
+    assert updated_by(late="drop") == updated_by(late="rerun", lag_s=0.5) == {"radar"}
     assert updated_by(late="one_step", lag_s=0.5) == {"radar"}
     for late in ("one_step", "rerun"):
         assert updated_by(late=late, lag_s=2.0) == {"radar", "eye"}

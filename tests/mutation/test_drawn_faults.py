@@ -1,0 +1,108 @@
+"""Mistakes are found in a syntax tree, written in their place, and known by where they are."""
+
+import ast
+import json
+import random
+
+from drawn_fault import faults_of
+from fault_page import table_of_rooms, with_random
+from faulty_copy import CAUGHT, ROOT, SURVIVED
+from random_faults import equivalents
+
+TEXT = '''"""Text with 1 number."""
+import math
+LIMIT = 2.5
+class Beam:
+    """Declared."""
+    width: float = 3.0
+    def gain(self, a: int = 7, *, far=False) -> "1.0":
+        if a < LIMIT and not far:
+            raise ValueError(f"{a + 1}")
+        return f"{a - self.width:.1f}" + str(min(a, 4, key=abs)) if far else math.sin(-a)
+'''
+
+FOUND = """
+::constant 2.5>2.75 2.5>5.0
+Beam.gain::off by one 7>8 7>6 4>5 4>3
+Beam.gain::true or false False>True
+Beam.gain::swapped branches a < LIMIT and (not far)>not (a < LIMIT and (not far))
+Beam.gain::and, or a < LIMIT and (not far)>a < LIMIT or not far
+Beam.gain::dropped condition a < LIMIT and (not far)>not far a < LIMIT and (not far)>a < LIMIT
+Beam.gain::comparison a < LIMIT>a <= LIMIT a < LIMIT>a >= LIMIT
+Beam.gain::dropped not not far>far
+Beam.gain::arithmetic a - self.width>a + self.width
+Beam.gain::dropped term a - self.width>a
+Beam.gain::swapped operands a - self.width>self.width - a
+Beam.gain::swapped arguments min(a, 4, key=abs)>min(4, a, key=abs)
+Beam.gain::dropped keyword min(a, 4, key=abs)>min(a, 4)
+Beam.gain::another function min(a, 4, key=abs)>max(a, 4, key=abs) math.sin(-a)>math.cos(-a)
+Beam.gain::sign -a>a
+"""
+
+
+def test_every_mistake_is_found_and_nothing_that_is_declared_or_said():
+    kinds: dict[str, list[str]] = {}
+    for fault in faults_of("a/b/c.py", TEXT):
+        change = fault.change.replace("  →  ", ">")
+        kinds.setdefault(f"{fault.where}::{fault.operator}", []).append(change)
+    assert len(kinds["Beam.gain::swapped branches"].pop().split(">")) == 2
+    said = {f"{kind} {' '.join(changes)}" for kind, changes in kinds.items()}
+    assert said == set(FOUND.strip().splitlines())
+
+
+def test_a_mistake_changes_its_place_alone():
+    for fault in faults_of("a/b/c.py", TEXT):
+        tree = ast.parse(fault.applied())
+        assert ast.dump(tree) != ast.dump(ast.parse(TEXT))
+        changed = [
+            number
+            for number, (old, new) in enumerate(
+                zip(TEXT.splitlines(), fault.applied().splitlines(), strict=True), 1
+            )
+            if old != new
+        ]
+        assert changed == [fault.line]
+        assert fault.room == "a/b"
+
+
+def test_mistakes_of_the_project_can_be_written():
+    dice = random.Random(5)
+    files = sorted((ROOT / "components").rglob("*.py")) + sorted((ROOT / "dsa_des").rglob("*.py"))
+    for path in dice.sample(files, 6):
+        text = path.read_text(encoding="utf-8")
+        found = faults_of(path.relative_to(ROOT).as_posix(), text)
+        assert len({fault.digest for fault in found}) == len(found)
+        for fault in dice.sample(found, min(3, len(found))):
+            assert fault.applied() != text
+
+
+def test_what_is_called_equivalent_is_there():
+    rows = json.loads((ROOT / "tests/mutation/equivalent.json").read_text(encoding="utf-8"))
+    marked = equivalents()
+    assert len(marked) == len(rows)
+    for file in {row["name"].partition("::")[0] for row in rows}:
+        known = {fault.digest for fault in faults_of(file, (ROOT / file).read_text("utf-8"))}
+        mine = [row for row in rows if row["name"].startswith(f"{file}::")]
+        wrong = [row for row in mine if not row["reason"] or not known & set(equivalents([row]))]
+        assert not wrong
+
+
+def test_shares_are_of_those_that_can_be_noticed(tmp_path):
+    def row(room: str, result: str, equivalent: str = "") -> dict:
+        return {
+            "room": room, "result": result, "equivalent": equivalent, "seed": 4, "at": "2026-01-02",
+            "place": f"{room}/x.py:7", "operator": "sign", "change": "-x  →  x",
+        }  # fmt: skip
+
+    rows = [row("b", CAUGHT)] * 8 + [row("b", SURVIVED)] * 2 + [row("a", SURVIVED, "none")]
+    # By Wilson, of 8 in 10: 0.4902 to 0.9433 (Brown, Cai and DasGupta's formula, by hand).
+    assert "| b | 10 | 0 | 8 | 2 | 80 % | 49 % | 94 % |" in table_of_rooms(rows)
+    assert "| a | 1 | 1 | 0 | 0 | nan % | 0 % | 100 % |" in table_of_rooms(rows)
+    page = tmp_path / "page.md"
+    page.write_text("# First\n\nlist\n", encoding="utf-8")
+    for _ in range(2):
+        page.write_text(with_random(page, rows), encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("# First\n\nlist\n") and text.count("## Drawn at random") == 1
+    assert text.count("`b/x.py:7`") == 2 and "`a/x.py:7`" not in text
+    assert "Seed 4, 2026-01-02" in text
