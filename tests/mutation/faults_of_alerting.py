@@ -106,8 +106,8 @@ FAULTS = [
         _GROUP,
         "components/guidance/resolution_memory.py",
         (_MEMORY,),
-        ("kept-for-ever", "return young or", "return True or"),
-        ("sides-change-at-once", "if only_one or (old and", "if True or (old and"),
+        ("kept-for-ever", "young = now_s - self._since_s <", "young = 0 * now_s <"),
+        ("sides-change-at-once", "elif now_s - self._since_s <", "elif 2 * self._persistence_s <"),
     ),
     *in_file(
         _GROUP,
