@@ -45,9 +45,9 @@ def configs() -> Path:
 
 
 @cache
-def slow_tests() -> list[str]:
-    """Return the lines of tests/slow.txt: files, or FILE::FUNCTION."""
-    lines = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").splitlines()
+def listed(name: str) -> list[str]:
+    """Return the lines of a list beside this file, without its remarks."""
+    lines = Path(__file__).with_name(name).read_text(encoding="utf-8").splitlines()
     return [line for line in lines if line and not line.startswith("#")]
 
 
@@ -55,12 +55,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     """Do not import files that are slow as a whole where slow tests are left out."""
     if config.getoption("markexpr") != "not slow" or not collection_path.is_file():
         return None
-    return collection_path.relative_to(ROOT).as_posix() in slow_tests() or None
+    return collection_path.relative_to(ROOT).as_posix() in listed("slow.txt") or None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what tests/slow.txt lists."""
-    slow = set(slow_tests())
+    slow = set(listed("slow.txt"))
     for item in items:
         file, _, rest = item.nodeid.partition("::")
         if file in slow or f"{file}::{rest.split('[')[0]}" in slow:
@@ -72,3 +72,35 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
+
+
+def unexpected_skips(config: pytest.Config) -> list[str]:
+    """Return the skipped tests, with their reasons, that tests/skips.txt does not allow."""
+    found = []
+    for report in config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", []):
+        place, reason = report.nodeid, str(report.longrepr[2]).removeprefix("Skipped: ")
+        allowed = (line.partition(" | ")[::2] for line in listed("skips.txt"))
+        if not any(place.startswith(where) and text in reason for where, text in allowed):
+            found.append(f"{place}: {reason}")
+    return found
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Where CI is set, fail if a test was skipped that ought to run."""
+    here = os.environ.get("CI") == "true" and not hasattr(session.config, "workerinput")
+    if here and session.exitstatus == pytest.ExitCode.OK and unexpected_skips(session.config):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Where CI is set, name every test that was skipped."""
+    if os.environ.get("CI") != "true":
+        return
+    terminalreporter.section("skipped")
+    for report in terminalreporter.stats.get("skipped", []):
+        terminalreporter.line(f"{report.nodeid}: {report.longrepr[2]}")
+    for line in unexpected_skips(config):
+        terminalreporter.line(f"not allowed by tests/skips.txt: {line}", red=True)

@@ -16,7 +16,7 @@ from components.atmosphere.visibility import (
     rain_visibility_m,
 )
 from components.navigation.error_model import attitude_with_error, position_with_error
-from components.optical.false_alarms import false_alarm_direction, false_alarm_in_frame
+from components.optical.detection import detection_probability, false_alarm_direction
 from components.radar.beam_sweep import illumination_offset_s
 from components.radar.clutter import clutter_detection_probability
 from components.radar.false_alarms import (
@@ -84,7 +84,7 @@ CASES = {
     "sweep": lambda a, b, c: illumination_offset_s(
         9 * a - 4, start_rad=-1.9, width_rad=3.8, scan_period_s=1.0, azimuth_rate_rad_s=b - c
     ),
-    "frame": lambda a, b, c: false_alarm_in_frame(a, 0.3),
+    "frame": lambda a, b, c: detection_probability(a, b, 0.1 + c),
     "picture": lambda a, b, c: false_alarm_direction(
         a,
         b,

@@ -104,7 +104,7 @@ class CameraSights:
         )
         line = horizon(own_attitude, (azimuth, elevation), _dip_rad(own.alt_m), pixel_rad)
         strength = camera.p.static_weight * pixels
-        contrast = (margin + camera.p.threshold) / strength if strength > 0.0 else 0.0
+        contrast = (margin + camera.detector.threshold) / strength if strength > 0.0 else 0.0
         return {
             "target": contact,
             "sensor": printable(name),

@@ -37,10 +37,11 @@ def encounters() -> None:
 @click.option(
     "--interval",
     "method",
-    type=click.Choice(["delta", "bootstrap"]),
-    default="delta",
+    type=click.Choice(["gamma", "delta", "bootstrap"]),
+    default="gamma",
     show_default=True,
-    help="Paired delta method on the logarithm, or resampled encounters.",
+    help="By gamma distributions, for few events and uneven weights too; paired delta method on "
+    "the logarithm; or resampled encounters.",
 )
 @click.option("--resamples", type=click.IntRange(100, 1_000_000), default=4000, show_default=True)
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")

@@ -68,4 +68,7 @@ def _weights(text: str, found: EncounterSet) -> FloatArray:
     missing = [n for n in found.numbers.tolist() if n not in known]
     if missing:
         raise UsageError(f"{text}: encounter {missing[0]}: weight is missing")
-    return np.array([known[n] for n in found.numbers.tolist()])
+    weights = np.array([known[n] for n in found.numbers.tolist()])
+    if not (weights > 0.0).any():
+        raise UsageError(f"{text}: all weights are 0")
+    return weights

@@ -21,6 +21,8 @@ LISTS = {
     TRACKS: ("time_s", "north_m", "east_m", "altitude_m"),
 }
 DYNAMICS = ("euler", "point_mass")
+#: Sums of weights, and of their cubes, stay numbers.
+LARGEST_WEIGHT = 1e90
 
 
 class NoSuchEncounter(ValueError):

@@ -11,12 +11,18 @@ from components.encounters.pair_densities import PairingRules, StepDensity
 from components.encounters.pair_sets import set_of_pairs
 from components.encounters.pairing import PairSampler
 from components.encounters.sample_command import open_model
-from components.encounters.set_file import set_writer
+from components.encounters.set_file import is_place, set_writer
 from components.encounters.track_rules import TrackError
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import foreseen
 from dsa_des.files.output_file import check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
+
+#: Edges of miss distances: farther than any aircraft sees another.
+_FARTHEST_FT = 1e6
+# Processor time (s) and bytes of an encounter, as measured with a small model.
+_PAIR = (1e-3, 900.0)
 
 
 def generate_set(
@@ -56,6 +62,8 @@ def generate_set(
     check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
+    if long := foreseen(f"--count {count}", count, *_PAIR):
+        say(f"note: {long}", err=True)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0
     try:
@@ -87,14 +95,19 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
                 f"{option} {' '.join(given)}: must be rising edges, ft, and the proportion of each "
                 "step between two, all with commas between them"
             ) from None
+        said = f"{option} {' '.join(given)}"
+        if not (np.abs(edges) <= _FARTHEST_FT).all():
+            raise UsageError(f"{said}: edges must lie within ±{_FARTHEST_FT:g} ft")
+        if option == "--vertical" and not (parts <= 1.0).all():
+            raise UsageError(f"{said}: chances must lie above 0 and be 1 at most")
         # Shares of horizontal distances are of a step as a whole, those of heights its chance.
         wide = np.diff(edges) if option == "--horizontal" and len(edges) == len(parts) + 1 else 1.0
         try:
             density = StepDensity(edges, parts / wide)
         except ValueError as error:
-            raise UsageError(f"{option} {' '.join(given)}: {error}") from None
+            raise UsageError(f"{said}: {error}") from None
         if edges[0] > 0.0 or edges[-1] < 0.0:
-            raise UsageError(f"{option} {' '.join(given)}: the edges must lie about 0")
+            raise UsageError(f"{said}: the edges must lie about 0")
         changes["horizontal_ft" if option == "--horizontal" else "vertical_ft"] = density
     return PairingRules(**changes)
 
@@ -115,7 +128,7 @@ def _write_made(made: str, out: str) -> None:
 
 def check_place(at: tuple[float, float]) -> None:
     """Raise UsageError unless a latitude and a longitude are usable as the origin of a set."""
-    if not (math.isfinite(at[0]) and abs(at[0]) <= 89.0 and abs(at[1]) <= 360.0):
+    if not is_place(at):
         raise UsageError(
             f"--at {at[0]} {at[1]}: latitude must lie within ±89, longitude within ±360 degrees"
         )

@@ -21,11 +21,13 @@ from components.encounters.closest_geometry import (
     intruder_heading,
 )
 from components.encounters.draws import EncounterDraws
-from components.encounters.encounter_set import TRACKS, EncounterSet
+from components.encounters.encounter_set import LARGEST_WEIGHT, TRACKS, EncounterSet
 from components.encounters.pair_sets import NAMES, geometry_class
+from components.encounters.set_file import is_place
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
+from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, read_input_text, resolve_home
 from dsa_des.files.toml_input import parse_toml
 
@@ -146,15 +148,17 @@ class _Recipes:
             self.add("sense", f"must be {' or '.join(SENSES)}")
         count, seed = self.whole("count", 1, 1, _MOST), self.whole("seed", 0, 0, 2**62)
         duration = self.number("duration_s", 120.0, 0.1, 86_400.0)
-        weight = self.number("weight", 1.0, 0.0, 1e300)
+        weight = self.number("weight", 1.0, 1e-100, LARGEST_WEIGHT)
         at = self.tables.get("at", [0.0, 0.0])
-        good = isinstance(at, list) and len(at) == 2 and all(map(_is_number, at))
-        if not good or abs(at[0]) > 89 or abs(at[1]) > 360:
+        if not is_place(at):
             self.add("at", "must be [latitude, longitude] in degrees, within ±89 and ±360")
         if self.wrong:
             raise UsageError(*self.wrong)
         if count * math.prod(map(len, swept.values())) > _MOST:
             raise UsageError(f"{self.path}: makes more than {_MOST:,} encounters")
+        total = count * math.prod(map(len, swept.values()))
+        asked = f"{self.path}: {total:,} encounters of {duration:g} s"
+        refuse_samples(asked, 2.0 * total * (duration + 1.0))
         every = [
             dict(zip(swept, values, strict=True)) for values in itertools.product(*swept.values())
         ]

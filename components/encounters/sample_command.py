@@ -15,6 +15,7 @@ from components.encounters.streamed_file import streamed
 from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
 from dsa_des.arrays.types import AnyArray
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import foreseen
 from dsa_des.files.input_files import InputFileError, resolve_home
 from dsa_des.files.output_file import check_file
 from dsa_des.files.output_names import named, reason_of
@@ -22,6 +23,8 @@ from dsa_des.terminal.terminal import say
 
 #: Purpose of the draws: without rejections raw tracks and flown ones are the same.
 TRACKS = "tracks"
+# Processor time (s) and bytes of a row, as measured with a small model.
+_RAW_ROW, _FLOWN_ROW = (1e-6, 60.0), (4e-6, 160.0)
 
 
 def sample_tracks(
@@ -51,6 +54,10 @@ def sample_tracks(
         raise UsageError(
             f"--duration-s {duration_s:g}: must be a whole number, as tracks have 1 Hz"
         )
+    asked = f"--count {count} --duration-s {seconds}"
+    each = _RAW_ROW if raw else _FLOWN_ROW
+    if long := foreseen(asked, count * (seconds + 1), *each):
+        say(f"note: {long}", err=True)
     batches = _raw(found, seed, range(first, first + count), seconds)
     if not raw:
         batches = _flown(found, seed, range(first, first + count), seconds, dynamics)

@@ -13,11 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.encounters.encounter_set import EVENTS, LISTS, STATE, TRACKS, EncounterSet
+from components.encounters.encounter_set import (
+    EVENTS,
+    LARGEST_WEIGHT,
+    LISTS,
+    STATE,
+    TRACKS,
+    EncounterSet,
+)
 from components.encounters.splitting import FAMILY
 from components.encounters.streamed_file import streamed
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.errors import did_you_mean
+from dsa_des.errors import did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, status_of
 
 if TYPE_CHECKING:
@@ -32,7 +39,21 @@ EXTRA = (
 )  # fmt: skip
 _LARGEST_BYTES = 16 * 2**30
 _MOST_SAID = 20
-_LARGEST = {"north_m": 5e6, "east_m": 5e6, "altitude_m": 1e5, "speed_mps": 2000.0}
+_LARGEST = {
+    "north_m": 5e6, "east_m": 5e6, "altitude_m": 1e5, "speed_mps": 2000.0, "time_s": 1e7,
+    "climb_mps": 2000.0, "turn_rad_s": 100.0, "acceleration_mps2": 1e4, "heading_rad": 1e4,
+}  # fmt: skip
+
+
+def is_place(value: object) -> bool:
+    """Return whether a value is [latitude, longitude] of a usable origin, in degrees."""
+    return (
+        isinstance(value, list | tuple)
+        and len(value) == 2
+        and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+        and abs(value[0]) <= 89.0
+        and abs(value[1]) <= 360.0
+    )
 
 
 class EncounterSetError(ValueError):
@@ -97,8 +118,10 @@ class _SetReader:
 
     def encounters(self, skip_damaged: bool) -> EncounterSet:
         whole = self.column("encounter")
-        if np.isnan(whole).any() or (whole != np.floor(whole)).any() or (whole < 0).any():
-            raise self.fail("column 'encounter': must be whole numbers of 0 or more, none missing")
+        if not ((whole == np.floor(whole)) & (whole >= 0) & (whole <= 2**53)).all():
+            raise self.fail(
+                "column 'encounter': must be whole numbers from 0 to 2^53, none missing"
+            )
         if (np.diff(whole) < 0).any():
             raise self.fail("rows must be in order of their encounters' numbers")
         rows_of, first = np.unique(whole.astype(np.int64), return_index=True)
@@ -107,14 +130,17 @@ class _SetReader:
         flat = {name: self.column(name) for name in self.flat}
         weights = self.column("weight")
         names = self.table["aircraft"].to_pylist()
-        wrong = wrong | self.wrong_rows(starts, lists, flat, weights, names)
+        wrong = self.wrong_rows(starts, lists, flat, weights, names) | wrong
         said: dict[int, str] = {}
         for row in sorted(wrong):
             place = int(np.searchsorted(bounds, row, side="right")) - 1
             said.setdefault(place, wrong[row])
         for place in np.flatnonzero(np.diff(bounds) < 2).tolist():
             said.setdefault(place, "has one aircraft: an ownship and an intruder are needed")
-        same = np.add.reduceat(np.abs(weights - np.repeat(weights[first], np.diff(bounds))), first)
+        with np.errstate(invalid="ignore"):
+            same = np.add.reduceat(
+                np.abs(weights - np.repeat(weights[first], np.diff(bounds))), first
+            )
         for place in np.flatnonzero(same > 0.0).tolist():
             said.setdefault(place, "its aircraft have different weights")
         if said and (not skip_damaged or len(said) == len(rows_of)):
@@ -122,6 +148,8 @@ class _SetReader:
             lines = [f"{self.path}: encounter {rows_of[p]}: {said[p]}" for p in places]
             more = [f"and {len(lines) - _MOST_SAID} more"] if len(lines) > _MOST_SAID else []
             raise EncounterSetError("\n".join([*lines[:_MOST_SAID], *more]))
+        if not (weights > 0.0).any():
+            raise self.fail("all weights are 0")
         reference, extra = self.reference(), self.extra(first)
         found = EncounterSet(
             str(self.path), self.kind, rows_of, weights[first], bounds, tuple(map(str, names)),
@@ -150,17 +178,27 @@ class _SetReader:
                 raise self.fail(f"column {name!r}: holds {column.type}; lists are needed")
             lengths = np.asarray(pc.fill_null(pc.list_value_length(column), 0), dtype=np.int64)
             mine = np.concatenate([[0], np.cumsum(lengths)])
-            values = np.asarray(pc.list_flatten(column).to_numpy(zero_copy_only=False), dtype=float)
+            try:
+                flat = pc.list_flatten(column).to_numpy(zero_copy_only=False)
+                values: FloatArray = np.asarray(flat, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise self.fail(
+                    f"column {name!r}: holds {column.type}; numbers are needed"
+                ) from None
             if starts is None:
                 starts = mine
                 for row in np.flatnonzero(lengths == 0).tolist():
                     wrong[row] = f"{name} is empty"
             elif not np.array_equal(starts, mine):
-                row = int(np.flatnonzero(np.diff(starts) != lengths)[0])
-                raise self.fail(
-                    f"encounter {self.table['encounter'][row].as_py()}: {name} has {lengths[row]} "
-                    f"values, time_s has {starts[row + 1] - starts[row]}"
-                )
+                wanted = np.diff(starts)
+                for row in np.flatnonzero(wanted != lengths).tolist():
+                    said = f"{name} has {lengths[row]} values, time_s has {wanted[row]}"
+                    wrong.setdefault(row, said)
+                # Such rows are left out, or an error; until then they are as long as the others.
+                whole = np.full(int(starts[-1]), np.nan)
+                same = wanted == lengths
+                whole[np.repeat(same, wanted)] = values[np.repeat(same, lengths)]
+                values = whole
             found[name] = values
         assert starts is not None
         return starts, found, wrong
@@ -183,8 +221,8 @@ class _SetReader:
 
         with np.errstate(invalid="ignore"):
             note(np.flatnonzero(np.isnan(weights)), "weight is missing")
-            note(np.flatnonzero(~(weights >= 0.0) | ~np.isfinite(weights)), "weight must be a "
-                 "number of 0 or more")  # fmt: skip
+            good = (weights >= 0.0) & (weights <= LARGEST_WEIGHT)
+            note(np.flatnonzero(~good), f"weight must be a number from 0 to {LARGEST_WEIGHT:g}")
         note(np.flatnonzero([not isinstance(n, str) or not n for n in names]), "has no name")
         time_s = lists["time_s"]
         for name, values in lists.items():
@@ -216,15 +254,27 @@ class _SetReader:
         return found
 
     def reference(self) -> tuple[float, float]:
-        meta = json.loads((self.table.schema.metadata or {}).get(_META, b"{}"))
-        reference = meta.get("reference_deg", (0.0, 0.0))
+        try:
+            meta = json.loads((self.table.schema.metadata or {}).get(_META, b"{}"))
+        except (ValueError, RecursionError) as error:
+            raise self.fail(f"its metadata are no JSON ({str(error)[:200]})") from None
+        if not isinstance(meta, dict):
+            raise self.fail("its metadata must be a table (a JSON object)")
+        reference = meta.get("reference_deg", [0.0, 0.0])
+        if not is_place(reference):
+            raise self.fail(
+                f"its metadata: reference_deg = {shown_value(reference)}: must be [latitude, "
+                "longitude] in degrees, within ±89 and ±360"
+            )
         return float(reference[0]), float(reference[1])
 
     def extra(self, first: IntArray) -> dict[str, AnyArray]:
+        there = [name for name in EXTRA if name in self.table.column_names]
         return {
-            name: np.asarray(self.table[name].to_numpy(zero_copy_only=False))[first]
-            for name in EXTRA
-            if name in self.table.column_names
+            name: np.array(self.table[name].to_pylist(), dtype=object)[first]
+            if name == "geometry"
+            else self.column(name)[first]
+            for name in there
         }
 
 

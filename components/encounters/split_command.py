@@ -11,6 +11,7 @@ from components.encounters.splitting import expected_copies, nearness, split_set
 from components.encounters.table_file import kept_rows, numbers, read_table
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, resolve_home
 from dsa_des.files.output_file import check_ending, check_file
 from dsa_des.files.output_names import named, reason_of
@@ -52,6 +53,8 @@ def split_encounters(
         expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
     except ValueError as error:
         raise UsageError(f"--levels {levels} --copies {copies}: {error}") from None
+    lengths = np.diff(found.starts[found.first_rows])
+    refuse_samples(f"--copies {copies}", float(np.sum(expected * lengths)))
     made = split_set(found, expected, seed)
     if not len(made):
         raise UsageError(f"{file}: no encounter is left; more copies are needed")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from components.encounters.encounter_set import LARGEST_WEIGHT
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.files.input_files import (
@@ -149,8 +150,10 @@ def numbers(
     cells = table.column(name, option)
     values = np.array([_number(cell) for cell in cells])
     with np.errstate(invalid="ignore"):
-        good = (values == 0.0) | (values == 1.0) if flag else np.isfinite(values) & (values >= 0.0)
-    allowed = "must be 0 or 1" if flag else "must be a number of 0 or more"
+        zero_one = (values == 0.0) | (values == 1.0)
+        good = zero_one if flag else (values >= 0.0) & (values <= LARGEST_WEIGHT)
+    most = f"must be a number of 0 or more, {LARGEST_WEIGHT:g} at most"
+    allowed = "must be 0 or 1" if flag else most
     wrong = {
         row: f"{name} is missing: {allowed}"
         if cells[row] is None

@@ -51,7 +51,11 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
         text = read_input_text(path)
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    reader = csv.reader(io.StringIO(text))
+    try:
+        rows = [row for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise EncounterSetError(f"{path}: line {reader.line_num}: {error}") from None
     names = [name.strip() for name in rows[0]] if rows else []
     wanted = _PLANE if "time_s" in names else _GEODETIC
     for name in wanted:
@@ -75,6 +79,11 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
             raise EncounterSetError(f"{path}: line {line}: holds something else than numbers")
         if values[0] < 0.0:
             raise EncounterSetError(f"{path}: line {line}: time = {values[0]:g} is negative")
+        if wanted is _GEODETIC and not (abs(values[1]) <= 90.0 and abs(values[2]) <= 360.0):
+            raise EncounterSetError(
+                f"{path}: line {line}: lat, lon = {values[1]:g}, {values[2]:g}: must lie within "
+                "±90 and ±360 degrees"
+            )
         found.setdefault(who, []).append(values)
     if not found:
         raise EncounterSetError(f"{path}: a row of column names and rows of samples are needed")
@@ -103,13 +112,13 @@ def read_track_matrices(path: Path) -> Tracks:
         If it cannot be read, or holds none.
     """
     from scipy.io import loadmat
-    from scipy.io.matlab import MatlabObject, MatlabOpaque, MatReadError
+    from scipy.io.matlab import MatlabObject, MatlabOpaque
 
     try:
         content = loadmat(io.BytesIO(read_input_bytes(path)))
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None
-    except (MatReadError, ValueError, TypeError, NotImplementedError, EOFError) as error:
+    except Exception as error:  # SciPy raises whatever comes of bytes that it does not check
         raise EncounterSetError(
             f"{path}: is no MATLAB file of version 7 or less: {str(error)[:200]}"
         ) from None

@@ -28,14 +28,13 @@ def _when(time_s: float) -> str:
 
 def _detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, float, float]]:
     """Give sensor, target, time, longitude, latitude and height of detections with a range."""
-    table = run.tables.get("detections")
-    if table is None:
+    if "detections" not in run.tables:
         return
     number: dict[str, FloatArray] = {
-        name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=float)
+        name: run.numbers("detections", name)
         for name in ("time_s", "azimuth_rad", "elevation_rad", "range_m", *_POSE)
     }
-    there = np.flatnonzero(np.isfinite(number["range_m"]) & np.isfinite(number["own_lat_deg"]))
+    there = np.flatnonzero(np.isfinite(list(number.values())).all(axis=0))
     if len(there) == 0:
         return
     number = {name: values[there] for name, values in number.items()}
@@ -57,10 +56,10 @@ def _detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, flo
         reference_lon_deg=number["own_lon_deg"],
         reference_alt_m=number["own_alt_m"],
     )
-    sensors, targets = table["block"].to_pylist(), table["target"].to_pylist()
+    sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
     places = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
     for row, time_s, place in zip(there.tolist(), number["time_s"].tolist(), places, strict=True):
-        yield sensors[row], targets[row] or "", time_s, *place
+        yield sensors[row] or "", targets[row] or "", time_s, *place
 
 
 def kml_text(run: RecordedTables) -> str:

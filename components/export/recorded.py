@@ -17,6 +17,8 @@ _STATE = (
     "velocity_down_m_s", "heading_rad", "pitch_rad", "roll_rad",
 )  # fmt: skip
 OWNSHIP = "ownship"
+# Greater than any position, speed or time of a run.
+_LARGEST = 1e10
 
 
 @dataclass(frozen=True)
@@ -52,12 +54,18 @@ class RecordedTables:
                 f"{self.folder}: has no truth.parquet, which holds the flights: it is recorded "
                 "where it is small; ask for it with truth = true under [record]"
             )
-        truth = self.tables["truth"]
-        names = truth["target"].to_pylist()
+        names = self.texts("truth", "target")
         if OWNSHIP in names:
             raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
         found: dict[str, dict[str, FloatArray]] = {}
-        columns = {name: truth[name].to_numpy(zero_copy_only=False) for name in _STATE}
+        columns = {name: self.numbers("truth", name) for name in _STATE}
+        for name, values in columns.items():
+            if not (np.abs(values) <= _LARGEST).all():
+                row = int(np.argmax(~(np.abs(values) <= _LARGEST)))
+                raise UsageError(
+                    f"{self.folder}: truth.parquet: {name} in row {row} is {values[row]:g}: a "
+                    f"flight needs numbers within ±{_LARGEST:g}"
+                )
         who = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
         for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
             mine = np.flatnonzero(who == name)
@@ -66,6 +74,35 @@ class RecordedTables:
             if len(time_s):
                 found[name] = {key: values[mine][first] for key, values in columns.items()}
         return found
+
+    def numbers(self, table: str, name: str) -> FloatArray:
+        """Return a column as numbers, NaN where nothing stands.
+
+        Raises
+        ------
+        UsageError
+            If it is missing, or holds something else.
+        """
+        try:
+            column = self._column(table, name).to_numpy(zero_copy_only=False)
+            return np.asarray(column, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise UsageError(f"{self.folder}: {table}.parquet: {name} holds no numbers") from None
+
+    def texts(self, table: str, name: str) -> list[str | None]:
+        """Return a column of texts, as `numbers` does one of numbers."""
+        found = self._column(table, name).to_pylist()
+        if not all(text is None or isinstance(text, str) for text in found):
+            raise UsageError(
+                f"{self.folder}: {table}.parquet: {name} holds something else than text"
+            )
+        return found
+
+    def _column(self, table: str, name: str) -> Any:
+        columns = self.tables[table]
+        if columns.column_names.count(name) != 1:
+            raise UsageError(f"{self.folder}: {table}.parquet: there is no column {name!r}")
+        return columns[name]
 
 
 def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:

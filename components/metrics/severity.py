@@ -19,7 +19,7 @@ from components.well_clear.severity import loss_severity
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Result
+from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result
 
 # The best of the grid is looked at again with this much finer steps to both sides.
 _FINER = 50
@@ -78,7 +78,7 @@ class Severity(TargetMetric):
         """Return both."""
         return [
             Result("slowc_percent", NUMBER, "largest severity of the loss of well clear, percent"),
-            Result("pnmac", NUMBER, "probability of an NMAC, errors of the altimeters included"),
+            Result("pnmac", FRACTION, "probability of an NMAC, errors of the altimeters included"),
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:

@@ -22,7 +22,7 @@ from components.metrics.single_sensor import only_feed
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, recorded_by
 
 
 class _Lines:
@@ -203,7 +203,7 @@ class TrackUpdates(TargetMetric):
         return [
             Result("track_update_interval_s", NUMBER, "mean time between updates of a track, s"),
             Result("track_update_interval_p95_s", NUMBER, "95th percentile of it, s"),
-            Result("track_continuity", NUMBER, "share of a track's time that it is not broken"),
+            Result("track_continuity", FRACTION, "share of a track's time that it is not broken"),
             Result("track_breaks", NUMBER, "number of breaks"),
         ]
 

@@ -15,7 +15,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, NUMBER, Group, Metric, Result, recorded_by
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
@@ -48,7 +48,7 @@ _RESULTS = {
     "track_positional_accuracy_m": "distance of tracks from their targets, mean, m (SIAP)",
     "track_velocity_accuracy_m_s": "size of their velocity's error, mean, m/s (SIAP)",
     "track_number_changes_per_s": "changes of track number by the time tracked, 1/s (SIAP)",
-    "track_longest_share": "longest time of one track on each target by all its time (SIAP)",
+    "track_longest_share": "share of targets' time that they keep their longest track (SIAP)",
     "track_confirmation_s": "time from a target's first detection to its first confirmed track, "
     "mean, s",
     "track_confirmation_from_coverage_s": "the same from when it enters the field and range of a "
@@ -135,7 +135,11 @@ class Tracking(Metric):
             Result(_at(end, of), NUMBER, f"normalised error squared up to {end:g} s")
             for end in self._ends_s
         ]
-        return [*(Result(name + of, NUMBER, says) for name, says in _RESULTS.items()), *series]
+        whole = [
+            Result(name + of, FRACTION if says.startswith("share") else NUMBER, says)
+            for name, says in _RESULTS.items()
+        ]
+        return [*whole, *series]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all of every replica."""

@@ -1,7 +1,9 @@
 """The base class of EO and IR cameras: pixels, signature, threshold (thesis §3.5.2)."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -12,8 +14,19 @@ from components.aircraft.known_targets import known_targets
 from components.geometry.field_of_view import sector_width_rad
 from components.optical.area_of_cells import check_silhouette
 from components.optical.centroid_accuracy import centroid_variance
+from components.optical.detection import (
+    FAINTEST_DEVIATIONS,
+    FAINTEST_PD,
+    detection_probability,
+    noise_equivalent_pixels,
+)
+from components.optical.detector import (
+    CameraCalibration,
+    CameraDetector,
+    farthest_detection_m,
+    settled,
+)
 from components.optical.dynamic_signature import DynamicSignature
-from components.optical.farthest_range import farthest_detection_m
 from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
@@ -32,7 +45,11 @@ class CameraParameters(SensorParameters):
 
     azimuth_pixels: int = Field(gt=0, description="Pixels across the field of view.")
     elevation_pixels: int = Field(gt=0, description="Pixels from its lower to its upper edge.")
-    threshold: float = Field(default=1.0, description="Signature needed for a detection (eq. 19).")
+    threshold: float | None = Field(
+        default=None,
+        description="Signature needed for a detection (eq. 19); by default 1, or what two of "
+        "noise_equivalent_contrast, false_alarms_per_frame and calibrate say.",
+    )
     cued_threshold: float | None = Field(
         default=None,
         ge=0,
@@ -65,15 +82,29 @@ class CameraParameters(SensorParameters):
     )
     noise_equivalent_contrast: float | None = Field(
         default=None,
-        gt=0,
-        description="Contrast gain of a target that stands out by as much as a pixel's noise, for "
-        "errors = 'signal'.",
+        ge=0,
+        description="Contrast gain of a target that stands out by as much as a pixel's noise. By "
+        "default the noise follows from the threshold and false_alarms_per_frame, or calibrate; 0 "
+        "is the thesis's rule: what reaches the threshold is detected, nothing else is.",
+    )
+    calibrate: CameraCalibration | None = Field(
+        default=None,
+        description="A known detection range, from which noise or threshold, or both, follow.",
     )
     blur_pixels: float = Field(
         default=0.5, gt=0, description="Standard deviation of the picture's blur, pixels."
     )
-    false_alarms_per_frame: float = Field(
-        default=0.0, ge=0, le=1, description="Probability that a frame brings a false alarm."
+    false_alarms_per_frame: float | None = Field(
+        default=None,
+        ge=0,
+        le=1e5,
+        description="False alarms expected in a frame, from which the noise follows at a given "
+        "threshold, or the threshold at a given noise; by default 0.0001 where noise is not given.",
+    )
+    false_alarms: bool | None = Field(
+        default=None,
+        description="Whether noise is reported too, anywhere in the picture; by default where "
+        "false_alarms_per_frame is given.",
     )
     marked_false_alarms: bool = Field(
         default=False,
@@ -84,30 +115,48 @@ class CameraParameters(SensorParameters):
     def without_effect(self) -> list[str]:
         """Say which keys belong to errors, false alarms and rates that there are not."""
         said = super().without_effect()
-        if self.errors != "signal":
-            of_signal = "noise_equivalent_contrast", "blur_pixels"
-            said += self.idle(*of_signal, because=f"errors is '{self.errors}'")
-        if not self.false_alarms_per_frame:
-            said += self.idle("marked_false_alarms", because="false_alarms_per_frame is 0")
+        if self.noise_equivalent_contrast == 0 and self.errors != "signal":
+            said += self.idle("blur_pixels", because="there is no noise")
+        if not self.reports_noise:
+            said += self.idle("marked_false_alarms", because="no false alarms are reported")
         if not self.dynamic_weight:
             said += self.idle("rate", because="dynamic_weight is 0")
         return said
 
     @model_validator(mode="after")
-    def _noise_is_known(self) -> Self:
-        if self.errors == "signal" and self.noise_equivalent_contrast is None:
+    def _any_two_say_the_others(self) -> Self:
+        keys = "threshold", "noise_equivalent_contrast", "false_alarms_per_frame", "calibrate"
+        given = [key for key in keys if getattr(self, key) is not None]
+        silent = self.noise_equivalent_contrast == 0
+        if len(given) > 2 and not (silent and self.calibrate is None):
             raise ValueError(
-                "errors is 'signal' and noise_equivalent_contrast is not given: errors are a share "
-                "of the picture by how much it stands out of noise"
+                f"{', '.join(given[:-1])} and {given[-1]} are given, and any two of them say the "
+                f"{'third' if len(given) == 3 else 'others'}: leave one out"
+            )
+        if silent and self.calibrate is not None:
+            raise ValueError("noise_equivalent_contrast is 0: without noise calibrate has no Pd")
+        if silent and self.errors == "signal":
+            raise ValueError(
+                "errors is 'signal' and noise_equivalent_contrast is 0: errors are a share of the "
+                "picture by how much it stands out of noise"
             )
         return self
 
+    @property
+    def reports_noise(self) -> bool:
+        """Whether there are false alarms in its reports."""
+        if self.false_alarms is None:
+            return bool(self.false_alarms_per_frame)
+        return self.false_alarms
+
 
 class Camera(Sensor):
-    """A camera: a target is detected when its signature reaches the threshold.
+    """A camera: a target is detected when its signature, as measured, reaches the threshold.
 
     E = a·Q·P + b·V with Q pixels covered, P contrast gain and V the rate of the line of sight
-    (eq. 18); confidence is C = E - threshold, in the unit of the threshold (eq. 19).
+    (eq. 18). Each look measures E once with Gaussian noise. Confidence is C = sample - threshold,
+    in the unit of the threshold (eq. 19); pixels are those that a target of contrast 1 covers
+    whose signature is the sample. ``looks`` has the pixels that are covered, and Pd.
     """
 
     Parameters = CameraParameters
@@ -139,10 +188,22 @@ class Camera(Sensor):
             self.azimuth_step_rad = self.pixel_azimuth_rad
         if not parameters.elevation_resolution_deg:
             self.elevation_step_rad = self.pixel_elevation_rad
-        self._all_pixels = float(self.p.azimuth_pixels * self.p.elevation_pixels)
+        self.all_pixels = float(self.p.azimuth_pixels * self.p.elevation_pixels)
+        self._noise = self.stream("signature noise")
         self._areas: list[CellValues] = []
         self._contrast_factors: list[CellValues] = []
         self._signatures: list[CellValues] = []
+
+    @cached_property
+    def detector(self) -> CameraDetector:
+        """Its threshold and noise, by what the scene states of them."""
+        spot = noise_equivalent_pixels(self.p.blur_pixels)
+        return settled(self, max(1, round(self.all_pixels / spot)), self._weight * math.sqrt(spot))
+
+    @property
+    def _weight(self) -> float:
+        # Without a weight of its own, size says nothing: as much as if it had the unit one.
+        return float(self.p.static_weight or 1.0)
 
     def setup(self) -> None:
         """Check the targets' silhouettes, and take what effects do to area, signature, contrast."""
@@ -151,6 +212,11 @@ class Camera(Sensor):
         self._areas = self.built("area")
         self._contrast_factors = self.built("contrast")
         self._signatures = self.built("signature")
+        if self.p.errors == "signal" and self.detector.noise == 0.0:
+            raise ValueError(
+                "errors is 'signal' and noise_equivalent_contrast is not given, and neither do a "
+                "threshold above 0 and false alarms say how large the noise is"
+            )
         if any(self.built("darkness")):
             self.reach = replace(self.reach, enabled=False)
         if not self.context.simulate_everything:
@@ -159,7 +225,9 @@ class Camera(Sensor):
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
     def exact_because(self) -> str:
-        """A rate divides the change of an error from scan to scan by the scan's period."""
+        """A rate divides an error's change by the scan's period; Pd has no proven bound."""
+        if self.detector.noise and "detection_probability" in self.context.tolerance:
+            return f"no bound is proven for the Pd of {self.name}"
         if not self._signatures:
             return ""
         weight = self.p.dynamic_weight
@@ -167,12 +235,12 @@ class Camera(Sensor):
 
     def left_out(self) -> list[str]:
         """Say beyond which range nothing can reach the threshold, and what `auto` came to."""
-        said = []
+        said = [*super().left_out()]
         if self.reach.range_max_m < self.stated_reach.range_max_m:
             range_km = self.reach.range_max_m / 1000.0
             said.append(
                 f"targets beyond {range_km:.2f} km: not looked at, even the largest of them, seen "
-                "from its largest side, cannot reach the threshold there"
+                f"from its largest side, {self._too_faint()} there"
             )
         if self.p.model == "auto":
             said.append(
@@ -180,6 +248,11 @@ class Camera(Sensor):
                 "error bound proven"
             )
         return said
+
+    def _too_faint(self) -> str:
+        if self.detector.noise:
+            return f"has a Pd below {FAINTEST_PD:g}, which counts as none,"
+        return "cannot reach the threshold"
 
     @property
     def contrast_column(self) -> str:
@@ -209,7 +282,7 @@ class Camera(Sensor):
             cells.range_m,
             self.pixel_azimuth_rad,
             self.pixel_elevation_rad,
-            self._all_pixels,
+            self.all_pixels,
         )
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
@@ -218,21 +291,50 @@ class Camera(Sensor):
         signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
             signature = signature + added(cells)
-        margin = signature - self._threshold_of(cells)
-        signal = {"pixels": pixels, "contrast": contrast}
-        return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
+        threshold = self._threshold_of(cells)
+        noise = self.detector.noise
+        if not noise:
+            margin = signature - threshold
+            signal = {"pixels": pixels, "contrast": contrast}
+            return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
+        keys = cells.roster.keys_of(cells.target)
+        sample = signature + noise * self._noise.normal(keys, cells.scan)
+        margin = sample - threshold
+        seen = (margin >= 0.0) & (signature > threshold - FAINTEST_DEVIATIONS * noise)
+        extras = {"pixels": pixels}
+        if self._says_looks:
+            extras["detection_probability"] = detection_probability(signature, threshold, noise)
+        return Look(seen, margin, extras, self.signal_of(sample, np.ones(len(cells))))
+
+    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+        """Return what is recorded beside a detection: of a measured signature what it says."""
+        extras = dict(super()._extras(cells, look))
+        if self.detector.noise:
+            extras["pixels"] = look.signal["pixels"]
+            extras.pop("detection_probability", None)
+        return extras
+
+    def report(self) -> dict[str, Any]:
+        """Return threshold, noise and false alarms in use."""
+        found = self.detector
+        used = {
+            "threshold": found.threshold,
+            "noise": found.noise,
+            "false_alarms_per_frame": found.false_alarms,
+        }
+        return {**super().report(), "cameras": {self.name: used}}
 
     def _threshold_of(self, cells: Cells) -> Any:
         """Return the threshold: one for all, or each cell's own where some are cued."""
         if cells.cued is None or self.p.cued_threshold is None:
-            return self.p.threshold
-        return np.where(cells.cued, self.p.cued_threshold, self.p.threshold)
+            return self.detector.threshold
+        return np.where(cells.cued, self.p.cued_threshold, self.detector.threshold)
 
     def lowest_threshold(self) -> float:
         """Return the least signature that is ever detected."""
         if self.p.cued_threshold is None or not self.built("cue"):
-            return float(self.p.threshold)
-        return float(min(self.p.threshold, self.p.cued_threshold))
+            return self.detector.threshold
+        return float(min(self.detector.threshold, self.p.cued_threshold))
 
     def warnings(self) -> list[str]:
         """Say which cues change nothing."""
@@ -240,7 +342,8 @@ class Camera(Sensor):
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the angles to the target's centre in the picture."""
-        ratio = signal["contrast"] / self.p.noise_equivalent_contrast
+        of_contrast = self._weight * math.sqrt(noise_equivalent_pixels(self.p.blur_pixels))
+        ratio = signal["contrast"] * (of_contrast / self.detector.noise)
         variance = centroid_variance(signal["pixels"], ratio, self.p.blur_pixels)
         return {
             "azimuth": self.pixel_azimuth_rad**2 * variance,
@@ -248,14 +351,16 @@ class Camera(Sensor):
         }
 
     def contrasts_of(self, roster: Roster) -> FloatArray:
-        """Return the contrast gains that the targets have by themselves, each once; else 1."""
-        if not self.contrast_column or not len(roster):
+        """Return the contrast gains that false alarms may be of: the targets', each once; else 1.
+
+        A signature that is measured with noise does not say of which contrast it is.
+        """
+        if self.detector.noise or not self.contrast_column or not len(roster):
             return np.ones(1)
         found = np.unique(roster.column(self.contrast_column))
         return found[found > 0.0] if (found > 0.0).any() else np.ones(1)
 
     def signal_of(self, signature: FloatArray, contrast: FloatArray) -> dict[str, FloatArray]:
         """Return the signal of targets that have some signatures by their size alone (eq. 18)."""
-        # Without a weight of its own, size says nothing: as much as if it had the unit one.
-        pixels = signature / ((self.p.static_weight or 1.0) * contrast)
-        return {"pixels": np.minimum(pixels, self._all_pixels), "contrast": contrast}
+        pixels = np.maximum(signature, 0.0) / (self._weight * contrast)
+        return {"pixels": np.minimum(pixels, self.all_pixels), "contrast": contrast}

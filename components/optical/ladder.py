@@ -35,7 +35,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
                 * as_camera.pixel_elevation_rad
             )
             weight = as_camera.p.static_weight
-            return {_AREA.name: pixel_m2 * as_camera.p.threshold / (weight * contrast)}
+            return {_AREA.name: pixel_m2 * as_camera.detector.threshold / (weight * contrast)}
 
     else:
 

@@ -135,8 +135,8 @@ class SensorParameters(ErrorParameters):
         """What detections are counted of."""
         if self.declare_by is not None:
             return self.declare_by
-        # Radars and cameras that can have false alarms say so by these keys.
-        noisy = getattr(self, "false_alarms", False) or getattr(self, "false_alarms_per_frame", 0)
+        # Radars and cameras that can have false alarms say so by these.
+        noisy = getattr(self, "reports_noise", getattr(self, "false_alarms", False))
         return "place" if noisy else "target"
 
     def reach(self) -> Reach:

@@ -26,6 +26,17 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 Table = Mapping[str, Any]
 
 
+class _TableColumns(dict[str, Any]):
+    """A table's columns; one that is asked for and not there is said with the file."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+
+    def __missing__(self, name: str) -> Any:
+        raise UsageError(f"{self._path}: there is no column {name!r}")
+
+
 def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run.
 
@@ -137,7 +148,7 @@ def _table(path: Path) -> Table | None:
         table = pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
         raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
-    found: dict[str, Any] = {}
+    found = _TableColumns(path)
     for name in table.column_names:
         column = table[name]
         if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
 from dsa_des.errors import SceneError
+from dsa_des.errors.budgets import MOST_SCANS
 from dsa_des.running.node import Node
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import ScanClock
@@ -11,8 +12,6 @@ from dsa_des.time.timeline import ReplicaTime
 
 # A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
 CELLS_PER_WINDOW = 131072
-# At a microsecond each, the fewest that anything takes, eleven days.
-_MOST_SCANS = 1e12
 
 
 def scans_of(nodes: Mapping[str, Node], time: ReplicaTime) -> float:
@@ -22,10 +21,10 @@ def scans_of(nodes: Mapping[str, Node], time: ReplicaTime) -> float:
 
 def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
     """Raise SceneError if a run has more scans than are ever simulated."""
-    if scans > _MOST_SCANS:
+    if scans > MOST_SCANS:
         message = (
             f"is {duration_s:.4g} s, in which the clocks of this scene make "
-            f"{scans:.2g} scans: at most {_MOST_SCANS:.0e} are simulated"
+            f"{scans:.2g} scans: at most {MOST_SCANS:.0e} are simulated"
         )
         raise SceneError([scene.problem("duration_s", message)])
 

@@ -1,7 +1,8 @@
 """Requirements turned round: the cheapest value of an axis that keeps a result within a limit.
 
 The values of the axis stand from cheap to dear. A value meets a limit where the *interval* of the
-result lies within it, not the estimate alone. Values are looked at from the dearest down, and the
+result lies within it, not the estimate alone; an interval of too few values (`Estimate.few`), whose
+ends are not as sure as they say, meets none. Values are looked at from the dearest down, and the
 first that does not meet the limit ends it: the cheapest is the last before it. Tests that are taken
 in an order fixed beforehand, up to the first that fails, need no correction for their number
 (Westfall & Krishen, Journal of Statistical Planning and Inference 99, 2001), so each answer is as
@@ -65,7 +66,10 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
     told = []
     for at, some in found.items():
         dearest_first = some if requirement.cheap_last else some[::-1]
-        sure = [requirement.met(line.estimate.low, line.estimate.high) for line in dearest_first]
+        sure = [
+            not line.estimate.few and requirement.met(line.estimate.low, line.estimate.high)
+            for line in dearest_first
+        ]
         likely = [
             requirement.met(line.estimate.value, line.estimate.value) for line in dearest_first
         ]

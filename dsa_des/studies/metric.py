@@ -29,9 +29,11 @@ METRICS = "dsa_des.metrics"
 
 _T = TypeVar("_T")
 
-#: Kinds of results: a number with a mean; an event that happens or not; a share of trials; the
-#: ratio of two events over all units of a cell; the name of a class.
-NUMBER, EVENT, SHARE, RATIO, CLASS = "number", "event", "share", "ratio", "class"
+#: Kinds of results: a number with a mean; a number from 0 to 1 with a mean, such as a share of the
+#: time; an event that happens or not; a share of trials; the ratio of two events over all units of
+#: a cell; the name of a class.
+NUMBER, FRACTION, EVENT, SHARE = "number", "fraction", "event", "share"
+RATIO, CLASS = "ratio", "class"
 #: What is put behind the name of a share for the column of its trials.
 TRIALS = ".trials"
 
@@ -89,8 +91,9 @@ class Result:
     ----------
     name : str
         With its unit, for example ``declaration_time_s.radar``.
-    kind : {"number", "event", "share", "ratio", "class"}
-        A number may be NaN (no value in this run); an event is 0 or 1; a share has a second
+    kind : {"number", "fraction", "event", "share", "ratio", "class"}
+        A number may be NaN (no value in this run), and so may a fraction, which lies between 0 and
+        1, as does the interval of its mean; an event is 0 or 1; a share has a second
         column ``NAME.trials``, and is NaN without trials. A class is a text or None, and stands in
         no summary. A ratio has no column: it is made of others (`ratio`) over the runs of a cell.
     meaning : str

@@ -18,7 +18,7 @@ from dsa_des.studies.folder import StudyFolder
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.labels import short, value_label
 from dsa_des.studies.map_figure import draw_map
-from dsa_des.studies.metric import NUMBER
+from dsa_des.studies.metric import FRACTION, NUMBER
 from dsa_des.studies.record import FigureRecord, StudyRecord
 from dsa_des.studies.requirements import Requirement
 from dsa_des.studies.seal import parquet
@@ -157,7 +157,7 @@ class Tables:
             "mitigated_probability", "few", "reason",
         ):  # fmt: skip
             columns[name] = [getattr(one, name) for one in told]
-        for method in ("delta", "bootstrap"):
+        for method in ("gamma", "bootstrap"):
             both = [{r.method: r for r in (line.ratio, line.other) if r is not None}
                     for line in lines]  # fmt: skip
             found = [known.get(method) for known in both]
@@ -346,7 +346,9 @@ class Tables:
             numbers = {result.name for result in self.results if result.is_number}
             return [name for name in dict.fromkeys(only or drawn) if name in numbers]
         differing = [c.result for c in self.compared if c.difference.paired.half_width > 0]
-        return list(dict.fromkeys(r.name for r in differing if r.kind == NUMBER))[:_MOST_SCATTERS]
+        return list(dict.fromkeys(r.name for r in differing if r.kind in (NUMBER, FRACTION)))[
+            :_MOST_SCATTERS
+        ]
 
     def _draw_scatters(self, axis: str, baseline: Any, only: Sequence[str]) -> list[Path]:
         """Draw results of two types in one block against each other."""

@@ -113,12 +113,14 @@ def _show_answers(console: Any, tables: Tables) -> None:
     sure = f"{100 * one_sided(tables.record.confidence):g} %"
     print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)
     if any(answer.value is None for answer in tables.answers):
-        console.print("none: the interval of the dearest does not lie within the limit")
+        console.print(
+            "none: the interval of the dearest does not lie within the limit, or is marked *"
+        )
 
 
 #: Columns of the table of ratios, behind those of the axes.
 RATIO_HEADS = (
-    "ratio of events", "unresolved", "induced", "delta", "bootstrap", "effective size",
+    "ratio of events", "unresolved", "induced", "gamma", "bootstrap", "effective size",
     "nominal, mitigated, induced", "without",
 )  # fmt: skip
 
@@ -136,7 +138,7 @@ def ratio_cells(line: Line) -> list[str]:
         return f"{short(low)} to {short(high)}" + (" *" if by[method].few else "")
 
     return [
-        line.result.name, short(found.unresolved), short(found.induced), interval("delta"),
+        line.result.name, short(found.unresolved), short(found.induced), interval("gamma"),
         interval("bootstrap"), f"{found.effective_sample_size:.1f} of {found.encounters}",
         found.reason
         or f"{found.nominal_events}, {found.mitigated_events}, {found.induced_events}",

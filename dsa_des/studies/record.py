@@ -68,7 +68,7 @@ class ResultRecord(StrictRecord):
     """A result of a metric; see `Result`."""
 
     name: str
-    kind: Literal["number", "event", "share", "ratio", "class"]
+    kind: Literal["number", "fraction", "event", "share", "ratio", "class"]
     meaning: str
     cut_off: str | None = None
     told: tuple[str, str, str] | None = None

@@ -1,7 +1,7 @@
 """Confidence intervals: Wilson for shares, t or bootstrap for means, paired for differences."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -145,6 +145,27 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     return Estimate(value, low, high, count, count < FEW)
 
 
+def fraction(values: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of independent values between 0 and 1; NaN ones are left out.
+
+    The interval is Wilson's with as many trials as would make a share as uncertain as the mean is
+    by Student's t, so it stays between 0 and 1; where all values are alike each is one trial.
+
+    Parameters
+    ----------
+    values : (n,)
+    confidence : float
+    """
+    plain = mean(values, confidence)
+    if plain.count < 2:
+        return plain
+    error = normal_error(plain, confidence)
+    spread = plain.value * (1.0 - plain.value)
+    trials = spread / error**2 if spread > 0.0 and error > 1e-9 else float(plain.count)
+    low, high = wilson(plain.value * trials, trials, confidence)
+    return Estimate(plain.value, low, high, plain.count, plain.few)
+
+
 def symmetric(value: float, error: float, count: int, few: bool, confidence: float) -> Estimate:
     """Return an estimate whose interval is that of the normal distribution."""
     half = _z(confidence) * error
@@ -236,11 +257,12 @@ def difference(
         NaN where a unit has no value.
     confidence : float
     method : {"t", "bootstrap"}
-    kind : {"number", "event", "share"}
-        Events, and shares of which each unit has all or nothing, are counted: their paired interval
-        is that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
-        proportions based on paired data", Journal of Educational and Behavioral Statistics 37
-        (2012). It is no point where no unit differs.
+    kind : {"number", "fraction", "event", "share"}
+        Of all but numbers no interval reaches beyond -1 and 1. Events, and shares of which each
+        unit has all or nothing, are counted: their paired interval is that of Bonett and Price,
+        "Adjusted Wald confidence interval for a difference of binomial proportions based on paired
+        data", Journal of Educational and Behavioral Statistics 37 (2012). It is no point where no
+        unit differs.
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
@@ -248,12 +270,20 @@ def difference(
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
     paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
+    unpaired = _welch(first[both], second[both], confidence)
+    if kind != "number":
+        paired, unpaired = _of_shares(paired), _of_shares(unpaired)
     return EstimatedDifference(
         paired,
-        _welch(first[both], second[both], confidence),
+        unpaired,
         int((here & ~there).sum()),
         int((there & ~here).sum()),
     )
+
+
+def _of_shares(found: Estimate) -> Estimate:
+    """Return a difference of shares whose interval holds nothing that none can be."""
+    return replace(found, low=max(-1.0, found.low), high=min(1.0, found.high))
 
 
 def _counted(changes: FloatArray, confidence: float) -> Estimate:
@@ -271,8 +301,7 @@ def _counted(changes: FloatArray, confidence: float) -> Estimate:
     middle = math.fsum(more) / len(more)
     error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
     half = t_quantile(count - 1, confidence) * error
-    low, high = max(-1.0, middle - half), min(1.0, middle + half)
-    return Estimate(value, low, high, count, count < FEW)
+    return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 
 def _welch(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:

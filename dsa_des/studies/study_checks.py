@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
+from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -13,6 +14,7 @@ from dsa_des.scene.steps import key_in
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.metric import (
     CLASS,
+    FRACTION,
     NUMBER,
     SHARE,
     TRIALS,
@@ -105,6 +107,17 @@ def _check_ends(study: Study, scenes: list[Scene], add: Callable[..., None]) -> 
             break
 
 
+def _endless(study: Study, scans: float) -> str:
+    """Return why a study whose runs have so many scans is not begun, nothing if it is."""
+    runs = study.replicas * len(study.cells)
+    if runs * scans <= MOST_STUDY_SCANS:
+        return ""
+    return (
+        f"{runs:,} runs of {scans:.2g} scans are {runs * scans:.2g} scans in all: at most "
+        f"{MOST_STUDY_SCANS:.0e} are begun, {int(MOST_STUDY_SCANS / scans):,} runs like these"
+    )
+
+
 def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Problem]:
     """Set up a run, and return what is wrong with it or with the metrics.
 
@@ -116,7 +129,10 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
     wrong: dict[int, str] | None = None
     for scene in scenes:
         try:
-            blocks = Simulation(scene_of(scene, study.replica(0))).components
+            simulation = Simulation(scene_of(scene, study.replica(0)))
+            if wrong is None and (said := _endless(study, simulation.scans)):
+                return [file.problem(("replicas",), said)]
+            blocks = simulation.components
         except (SceneError, BlockFailure) as error:
             if wrong is None:
                 if isinstance(error, SceneError):
@@ -168,9 +184,10 @@ def _check_names(study: Study, results: Mapping[str, Result], add: Callable[...,
             message += did_you_mean(str(figure["metric"]), names)
             add(("figures", number, "metric"), message, str(figure["metric"]))
         elif figure["kind"] in ("histogram", "cdf") and (
-            results[figure["metric"]].kind not in (NUMBER, SHARE)
+            results[figure["metric"]].kind not in (NUMBER, FRACTION, SHARE)
         ):
-            numbers = [name for name in names if results[name].kind in (NUMBER, SHARE)]
+            spread = (NUMBER, FRACTION, SHARE)
+            numbers = [name for name in names if results[name].kind in spread]
             what = {"event": "an event, 0 or 1"}.get(results[figure["metric"]].kind, "a ratio")
             message = f"is {what}: a {figure['kind']} shows how numbers are spread"
             message += f"; numbers are {', '.join(numbers[:4])}" if numbers else ""

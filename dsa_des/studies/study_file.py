@@ -13,6 +13,7 @@ from dsa_des.block.component import SourcedText
 from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
+from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.overrides import apply_set
 from dsa_des.scene.parameter_errors import explain
@@ -32,8 +33,6 @@ KEYS = (
     "figures", "requirements", "stop_when", "compare", "over", "confidence", "interval",
     "runs_per_chunk",
 )  # fmt: skip
-_MOST_RUNS = 100_000_000
-_MOST_CELLS = 1_000_000
 
 
 def read_study(
@@ -131,12 +130,12 @@ class _StudyReader:
         axes = self.axes(scene, swaps)
         cells = math.prod(len(axis.labels) for axis in axes)
         runs = replicas * cells
-        if cells > _MOST_CELLS:
-            self.add(("axes",), f"make {cells:,} cells; at most {_MOST_CELLS:,} are allowed")
+        if cells > MOST_CELLS:
+            self.add(("axes",), f"make {cells:,} cells; at most {MOST_CELLS:,} are allowed")
             raise SceneError(self.problems)
-        if runs > _MOST_RUNS:
+        if runs > MOST_RUNS:
             runs_are = f"{cells:,} cells make {runs:,} runs" if runs < 10**18 else "are too many"
-            self.add(("replicas",), f"{runs_are}; at most {_MOST_RUNS:,} runs are allowed")
+            self.add(("replicas",), f"{runs_are}; at most {MOST_RUNS:,} runs are allowed")
             raise SceneError(self.problems)
         study = Study(
             path=Path(self.file.path),

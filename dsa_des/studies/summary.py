@@ -13,12 +13,13 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.studies.chunk import CRASHED
-from dsa_des.studies.metric import CLASS, EVENT, RATIO, SHARE, TRIALS, Result
+from dsa_des.studies.metric import CLASS, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
 from dsa_des.studies.ratio import PairedRatio, influences, paired_ratio
 from dsa_des.studies.statistics import (
     Estimate,
     EstimatedDifference,
     difference,
+    fraction,
     mean,
     normal_error,
     share,
@@ -115,6 +116,8 @@ class Rows:
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
             _, of_units = self.by_unit(result.name, rows)
+            if result.kind == FRACTION:
+                return fraction(of_units, confidence), missing
             return mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:
@@ -134,7 +137,7 @@ class Rows:
         """
         found, used, missing = self._paired(result, rows)
         below, above, weight, cluster = found
-        method = "bootstrap" if method == "bootstrap" else "delta"
+        method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
             below, above, weight, cluster=together, confidence=confidence, method=method,
@@ -181,7 +184,9 @@ class Rows:
         parts, ratios, cluster = [], [], sides[0][0][3][here]
         for (columns, _, _), common in zip(sides, (here, there), strict=True):
             below, above, weight = (column[common] for column in columns[:3])
-            ratio = paired_ratio(below, above, weight, cluster=cluster, confidence=confidence)
+            ratio = paired_ratio(
+                below, above, weight, cluster=cluster, confidence=confidence, method="delta"
+            )
             ratios.append(ratio)
             if not ratio.reason:
                 parts.append(influences(below, above, weight, ratio.ratio))
@@ -280,7 +285,7 @@ def summarise(
                 estimate = estimate_of(ratio)
                 # Drawing sets again takes a while; of classes it is done only where it is asked.
                 if method == "bootstrap":
-                    other, _ = rows.ratio(result, chosen, confidence, "delta")
+                    other, _ = rows.ratio(result, chosen, confidence, "t")
                 elif result.ratio is not None and result.ratio.only is None:
                     other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
             else:

@@ -1,6 +1,7 @@
 """The docs build into one site, without warnings and without anything from the network."""
 
 import importlib.util
+import os
 import re
 import subprocess
 import sys
@@ -49,12 +50,14 @@ def test_every_page_is_in_the_navigation() -> None:
 def test_the_site_builds_without_warnings_and_loads_nothing(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="needs the extra docs")
     pytest.importorskip("mkdocstrings_handlers.python", reason="needs the extra docs")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(CONFIG)]
-    done = subprocess.run(
-        [*command, "-d", str(tmp_path / "site")], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    pages = [path for path in (tmp_path / "site").rglob("*") if path.suffix in (".html", ".css")]
+    site = Path(os.environ.get("DSA_DES_SITE", tmp_path / "site"))  # .ci/run has built it already
+    if not site.exists():
+        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(CONFIG)]
+        done = subprocess.run(
+            [*command, "-d", str(site)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    pages = [path for path in site.rglob("*") if path.suffix in (".html", ".css")]
     assert len(pages) > 15
     for page in pages:
         text = page.read_text(encoding="utf-8")

@@ -157,6 +157,12 @@ def test_the_geometry_is_kept_where_speeds_are_drawn(tmp_path: Path, kind: str) 
         ("own_speed_kt = 120", "own_speed_kt = 40", "encounter 0: no course of an intruder at"),
         ("horizontal_ft = 200", "horizontal_ft = 1", "encounter 0: it climbs or sinks too fast"),
         ("closest_s = 100", "closest_s = = 1", "made.toml"),
+        (
+            "closest_s = 100",
+            "closest_s = 9\nweight = 0",
+            "weight = 0: must be a number from 1e-100",
+        ),
+        ("closest_s = 100", "closest_s = 9\nduration_s = 8e4\ncount = 9999", "1.6e+09 samples of"),
     ],
 )
 def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
+from dsa_des.studies.ratio import paired_ratio
 from tests.encounters.test_closed_loop_risk import SCENE
 
 STUDY = """\
@@ -72,10 +73,9 @@ def test_weights_families_and_classes_count(tmp_path: Path) -> None:
     assert whole["effective_sample_size"] == pytest.approx(27**2 / (25 + 4 + 49 + 36 + 49))
     # By the paired delta method, with the two of a family added up first.
     error = math.sqrt(sum(x * x for x in (5 * 0.45, 2 * 0.55, 7 * 0.55, 6 * 0.45))) / 20
-    reach = math.exp(1.959963984540054 * error / 0.45)
-    assert whole["delta_error"] == pytest.approx(error)
-    assert whole["delta_low"] == pytest.approx(0.45 / reach)
-    assert whole["delta_high"] == pytest.approx(0.45 * reach)
+    assert whole["gamma_error"] == pytest.approx(error)
+    by_hand = paired_ratio([1, 1, 1, 1, 0], [0, 1, 1, 0, 0], [5, 2, 7, 6, 7])
+    assert (whole["gamma_low"], whole["gamma_high"]) == pytest.approx(by_hand.interval)
     assert found["nmac_risk_ratio.head-on"]["ratio"] == pytest.approx(2 / 7)
     left = found["nmac_risk_ratio.crossing_from_the_left"]
     assert left["ratio"] == pytest.approx(7 / 13)

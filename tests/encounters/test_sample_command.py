@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from components.encounters import generate_command
 from components.encounters.command import encounters
 from components.encounters.model_file import read_model
 from components.encounters.track_rules import TrackRules, conditional
@@ -104,6 +105,24 @@ def test_errors_leave_nothing_behind(model: Path, tmp_path: Path) -> None:
     assert done.exit_code == 2 and f"error: {model}: " in done.stderr
     assert "Traceback" not in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["small.txt"]
+
+
+def test_what_cannot_end_is_refused_and_what_takes_long_is_told(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "t.csv"
+    words = ("--count", 100_000_000, "--duration-s", 86_400)
+    for more in ((), ("--raw",)):
+        done = call(model, out, *words, *more)
+        assert done.exit_code == 2 and done.stderr.count("\n") == 1 and not out.exists()
+        assert done.stderr.startswith("error: --count 100000000 --duration-s 86400: about ")
+        assert "TB" in done.stderr and "at most 11.6 days and 1 TB" in done.stderr
+    words = ("--model", model, "--count", 100_000_000, "--out", tmp_path / "s.parquet")
+    told: list[str] = []
+    monkeypatch.setattr(generate_command, "say", lambda text, err: told.append(text))
+    monkeypatch.setattr(generate_command, "PairSampler", lambda *_: (_ for _ in ()).throw(OSError))
+    CliRunner().invoke(encounters, ["generate", *map(str, words)])
+    assert told == ["note: --count 100000000: about 1.16 days of a processor and 90 GB"]
 
 
 def test_tracks_last_whole_seconds(model: Path, tmp_path: Path) -> None:

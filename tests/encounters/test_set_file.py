@@ -89,7 +89,9 @@ def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
     ("changes", "said"),
     [
         ({"weight": [None, None, 1.0, 1.0, 1.0]}, "encounter 3: weight is missing"),
-        ({"weight": [1.0, 1.0, -1.0, -1.0, -1.0]}, "encounter 7: weight must be a number of 0"),
+        ({"weight": [1.0, 1.0, -1.0, -1.0, -1.0]}, "encounter 7: weight must be a number from 0"),
+        ({"weight": [1.0, 1.0, 1e200, 1e200, 1e200]}, "weight must be a number from 0 to 1e+90"),
+        ({"east_m": [[1.0] * 3] * 4 + [[1.0]]}, "encounter 7: east_m has 1 values, time_s has 3"),
         ({"weight": [1.0, 2.0, 1.0, 1.0, 1.0]}, "encounter 3: its aircraft have different weights"),
         ({"time_s": [[0.0, 1.0, 2.0]] * 4 + [[-1.0, 0.0, 1.0]]}, "7: c: time_s is negative"),
         ({"time_s": [[0.0, 1.0, 1.0]] + [[0.0, 1.0, 2.0]] * 4}, "3: own: times must rise"),
@@ -117,16 +119,64 @@ def test_a_damaged_encounter_is_named_or_skipped_and_counted(
     [
         ({"altitude": [1.0] * 5}, "unknown variable 'altitude'; did you mean 'altitude_m'?"),
         ({"encounter": [7, 7, 3, 3, 3]}, "rows must be in order of their encounters' numbers"),
-        ({"encounter": [3, 3, 7, 7, None]}, "must be whole numbers of 0 or more, none missing"),
+        ({"encounter": [3, 3, 7, 7, None]}, "must be whole numbers from 0 to 2^53, none missing"),
         ({"weight": ["x"] * 5}, "column 'weight': holds string; numbers are needed"),
         ({"north_m": [1.0] * 5}, "column 'north_m': holds double; lists are needed"),
-        ({"east_m": [[1.0] * 3] * 4 + [[1.0]]}, "encounter 7: east_m has 1 values, time_s has 3"),
+        ({"north_m": [["x"] * 3] * 5}, "column 'north_m': holds list<"),
+        ({"weight": [0.0] * 5}, "all weights are 0"),
+        ({"family": ["x"] * 5}, "column 'family': holds string; numbers are needed"),
     ],
 )
 def test_a_set_that_is_wrong_as_a_whole(tmp_path: Path, changes: dict, said: str) -> None:
     with pytest.raises(EncounterSetError) as error:
         read_set(written(tmp_path, **changes), skip_damaged=True)
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"{", "its metadata are no JSON"),
+        (b"\xff", "its metadata are no JSON"),
+        (b"null", "its metadata must be a table"),
+        (b"[1]", "its metadata must be a table"),
+        (b'"text"', "its metadata must be a table"),
+        (b'{"reference_deg": [500, 8]}', "reference_deg = [500, 8]: must be [latitude, longitude]"),
+        (b'{"reference_deg": [NaN, 8]}', "within \u00b189 and \u00b1360"),
+        (b'{"reference_deg": null}', "reference_deg = None"),
+        (b'{"reference_deg": [true, 8]}', "reference_deg = [True, 8]"),
+    ],
+)
+def test_damaged_metadata_are_said(tmp_path: Path, content: bytes, said: str) -> None:
+    path = written(tmp_path)
+    table = pq.read_table(path).replace_schema_metadata({b"dsa_des.encounters": content})
+    pq.write_table(table, path)
+    with pytest.raises(EncounterSetError) as error:
+        read_set(path)
+    assert said in str(error.value) and str(error.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("option", "edges", "parts", "said"),
+    [
+        ("--vertical", "-500,500", "2", "chances must lie above 0 and be 1 at most"),
+        ("--vertical", "-500,500", "nan", "chances must lie above 0"),
+        ("--vertical", "-500,500", "0", "proportions must be numbers above 0"),
+        ("--horizontal", "-500,500", "-1", "proportions must be numbers above 0"),
+        ("--horizontal", "-1e300,1e300", "1", "edges must lie within \u00b11e+06 ft"),
+        ("--horizontal", "-500,inf", "1", "edges must lie within"),
+        ("--horizontal", "100,500", "1", "the edges must lie about 0"),
+    ],
+)
+def test_proportions_that_are_none(
+    model: Path, tmp_path: Path, option: str, edges: str, parts: str, said: str
+) -> None:
+    out = tmp_path / "s.parquet"
+    done = call("generate", "--model", model, "--count", 1, option, edges, parts, "--out", out)
+    assert (
+        done.exit_code == 2 and said in done.stderr and f"{option} {edges} {parts}" in done.stderr
+    )
+    assert not out.exists()
 
 
 def test_files_that_are_no_sets(tmp_path: Path) -> None:

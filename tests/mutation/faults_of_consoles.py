@@ -124,7 +124,7 @@ FAULTS = [
          "time_s - seen[:, 0] < 1e9"),
         ("attitude-of-the-first-target", '_rad")[-1, place]', '_rad")[-1, 0]'),
         ("attitude-of-the-window-s-start", '_rad")[-1, place]', '_rad")[0, place]'),
-        ("contrast-of-the-margin", "(margin + camera.p.threshold) / strength",
+        ("contrast-of-the-margin", "(margin + camera.detector.threshold) / strength",
          "margin / strength"),
         ("pixels-across-for-pixels-up", "camera.pixel_azimuth_rad, camera.pixel_elevation_rad",
          "camera.pixel_elevation_rad, camera.pixel_azimuth_rad"),

@@ -141,14 +141,14 @@ FAULTS = [
          "nearer_m = min(self.reach.range_max_m, 0.5 * farthest_m)"),
     ),
     *in_file(
-        _GROUP, "components/optical/farthest_range.py",
+        _GROUP, "components/optical/detector.py",
         ("wiring/test_cameras_that_look_no_farther.py", "sensor_effects/test_camera_effects.py"),
         ("farthest-by-the-front-alone", '        + roster.column(f"{areas}.side_m2")\n', ""),
         ("farthest-by-the-least", "float(np.max(area * roster.column(contrast)))",
          "float(np.min(area * roster.column(contrast)))"),
         ("farthest-without-the-back", 'ends.append(roster.column("ir.back_m2"))', "pass"),
         ("farthest-without-contrast", "np.max(area * roster.column(contrast))", "np.max(area)"),
-        ("farthest-at-threshold-one", "gain / (pixel * camera.lowest_threshold())", "gain / pixel"),
+        ("farthest-at-threshold-one", "gain / (pixel * faintest)", "gain / pixel"),
         ("farthest-despite-plumes", "        or adding\n", ""),
         ("farthest-despite-tables",
          'or camera.p.silhouette in ("aspect_table", "sampled_table", "mesh")',
@@ -173,7 +173,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/optical/frame_false_alarms.py", "wiring/test_camera_keys.py",
-        ("frames-without-alarms", "return Verdict(share > 0, f", "return Verdict(share > 0.5, f"),
+        ("frames-without-alarms", "return Verdict(rate > 0, f", "return Verdict(rate > 0.5, f"),
     ),
     *in_file(
         _GROUP, "components/sensor/sensor.py",

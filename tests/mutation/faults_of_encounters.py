@@ -144,8 +144,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/encounters/convert_command.py",
         ("encounters/test_convert_and_show.py::test_paired_tracks_become_a_set",),
-        ("weights-in-the-table-s-order", "return np.array([known[n] for n in found.numbers.tol",
-         "return weight[: len(found)] + 0.0 * np.array([known[n] for n in found.numbers.tol"),
+        ("weights-in-the-table-s-order", "weights = np.array([known[n] for n in found.numbers.tol",
+         "weights = weight[: len(found)] + 0.0 * np.array([known[n] for n in found.numbers.tol"),
     ),
     *in_file(
         _GROUP, "components/encounters/any_format.py",

@@ -1,15 +1,15 @@
-"""False alarms of a camera."""
+"""Pd and false alarms of a camera."""
 
 import math
 
 import numpy as np
 import pytest
 
-from components.optical.false_alarms import (
-    AFRL_HIGH_THRESHOLD,
-    AFRL_LOW_THRESHOLD,
+from components.optical.detection import (
+    FAINTEST_PD,
+    detection_probability,
     false_alarm_direction,
-    false_alarm_in_frame,
+    false_alarm_signature,
 )
 
 FIELD = {
@@ -18,23 +18,6 @@ FIELD = {
     "lowest_elevation_rad": -0.2,
     "highest_elevation_rad": 0.3,
 }
-
-
-@pytest.mark.parametrize(
-    ("probability", "percent"), [(AFRL_LOW_THRESHOLD, 0.045), (AFRL_HIGH_THRESHOLD, 0.01)]
-)
-def test_share_of_frames_is_the_published_one(probability, percent):
-    frames = 1_000_000
-    draws = np.random.Generator(np.random.PCG64(11)).random(frames)
-    expected = frames * percent / 100
-    alarms = np.count_nonzero(false_alarm_in_frame(draws, probability))
-    assert abs(alarms - expected) < 4 * math.sqrt(expected)
-
-
-def test_never_and_always():
-    draws = np.array([0.0, 0.5, 1 - 2**-53])
-    assert not false_alarm_in_frame(draws, 0.0).any()
-    assert false_alarm_in_frame(draws, 1.0).all()
 
 
 def test_directions_fill_the_field_of_view_evenly():
@@ -49,8 +32,9 @@ def test_directions_fill_the_field_of_view_evenly():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: false_alarm_in_frame(0.5, 1.5), "false_alarm_probability is 1.5"),
-        (lambda: false_alarm_in_frame(1.0, 0.5), "uniform is 1"),
+        (lambda: false_alarm_signature(1.0, threshold=1.0, noise=0.5), "uniform is 1"),
+        (lambda: false_alarm_signature(0.5, threshold=1.0, noise=0.0), "noise is 0"),
+        (lambda: detection_probability(1.0, 1.0, -0.1), "noise is -0.1"),
         (
             lambda: false_alarm_direction(0.5, 0.5, **{**FIELD, "azimuth_width_rad": 0.0}),
             "azimuth_width_rad is 0",
@@ -64,3 +48,22 @@ def test_directions_fill_the_field_of_view_evenly():
 def test_bad_input_is_named(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_pd_keeps_its_digits_into_both_tails():
+    """Against the complementary error function at 50 digits."""
+    mpmath = pytest.importorskip("mpmath")
+    signature = np.array([0.0, 0.2, 0.61, 0.99, 1.0, 1.3, 2.1, 2.4])
+    pd = detection_probability(signature, 1.0, 0.2)
+    with mpmath.workdps(50):
+        for level, found in zip(signature.tolist(), pd.tolist(), strict=True):
+            above = (mpmath.mpf(level) - 1) / mpmath.mpf(0.2)
+            exact = mpmath.erfc(-above / mpmath.sqrt(2)) / 2
+            if exact < FAINTEST_PD:
+                assert found == 0.0
+            elif exact < 0.5:
+                assert abs(found / exact - 1) < 1e-12
+            else:
+                assert abs((1.0 - found) - (1 - exact)) < 2e-16 + 1e-12 * (1 - exact)
+    assert (pd == 0.0).sum() == 1
+    assert detection_probability([0.99, 1.0], 1.0, 0.0).tolist() == [0.0, 1.0]

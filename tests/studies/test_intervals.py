@@ -49,6 +49,20 @@ def test_a_mean_has_the_t_interval() -> None:
     assert found.narrower == pytest.approx(1.7855 / 0.8799, abs=1e-3)
 
 
+def test_a_mean_of_fractions_and_a_difference_of_shares_have_possible_intervals() -> None:
+    values = np.array([1.0] * 10 + [0.75, 0.9, 0.8, 0.2])
+    told, plain = statistics.fraction(values, 0.95), statistics.mean(values, 0.95)
+    assert plain.high > 1.0 > told.high > told.value == plain.value > told.low > 0.0
+    # As wide as Student's in the middle; at an end where all are alike each is a trial of Wilson's.
+    half = np.array([0.4, 0.5, 0.6, 0.45, 0.55] * 20)
+    both = statistics.fraction(half, 0.95), statistics.mean(half, 0.95)
+    assert both[0].half_width == pytest.approx(both[1].half_width, rel=0.01)
+    alike = statistics.fraction(np.ones(20), 0.95)
+    assert (alike.low, alike.high) == pytest.approx((1.0 - 0.1611, 1.0), abs=5e-5)
+    found = statistics.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
+    assert (found.paired.high, found.unpaired.high) == (1.0, 1.0) and found.paired.value < 0.8
+
+
 def test_intervals_cover_what_they_promise() -> None:
     generator = np.random.default_rng(5)
     hits = {"t": 0, "bootstrap": 0, "share": 0}

@@ -84,6 +84,15 @@ def test_what_is_too_much_is_refused_in_one_line(small: Path, line: str) -> None
     assert not Path("o").exists()
 
 
+def test_more_scans_than_a_thousand_processors_make_are_refused(small: Path) -> None:
+    """Each of the runs would be begun, and so many of them too; all together are not."""
+    many = STUDY.replace("replicas = 1", "replicas = 100_000_000").replace("s = 2", "s = 1e9")
+    Path("study.toml").write_text(many)
+    error = dsa_des("study", "study.toml", "--workers", "1", "--out", "o", code=2).stderr
+    assert "replicas: 100,000,000 runs of " in error and error.count("\n") == 1
+    assert "scans in all: at most 1e+15 are begun" in error and not Path("o").exists()
+
+
 def test_what_json_cannot_hold_is_text_there(small: Path) -> None:
     odd = "description = [nan, -inf, 2020-01-01, 99999999999999999999999]\n"
     choice = "draws.blocks.ir.flaw = {choice = ['a', 'b']}\n"

@@ -40,10 +40,11 @@ def test_a_ratio_by_hand_with_both_intervals() -> None:
     assert (line.ratio.ratio, line.ratio.unresolved, line.ratio.induced) == pytest.approx(
         (5 / 3, 2 / 3, 1)
     )
-    assert line.missing == 1 and line.estimate.count == 4 and line.estimate.few
-    reach = math.exp(1.959963984540054 * math.sqrt(25 / 9 + 16 / 9 + 9) / 3 / (5 / 3))
-    assert (line.estimate.low, line.estimate.high) == pytest.approx((5 / 3 / reach, 5 / 3 * reach))
-    assert line.other.method == "bootstrap"
+    assert line.missing == 1 and line.estimate.count == 4
+    assert line.ratio.standard_error == pytest.approx(math.sqrt(25 / 9 + 16 / 9 + 9) / 3)
+    assert (line.estimate.low, line.estimate.high) == line.ratio.interval
+    assert (line.ratio.method, line.estimate.few) == ("gamma", False)
+    assert (line.other.method, line.other.few) == ("bootstrap", True)
     (drawn,) = summarise(rows, [ratio(weight="w")], 0.95, "bootstrap", {})
     assert (drawn.estimate.low, drawn.estimate.high) == line.other.interval
     assert drawn.other is not None and drawn.other.interval == line.ratio.interval
@@ -115,10 +116,11 @@ def test_intervals_of_clustered_ratios_hold_the_truth(method: str) -> None:
         w = np.repeat(random.choice([1.0, 3.0], 700), 3)
         found = paired_ratio(
             n, m, w, cluster=np.repeat(np.arange(700), 3),
-            method="delta" if method == "t" else method, resamples=300,
+            method="gamma" if method == "t" else method, resamples=300,
         )  # fmt: skip
         kept += found.interval[0] <= truth <= found.interval[1]
-    assert 0.925 <= kept / rounds <= 0.975
+    # What one event more would be is a whole cluster to the gammas: a little too wide.
+    assert 0.925 <= kept / rounds <= (0.99 if method == "t" else 0.975)
 
 
 def test_events_of_two_conditions_have_a_weighted_ratio() -> None:

@@ -21,7 +21,8 @@ RADAR = {
     "mount_azimuth_deg": 30.0, "mount_roll_deg": 25.0, "misalignment_deg": [1.0, 0.0, 0.0],
     "false_alarms": True, "false_alarm_probability": PFA,
 }  # fmt: skip
-CAMERA = {"azimuth_deg": [-15, 25], "range_km": 2.0, "false_alarms_per_frame": PER_FRAME}
+CAMERA = {"azimuth_deg": [-15, 25], "range_km": 2.0, "false_alarms_per_frame": PER_FRAME,
+          "threshold": 1.0, "noise_equivalent_contrast": None}  # fmt: skip
 FAR = [{**crooked.ROLLING, "north_m": -60_000.0}]
 
 

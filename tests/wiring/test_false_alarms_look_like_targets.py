@@ -23,7 +23,8 @@ RADAR = {
     "range_rate_resolution_m_s": 2.0, "power_w": 100.0,
 }  # fmt: skip
 CAMERA = {"threshold": 1.0, "false_alarms_per_frame": 0.5, "azimuth_deg": [-70, 70],
-          "azimuth_pixels": 6000, "elevation_pixels": 3000}  # fmt: skip
+          "azimuth_pixels": 6000, "elevation_pixels": 3000,
+          "noise_equivalent_contrast": None}  # fmt: skip
 #: Thirty targets, of the same contrast, where radar and camera look.
 CROWD = [
     {**crooked.ROLLING, "name": f"t{i}", "east_m": -2349.0 - 83.0 * i, "north_m": -1855.0,
@@ -36,7 +37,7 @@ def noisy(kind, mode, **keys):
     if mode == "stated":
         ours |= STATED
     if mode == "signal" and kind in CAMERAS:
-        ours["noise_equivalent_contrast"] = 0.1
+        ours |= {"noise_equivalent_contrast": 0.5, "threshold": None}
     if kind == "radar.threshold":
         ours["threshold_db"] = 8.0
     return sensor(kind, errors=mode, **{"scan_rate_hz": 10, **ours, **keys})
@@ -108,15 +109,20 @@ def test_the_order_within_a_scan_tells_nothing(kind):
     assert (false[:-1] & ~false[1:] & (measured[-1][:-1] == measured[-1][1:])).sum() > 5
 
 
+@pytest.mark.parametrize(("noise", "gains"), [(None, {1.0}), (0.0, {0.5, 1.25})])
 @pytest.mark.parametrize("kind", CAMERAS)
-def test_the_pixels_of_noise_give_its_confidence_as_a_target_s_do(kind):
-    """Eq. 18: 0.3 times pixels times contrast, less the threshold; the contrast is a target's."""
+def test_the_pixels_of_noise_give_its_confidence_as_a_target_s_do(kind, noise, gains):
+    """Eq. 18: 0.3 times pixels times contrast, less the threshold.
+
+    What is measured with noise says nothing of a contrast; else it is a target's.
+    """
     targets = [{**target, "contrast": gain, "contrast_ir": gain}
                for target, gain in zip(CROWD, (0.5, 1.25) * 15, strict=True)]  # fmt: skip
-    true, false, _, _ = both(chain({"sensor": noisy(kind, "grid")}, targets=targets, duration_s=20))
+    camera = noisy(kind, "grid", noise_equivalent_contrast=noise)
+    true, false, _, _ = both(chain({"sensor": camera}, targets=targets, duration_s=20))
     for part in (true, false):
         gain = (part["confidence"].astype(float) + 1.0) / (0.3 * part["pixels"].astype(float))
-        assert {round(value, 9) for value in gain} == {0.5, 1.25}
+        assert {round(value, 9) for value in gain} == gains
 
 
 def test_noise_of_a_camera_is_gaussian_beyond_the_threshold():
@@ -127,7 +133,8 @@ def test_noise_of_a_camera_is_gaussian_beyond_the_threshold():
     found = rows(run(chain({"sensor": noisy(
         "optical.eo", "grid", threshold=2.5, false_alarms_per_frame=share, scan_rate_hz=500)},
         duration_s=40)), target=None)  # fmt: skip
-    middle = 2.5 * (norm.isf(share / 2) / norm.isf(share) - 1.0)
+    pfa = share * (4.0 * np.pi / 3.0) / (6000 * 3000)
+    middle = 2.5 * (norm.isf(pfa / 2) / norm.isf(pfa) - 1.0)
     above = sum(row["confidence"] > middle for row in found)
     assert abs(above - len(found) / 2) < 2.6 * np.sqrt(len(found) / 4)
 
@@ -149,7 +156,14 @@ def test_who_it_is_decides_no_declaration_by_place():
     rule = {"declare_m": 2, "declare_n": 3}
     sensors = {
         "radar": noisy("radar.swerling", "grid", power_w=2e-4, scan_rate_hz=4, **rule),
-        "eye": noisy("optical.eo", "grid", scan_rate_hz=4, threshold=8.0, **rule),
+        "eye": noisy(
+            "optical.eo",
+            "grid",
+            scan_rate_hz=4,
+            threshold=8.0,
+            noise_equivalent_contrast=0.0,
+            **rule,
+        ),
         "told": sensor("optical.range_boundary", declare_by="place", **rule),
     }
     first = run(chain(sensors, targets=CROWD, duration_s=8))["detections"]

@@ -7,6 +7,7 @@ import looks
 import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
+from scipy.stats import norm
 from wired import alone, chain, rows, run, sensor
 
 from components.radar.parameters import RadarParameters
@@ -303,13 +304,16 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
 def test_a_camera_s_false_alarm_errs_like_a_target_of_its_signature():
     """Noise of signature E is E / 0.3 pixels of contrast 1, over a noise of 0.25."""
-    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 1.0}
-    run_ = alone("optical.eo", threshold=0.6, quantised=False, scan_rate_hz=5, **keys)
+    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 9.0}
+    run_ = alone("optical.eo", threshold=None, quantised=False, scan_rate_hz=5, **keys)
     found = rows(run_, target=None)
     pixel = math.radians(0.01)
-    assert len(found) == 5
+    # A point's picture takes 4 pi (0.25 + 1/12) pixels; noise is summed over as many.
+    area = 4.0 * math.pi / 3.0
+    threshold = 0.3 * 0.25 * math.sqrt(area) * norm.isf(9.0 * area / (36000 * 18000))
+    assert 20 < len(found) < 75
     for row in found:
-        pixels = (row["confidence"] + 0.6) / 0.3
+        pixels = (row["confidence"] + threshold) / 0.3
         assert row["pixels"] == pytest.approx(pixels)
         s2 = 0.25 + (pixels + 1.0) / 12.0
         expected = pixel**2 * 8.0 * math.pi * s2**2 / (pixels / 0.25) ** 2
@@ -337,7 +341,9 @@ ANGLE = "azimuth_error_deg"
                             "elevation_beamwidth_deg": 3.0}, "range_resolution_m is 0"),
         ("radar.swerling", {**looks.SIGNAL_KEYS["radar.swerling"], "errors": "signal",
                             "measures_range_rate": True}, "time of a look"),
-        ("optical.ir", {"errors": "signal"}, "noise_equivalent_contrast is not given"),
+        ("optical.ir", {"errors": "signal"}, "noise_equivalent_contrast is 0"),
+        ("optical.eo", {"noise_equivalent_contrast": 0.1, "false_alarms_per_frame": 0.5},
+         "threshold, noise_equivalent_contrast and false_alarms_per_frame are given"),
         ("optical.eo", {"errors": "gird"}, "errors"),
     ],
 )  # fmt: skip

@@ -19,7 +19,7 @@ HEARS_ALL: dict[str, Any] = {
 #: A camera that detects whatever it looks at, so that its pixels and signature are recorded.
 SEES_ALL: dict[str, Any] = {
     "type": "optical.eo", "scan_rate_hz": 1, "azimuth_pixels": 36000, "elevation_pixels": 18000,
-    "threshold": -1.0,
+    "threshold": -1.0, "noise_equivalent_contrast": 0.0,
 }  # fmt: skip
 
 
@@ -95,8 +95,8 @@ SENSORS: dict[str, dict[str, Any]] = {
 
 
 def sensor(kind: str, **keys: Any) -> dict[str, Any]:
-    """Return a table of a sensor that detects everything, with some keys changed."""
-    return {**SENSORS[kind], **keys}
+    """Return a table of a sensor that detects everything, with some keys changed; None: without."""
+    return {key: value for key, value in {**SENSORS[kind], **keys}.items() if value is not None}
 
 
 def alone(kind: str, *, duration_s: float = 1, targets: Any = crooked.TARGETS, **keys: Any) -> Any:

@@ -140,7 +140,7 @@ def _sensors(simulation: Simulation) -> list[LoopSensor]:
             sensor.pixel_sr = block.pixel_azimuth_rad * block.pixel_elevation_rad
             sensor.pixels = float(block.p.azimuth_pixels * block.p.elevation_pixels)
             sensor.weight = block.p.static_weight
-            sensor.threshold = block.p.threshold
+            sensor.threshold = block.detector.threshold
             sensor.areas = _areas(roster, block.areas, block.contrasts)
         sensors.append(sensor)
     return sensors

@@ -1,0 +1,289 @@
+"""The detector of a camera: its threshold and noise by what a scene states, and how far it sees."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
+from components.aircraft.known_targets import known_targets
+from components.optical.contrast import visibility_transmission
+from components.optical.detection import (
+    FAINTEST_DEVIATIONS,
+    deviations_exceeded,
+    exceeding_probability,
+)
+from components.optical.signature import pixels_of_cells
+from components.optical.weather_effects import own_band
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.component import Parameters
+
+#: Of a frame, where a scene says nothing of noise: that of AFRL's flight tests at the higher
+#: threshold (thesis section 2.4.1: 0.01 %, read as per frame).
+FALSE_ALARMS_PER_FRAME = 1e-4
+# Covers the rounding of areas, pixels and signatures many times over.
+_MARGIN = 1.0 + 1e-9
+_MARGIN_M = 1.0
+# Effects on the contrast that only take from it.
+_TAKING = ("visibility", "extinction in the band")
+
+
+class CameraCalibration(Parameters):
+    """One known detection range of a camera, from which noise or threshold follow."""
+
+    range_km: float = Field(gt=0, description="Range at which Pd is known, km.")
+    pd: float = Field(gt=0, lt=1, description="Probability of detection there, in one look.")
+    area_m2: float | None = Field(
+        default=None, gt=0, description="Area that the target shows, m²; or give the aircraft."
+    )
+    aircraft: Aircraft | None = Field(
+        default=None, description="The aircraft, with the keys of a file in configs/aircraft."
+    )
+    aspect_deg: float = Field(
+        default=0.0,
+        ge=-180,
+        le=180,
+        description="From where it is seen, level and at its altitude, deg: 0 nose, 90 abeam, 180 "
+        "tail.",
+    )
+    contrast: float | None = Field(
+        default=None, gt=0, description="Contrast gain P; by default the aircraft's, or 1."
+    )
+    visibility_km: float | None = Field(
+        default=None, gt=0, description="Visibility in which the range holds, km; none: clear air."
+    )
+
+    @model_validator(mode="after")
+    def _of_one_target(self) -> Self:
+        if (self.area_m2 is None) == (self.aircraft is None):
+            raise ValueError("exactly one of area_m2 and aircraft must be given")
+        if self.area_m2 is not None and self.aspect_deg:
+            raise ValueError("aspect_deg belongs to an aircraft; area_m2 is what shows")
+        return self
+
+
+@dataclass(frozen=True)
+class CameraDetector:
+    """What a camera detects with.
+
+    Parameters
+    ----------
+    threshold : float
+        Sample of a signature that is a detection.
+    noise : float
+        Standard deviation of the samples; 0 for a camera that sees signatures as they are.
+    alarm_noise : float
+        That of the samples that make false alarms; the same, where it is known.
+    places : int
+        Independent samples of noise in a frame.
+    false_alarms : float
+        Expected in a frame.
+    """
+
+    threshold: float
+    noise: float
+    alarm_noise: float
+    places: int
+    false_alarms: float
+
+
+def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
+    """Return a camera's detector: what the scene leaves open follows from what it states.
+
+    Any two of threshold, noise, false alarms and a known range give the others.
+
+    Parameters
+    ----------
+    camera : Camera
+    places : int
+        Independent samples in a frame.
+    noise_of_contrast : float
+        Noise of a signature, for a pixel whose noise is as much as a contrast of 1.
+
+    Raises
+    ------
+    ValueError
+        If what is stated contradicts itself.
+    """
+    p = camera.p
+    threshold, alarms, known = p.threshold, p.false_alarms_per_frame, p.calibrate
+    contrast = p.noise_equivalent_contrast
+    if contrast == 0.0:  # the thesis's rule, beside which a rate of false alarms may be stated
+        level = 1.0 if threshold is None else threshold
+        rate = alarms or 0.0
+        noise = level / _crossed(rate, places) if level > 0.0 and rate > 0.0 else 1.0
+        return CameraDetector(level, 0.0, noise, places, rate)
+    if sum(one is not None for one in (threshold, contrast, alarms, known)) < 2:
+        if threshold is None and known is None:
+            threshold = 1.0
+        if contrast is None and alarms is None:
+            alarms = FALSE_ALARMS_PER_FRAME
+    if alarms == 0.0 and threshold is None:
+        raise ValueError(
+            "false_alarms_per_frame is 0: no threshold is that high; give a rate above 0"
+        )
+    noise = None if contrast is None else noise_of_contrast * contrast
+    if known is not None:
+        signature = known_signature(camera, known)
+        above = -deviations_exceeded(known.pd)
+        if noise is not None:
+            threshold = signature - above * noise
+        elif alarms is not None:
+            crossed = _crossed(alarms, places)
+            if not above + crossed > 0.0:
+                raise ValueError(
+                    f"calibrate.pd is {known.pd:g}: noise alone is detected more often, with "
+                    f"{alarms:g} false alarms per frame"
+                )
+            noise = signature / (above + crossed)
+            threshold = crossed * noise
+        else:
+            assert threshold is not None
+            noise = (signature - threshold) / above if above else -1.0
+            if noise <= 0.0:
+                raise ValueError(
+                    f"calibrate.pd is {known.pd:g} and the signature there is {signature:.4g}: "
+                    f"with threshold {threshold:g} no noise gives that; leave threshold out, or "
+                    "give a range at which the signature is "
+                    f"{'above' if known.pd > 0.5 else 'below'} it"
+                )
+        if threshold <= 0.0:
+            raise ValueError(
+                f"calibrate needs a threshold of {threshold:.4g}: below 0 noise is detected "
+                "everywhere; give a smaller noise_equivalent_contrast or a larger pd"
+            )
+    elif threshold is None:
+        assert noise is not None and alarms is not None
+        threshold = noise * _crossed(alarms, places)
+    elif noise is None:
+        assert alarms is not None
+        if threshold <= 0.0:  # whatever there is is seen: nothing is known of the noise
+            return CameraDetector(threshold, 0.0, 1.0, places, alarms)
+        noise = threshold / _crossed(alarms, places)
+    if noise == 0.0:
+        return CameraDetector(threshold, 0.0, 1.0, places, 0.0)
+    rate = places * exceeding_probability(threshold / noise)
+    return CameraDetector(threshold, noise, noise, places, rate)
+
+
+def _crossed(false_alarms: float, places: int) -> float:
+    """Return how many standard deviations the threshold lies above noise; infinite for none."""
+    if false_alarms == 0.0:
+        return math.inf
+    if false_alarms >= 0.5 * places:
+        raise ValueError(
+            f"false_alarms_per_frame is {false_alarms:g}: it must be below {0.5 * places:g}, half "
+            f"of the {places:,} places for them in a frame"
+        )
+    return deviations_exceeded(false_alarms / places)
+
+
+class _OneLook:
+    """One cell: an aircraft at a known range, aspect and contrast, level and at our altitude."""
+
+    def __init__(self, craft: Aircraft, range_m: float, aspect_rad: float) -> None:
+        self.roster = Roster.of([("calibrate", craft)])
+        self.range_m = np.array([range_m])
+        self.relative_heading_rad = np.array([math.pi - aspect_rad])
+        self.target_pitch_rad = self.target_roll_rad = self.elevation_rad = np.zeros(1)
+        self.target = self.craft = np.zeros(1, dtype=np.int64)
+
+    def __len__(self) -> int:
+        return 1
+
+    def of_target(self, column: FloatArray) -> AnyArray:
+        return column[self.craft]
+
+
+def known_signature(camera: Any, known: CameraCalibration) -> float:
+    """Return the signature of the target whose probability of detection is known.
+
+    Parameters
+    ----------
+    camera : Camera
+    known : CameraCalibration
+
+    Raises
+    ------
+    ValueError
+        If there is none, or the visibility is not that of the camera's band.
+    """
+    craft = known.aircraft
+    if craft is None:  # a sphere shows the same to all sides
+        area_m2 = known.area_m2 or 0.0
+        sphere = InfraredAreas(front_m2=area_m2, back_m2=area_m2, side_m2=0.0, horizontal_m2=0.0)
+        craft = Aircraft(eo=sphere, ir=sphere)
+    range_m = 1000.0 * known.range_km
+    cells: Any = _OneLook(craft, range_m, math.radians(known.aspect_deg))
+    pixels = pixels_of_cells(
+        camera.area(cells),
+        cells.range_m,
+        camera.pixel_azimuth_rad,
+        camera.pixel_elevation_rad,
+        camera.all_pixels,
+    )
+    contrast = camera.contrast(cells) if known.contrast is None else np.full(1, known.contrast)
+    if known.visibility_km is not None:
+        if own_band(camera) is not None:
+            raise ValueError(
+                f"calibrate.visibility_km is given and extinction_band is {own_band(camera)!r}: "
+                "that band's air is another; give the contrast that is left (calibrate.contrast)"
+            )
+        contrast = contrast * visibility_transmission(range_m, 1000.0 * known.visibility_km)
+    signature = float((camera.p.static_weight * pixels * contrast)[0])
+    if signature <= 0.0:
+        raise ValueError("calibrate: the target has no signature there, so no Pd but that of noise")
+    return signature
+
+
+def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
+    """Return a range that no detection of this camera exceeds, m.
+
+    The area shown is at most the sum of the bodies' areas and the contrast at most each target's
+    own, so a·Q·P reaches the faintest signature that is ever detected, the threshold less
+    `FAINTEST_DEVIATIONS` of noise, at sqrt(a·A·P / (pixel · faintest)) at the latest (errata 10).
+    Infinite where that is not so: where noise alone reaches the threshold more often than that,
+    with a rate of the line of sight in the signature, with areas from a table, with effects that
+    can add to area or contrast, or with targets that the camera was not told of.
+
+    Parameters
+    ----------
+    camera : Camera
+        After its effects were built.
+    areas, contrast : str
+        The roster's columns, ``"eo"`` or ``"ir"``, ``"contrast"`` or ``"contrast_ir"``; empty for
+        a camera that shows other areas.
+    """
+    rosters = known_targets(camera.context)
+    adding = [
+        effect.name
+        for effect in type(camera).effects
+        if effect.name in camera.context.effects
+        and effect.acts_on in ("area", "contrast", "signature")
+        and effect.name not in _TAKING
+    ]
+    faintest = camera.lowest_threshold() - FAINTEST_DEVIATIONS * camera.detector.noise
+    if (
+        not areas
+        or not rosters
+        or adding
+        or camera.p.silhouette in ("aspect_table", "sampled_table", "mesh")
+        or faintest <= 0
+    ):
+        return math.inf
+    roster = rosters[0]
+    if len(roster) == 0:
+        return 0.0
+    ends = [roster.column(f"{areas}.front_m2")]
+    if areas == "ir":
+        ends.append(roster.column("ir.back_m2"))
+    area = (
+        np.max(ends, axis=0)
+        + roster.column(f"{areas}.side_m2")
+        + roster.column(f"{areas}.horizontal_m2")
+    )
+    gain = camera.p.static_weight * float(np.max(area * roster.column(contrast)))
+    pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
+    return math.sqrt(gain / (pixel * faintest)) * _MARGIN + _MARGIN_M
