@@ -102,7 +102,7 @@ class SteeredFlight:
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
 
 
-class Plan(NamedTuple):
+class SteeringPlan(NamedTuple):
     """What is still to be flown of turns, climbs and speeds, side by side, and what comes after.
 
     Parameters
@@ -125,7 +125,7 @@ class Plan(NamedTuple):
     speeds: Pieces
     speed_mps: float
 
-    def after(self, elapsed_s: float) -> Plan:
+    def after(self, elapsed_s: float) -> SteeringPlan:
         """Return what is left of it after some time."""
         return self._replace(
             turns=_left(self.turns, elapsed_s),
@@ -133,7 +133,7 @@ class Plan(NamedTuple):
             speeds=_left(self.speeds, elapsed_s),
         )
 
-    def told(self, told: Manoeuvre, alt_m: float) -> Plan:
+    def told(self, told: Manoeuvre, alt_m: float) -> SteeringPlan:
         """Return it with the parts that are told anew, from an altitude; the others stay."""
         plan = self
         if told.turn_rad != 0.0:
@@ -202,7 +202,7 @@ def _mean(pieces: Pieces, first_s: float, without: float) -> float:
 class SteeredPart(ScriptedTrajectory):
     """What is flown after a manoeuvre, with the plan that it follows."""
 
-    plan: Plan
+    plan: SteeringPlan
 
 
 def flown_from(
@@ -238,7 +238,9 @@ def flown_from(
             along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
             heading_deg = math.degrees(math.atan2(along[1], along[0]))
             speed_mps = math.hypot(*along) / (2.0 * _BASE_S)
-            plan = Plan((), (), _own_climb(0.5 * (high - low) / _BASE_S, manoeuvre), (), speed_mps)
+            plan = SteeringPlan(
+                (), (), _own_climb(0.5 * (high - low) / _BASE_S, manoeuvre), (), speed_mps
+            )
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             plan = earlier.plan.after(at_s - earlier.start_time_s)
@@ -255,7 +257,11 @@ def _own_climb(climb_mps: float, told: Manoeuvre) -> float:
 # A study's metrics fly again what its runs flew.
 @lru_cache(maxsize=4096)
 def _flown_from(
-    name: str, place: tuple[float, float, float], heading_deg: float, time_s: float, plan: Plan
+    name: str,
+    place: tuple[float, float, float],
+    heading_deg: float,
+    time_s: float,
+    plan: SteeringPlan,
 ) -> SteeredPart:
     part = SteeredPart(
         name,
