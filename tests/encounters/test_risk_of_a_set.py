@@ -151,4 +151,5 @@ def the_report_says_what_the_tables_hold(folder: Path) -> None:
     # Wilson's ends solve (p - x)^2 n = z^2 x (1 - x); the spread of the units costs one of them.
     share, z = sum(r["nmac_nominal"] for r in runs) / len(runs), 1.959963984540054
     for end in (low, high):
-        assert (share - end) ** 2 * (len(runs) - 1) == pytest.approx(z * z * end * (1 - end), rel=2e-3)
+        half = (share - end) ** 2 * (len(runs) - 1)
+        assert half == pytest.approx(z * z * end * (1 - end), rel=2e-3)
