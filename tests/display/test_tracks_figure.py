@@ -36,7 +36,7 @@ def test_confirmed_tracks_are_drawn_the_same_every_time(tmp_path, draw, shown):
 
 
 @pytest.mark.parametrize("sets", [(), (EKF, "blocks.tracker.confirm_m=60",
-                                       "blocks.tracker.confirm_n=62")])  # fmt: skip
+                                       "blocks.tracker.confirm_n=62", "duration_s=1")])  # fmt: skip
 def test_where_nothing_is_confirmed_there_is_no_figure(tmp_path, sets):
     assert told(tmp_path, *sets) is None
 

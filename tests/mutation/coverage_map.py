@@ -39,8 +39,10 @@ if {context!r} in os.environ:
         lines.stop()
         data = lines.get_data()
         found = {{file: data.lines(file) for file in data.measured_files()}}
-        with open(os.path.join({folder!r}, f"child.{{os.getpid()}}"), "w") as file:
+        place = os.path.join({folder!r}, "{{}}.%d" % os.getpid())
+        with open(place.format("part"), "w") as file:
             json.dump([os.environ.get({context!r}, ""), found], file)
+        os.replace(place.format("part"), place.format("child"))  # it may be killed meanwhile
     lines.start()
     atexit.register(tell)
     os.register_at_fork(after_in_child=anew)
