@@ -4,10 +4,28 @@ The package knows no radar. Blocks are found by their registered names (see
 `dsa_des.block.registry`), so this package never imports `components`.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import os
+import sys
 
-from dsa_des.record.version import __version__
+
+def _without_working_directory() -> None:
+    """Take the working directory off the module path, where ``python -m`` puts it first.
+
+    A ``re.py`` or a folder ``components`` there is not ours: this comes before any import that
+    Python has not made already. The folder that we were imported from stays.
+    """
+    home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    as_program = sys.argv[:1] == ["-m"] and {"dsa_des", "-mdsa_des"} & {*sys.orig_argv}
+    if as_program and not sys.flags.safe_path and sys.path[:1] == [os.getcwd()] != [home]:
+        del sys.path[0]
+
+
+_without_working_directory()
+
+from importlib import import_module  # noqa: E402
+from typing import TYPE_CHECKING, Any  # noqa: E402
+
+from dsa_des.record.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:
     from dsa_des.block.component import Component, Parameters

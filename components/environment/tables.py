@@ -127,7 +127,8 @@ class Record(Parameters):
     truth: bool | Literal["auto"] = Field(
         default="auto",
         description="Whether the table truth has the ownship and every target at every scan; by "
-        "default where aircraft times seconds are at most 600.",
+        "default where aircraft times seconds, of all replicas together, are at most 600; a study "
+        "makes it where a metric reads it.",
     )
     looks: bool = Field(
         default=False,

@@ -91,6 +91,11 @@ class TrafficStates(Message):
             **more,
         )
 
+    def check(self) -> None:
+        """Refuse arrays without a column for each of the targets, too."""
+        super().check()
+        check_columns(self)
+
     def tables(self) -> dict[str, Columns]:
         """Return the table of the truth where it is recorded."""
         return {} if self.true_flights is None else {"truth": truth_columns(self)}
@@ -161,6 +166,11 @@ class RelativeTargets(Message):
 
     joins_static = frozenset({"columns"})
 
+    def check(self) -> None:
+        """Refuse arrays without a column for each of the targets, too."""
+        super().check()
+        check_columns(self)
+
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the rows of all parts, over the targets of any of them."""
@@ -178,6 +188,17 @@ class GatedTargets(RelativeTargets):
     """
 
     decisions: dict[str, Decision] = per_row()
+
+
+def check_columns(message: Any) -> None:
+    """Raise ValueError unless the arrays over targets have as many columns as there are targets."""
+    count = len(message.columns)
+    for name, values in vars(message).items():
+        if values.__class__ is np.ndarray and values.ndim == 2 and values.shape[1] != count:
+            raise ValueError(
+                f"{type(message).__qualname__}.{name} has shape {values.shape} where the message "
+                f"has {count} targets"
+            )
 
 
 def over_same_targets(parts: Sequence[Any]) -> list[Any]:

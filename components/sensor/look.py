@@ -36,6 +36,29 @@ class Look:
     signal: dict[str, AnyArray] = field(default_factory=dict)
     noise: BoolArray | None = None
 
+    def check(self, cells: int) -> None:
+        """Refuse arrays without one value for each cell, and detections that are no truth values.
+
+        Raises
+        ------
+        TypeError, ValueError
+            With the field, its length and that which it must have.
+        """
+        tables = (
+            {"detected": self.detected, "confidence": self.confidence},
+            self.extras,
+            self.signal,
+        )
+        noise = () if self.noise is None else ({"noise": self.noise},)
+        for table in (*tables, *noise):
+            for name, value in table.items():
+                if not isinstance(value, np.ndarray) or value.shape != (cells,):
+                    given = getattr(value, "shape", type(value).__name__)
+                    message = f"an array of {cells} cells is needed"
+                    raise ValueError(f"look gave {name} of shape or type {given}: {message}")
+        if self.detected.dtype != np.bool_:
+            raise TypeError(f"look gave detected of {self.detected.dtype}: bool is needed")
+
 
 class Cells:
     """The (scan, target) pairs that need a sensor's physics, as flat contiguous arrays.

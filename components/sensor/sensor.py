@@ -185,6 +185,9 @@ class Sensor(Measuring):
         look = self._idle
         if look is None or len(cells):
             look = self.look(cells)
+            if not isinstance(look, Look):
+                raise TypeError(f"look gave {type(look).__name__}, no Look")
+            look.check(len(cells))
             for judge in self._judgements:
                 look = judge(cells, look)
             # Where many run, the next scans without cells may be those of other replicas.

@@ -5,7 +5,7 @@ scans, or as its own SimPy process. In the first two the engine calls `Component
 `dsa_des.block.wake.Wake`; rows of its messages are scans, so the same array code serves both.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -101,6 +101,10 @@ class Context:
         when `Component.setup` is called.
     simulate_everything : bool
         Whether a block must not leave out work that cannot change a result.
+    recorded_runs : int
+        How many runs of the scene are recorded together.
+    recorded_tables : collection of str, optional
+        The tables that somebody reads of what is recorded; None for all that there are.
     tolerance : mapping
         What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
     """
@@ -113,6 +117,8 @@ class Context:
     sections: Mapping[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
     simulate_everything: bool = False
+    recorded_runs: int = 1
+    recorded_tables: Collection[str] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
 
 

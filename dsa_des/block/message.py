@@ -26,6 +26,9 @@ PER_ROW = "row"  # first axis is the rows
 PER_ENTRY = "entry"  # first axis is the entries; `offsets[i]:offsets[i + 1]` belong to row i
 STATIC = "static"  # the same for all rows
 
+#: Numbers and truth values; no objects, no text.
+_NUMBERS = frozenset("biuf")
+
 #: Row and entry fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 #: Fields that hold instants beside `Message.tick`.
@@ -178,6 +181,32 @@ class Message:
     def __len__(self) -> int:
         return len(self.tick)
 
+    def check(self) -> None:
+        """Refuse fields whose first axis is not that of the rows, or of the entries.
+
+        Once per message that is sent: whoever reads it would else take one row's values for
+        another's, or leave some out, without a word.
+
+        Raises
+        ------
+        TypeError, ValueError
+            With the class, the field, its length and that which it must have.
+        """
+        rows, (row_names, entry_names) = len(self.tick), _layout(type(self))
+        _check_each(self, row_names, rows, "rows")
+        offsets = getattr(self, "offsets", None)
+        if offsets is None:
+            return
+        if not isinstance(offsets, np.ndarray) or offsets.dtype.kind not in "iu":
+            raise TypeError(f"{_of(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed")
+        ends = offsets.tolist()
+        if len(ends) != rows + 1 or (rows > 1 and bool((offsets[1:] < offsets[:-1]).any())):
+            raise ValueError(
+                f"{_of(self, 'offsets')} of shape {offsets.shape} must be ascending, one more than "
+                f"the {rows} rows"
+            )
+        _check_each(self, entry_names, ends[-1] - ends[0], "entries")
+
     def take(self, rows: slice | IntArray) -> Self:
         """Return the message of the given rows (slices give views, index arrays give copies)."""
         if isinstance(rows, slice):
@@ -285,6 +314,44 @@ def by_output(result: Any, outputs: Sequence[str]) -> Mapping[str, Message]:
             f"{', '.join(sorted(outputs)) or 'nothing'}"
         )
     return {outputs[0]: result}
+
+
+def _of(message: Message, name: str) -> str:
+    return f"{type(message).__qualname__}.{name}"
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} of shape {value.shape}"
+    return f"of type {type(value).__name__}"
+
+
+def _check_each(message: Message, names: tuple[str, ...], count: int, what: str) -> None:
+    """Refuse arrays, or those of dicts, that have not one value for each row or entry."""
+    fields_of = message.__dict__
+    for name in names:
+        value = fields_of.get(name)
+        if value.__class__ is np.ndarray:
+            if not value.ndim or len(value) != count or value.dtype.kind not in _NUMBERS:
+                _refuse(message, name, value, count, what)
+        elif value.__class__ is dict:
+            for key, item in value.items():
+                fits = item.__class__ is np.ndarray and item.ndim and len(item) == count
+                if not (fits or item is None or hasattr(item, "take_rows")):
+                    _refuse(message, f"{name}[{key!r}]", item, count, what)
+        elif value is not None and not hasattr(value, "take_rows"):
+            _refuse(message, name, value, count, what)
+
+
+def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> None:
+    """Raise unless it is an array of another class that will do, such as a masked one."""
+    said = f"{_of(message, name)} is {_kind(value)}"
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"{said}: an array of {count} {what} is needed")
+    if value.ndim == 0 or len(value) != count:
+        raise ValueError(f"{said} where the message has {count} {what}")
+    if value.dtype.kind not in _NUMBERS:
+        raise TypeError(f"{said}: numbers are needed")
 
 
 def _pick(value: Any, rows: slice | IntArray) -> Any:

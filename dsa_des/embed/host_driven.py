@@ -299,6 +299,7 @@ class HostDriven:
                 result = {runner.only_output: result}
             for output, given in result.items():
                 if len(given.tick):
+                    given.check()
                     sent[runner.name, output] = given
         return step
 

@@ -44,11 +44,18 @@ class Recorder:
     sinks : iterable of Sink
     wanted : mapping, optional
         Table name → columns to record; everything by default. What is not wanted costs nothing.
+    runs : int
+        How many runs of the scene are recorded for the same purpose, here and elsewhere.
     """
 
     def __init__(
-        self, sinks: Iterable[Sink], *, wanted: Mapping[str, Collection[str]] | None = None
+        self,
+        sinks: Iterable[Sink],
+        *,
+        wanted: Mapping[str, Collection[str]] | None = None,
+        runs: int = 1,
     ) -> None:
+        self.runs = runs
         self.sinks = list(sinks)
         #: Told of every message when it is sent, by block: also of what a window that is undone
         #: had sent, and before the rows are in their order.
@@ -63,6 +70,11 @@ class Recorder:
         self._ends: RunEnds | None = None
         #: Rows and pieces noted since some were handed on; more where a window was undone.
         self._noted = [0, 0]
+
+    @property
+    def wanted_tables(self) -> Collection[str] | None:
+        """The tables that are recorded; None for all that there are."""
+        return None if self._wanted is None else self._wanted.keys()
 
     def open(
         self,

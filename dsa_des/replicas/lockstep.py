@@ -93,6 +93,7 @@ class Replicas(Timeline):
         super().__init__(scenes[0])
         self._scenes = scenes if isinstance(scenes, ReplicaScenes) else list(scenes)
         self._report = report
+        self.runs = len(self._scenes)
         #: Blocks that are split, by name; the engine still asks the blocks for all but `run`.
         self.split: dict[str, SplitBlock] = {}
         #: What runs blocks for all replicas that differ in more than their clocks.
@@ -190,6 +191,7 @@ class Replicas(Timeline):
         context = Context(
             Streams(scene.seed), self.scene.ticks_per_s, duration_s=face.duration_s,
             consumers=face.consumers, producers=face.producers, sections=scene.sections,
+            recorded_runs=face.recorded_runs, recorded_tables=face.recorded_tables,
         )  # fmt: skip
         block = scene.blocks[name]
         return block.cls(name, block.parameters, context)

@@ -75,7 +75,11 @@ class Failed:
 
 
 def run_replicas(
-    scene: Scene, replicas: Sequence[Replica], *, wanted: Wanted = None
+    scene: Scene,
+    replicas: Sequence[Replica],
+    *,
+    wanted: Wanted = None,
+    runs: int | None = None,
 ) -> list[Recorded | Failed]:
     """Run replicas of a scene, in lock step where they can; a failing one stops no other.
 
@@ -85,6 +89,8 @@ def run_replicas(
     replicas : sequence of Replica
     wanted : mapping, optional
         Table name → columns to record; everything by default.
+    runs : int, optional
+        How many runs there are of the scene, where these are some of them.
 
     Returns
     -------
@@ -93,9 +99,10 @@ def run_replicas(
     """
     found, scenes = _checked(scene, replicas)
     ran: list[Recorded | Failed] = []
+    runs = len(replicas) if runs is None else runs
     for part in _at_once(scenes):
-        together: Sequence[Recorded | Failed] | None = _together(part, wanted)
-        ran += together or [_run(one, wanted) for one in part]
+        together: Sequence[Recorded | Failed] | None = _together(part, wanted, runs)
+        ran += together or [_run(one, wanted, runs) for one in part]
     outcomes = iter(ran)
     return [next(outcomes) if one is None else one for one in found]
 
@@ -144,12 +151,12 @@ def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     return None
 
 
-def _together(scenes: Sequence[Scene], wanted: Wanted) -> list[Recorded] | None:
+def _together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Recorded] | None:
     """Run scenes in lock step; None where they cannot, or where one of them fails."""
     if len(scenes) < 2:
         return None
     sink = ColumnSink()
-    recorder = Recorder([sink], wanted=wanted)
+    recorder = Recorder([sink], wanted=wanted, runs=runs)
     try:
         simulation = lock_step(scenes, recorder=recorder)
         outcome = simulation.run()
@@ -192,10 +199,10 @@ def _report(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
     return Simulation(scenes[number]).run().report
 
 
-def _run(scene: Scene, wanted: Wanted) -> Recorded | Failed:
+def _run(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
     try:
         sink = ColumnSink()
-        simulation = Simulation(scene, recorder=Recorder([sink], wanted=wanted))
+        simulation = Simulation(scene, recorder=Recorder([sink], wanted=wanted, runs=runs))
         outcome = simulation.run()
     except (SceneError, BlockFailure) as error:
         return Failed(str(error))

@@ -8,6 +8,7 @@ from typing import Any
 from dsa_des.block.component import Component, Consumer, Context, Producer
 from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
+from dsa_des.record.recording import Recorder
 from dsa_des.running.effect_plan import Planned, plan, unspent
 from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
@@ -29,6 +30,7 @@ class Assembly:
     ----------
     scene : Scene
     timeline : Timeline
+    recorder : Recorder or None
     simulate_everything : bool
     wrap_effect : callable, optional
 
@@ -42,19 +44,22 @@ class Assembly:
         self,
         scene: Scene,
         timeline: Timeline,
+        recorder: Recorder | None,
         simulate_everything: bool,
         wrap_effect: WrapEffect | None,
     ) -> None:
         self._scene = scene
         self._everything = simulate_everything
         self._place = telling_order(scene.graph, scene.classes)
-        self.components = self._build(timeline)
+        self.components = self._build(timeline, recorder)
         self.duration_s = self._duration()
         self._offer_down_the_chain()
         self.plan = self._plan_effects(wrap_effect)
         self._set_up()
 
-    def _build(self, timeline: Timeline) -> dict[str, Component]:
+    def _build(self, timeline: Timeline, recorder: Recorder | None) -> dict[str, Component]:
+        runs = timeline.runs if recorder is None else max(timeline.runs, recorder.runs)
+        tables = () if recorder is None else recorder.wanted_tables
         components: dict[str, Component] = {}
         problems: list[Problem] = []
         for name, block in self._scene.blocks.items():
@@ -63,6 +68,8 @@ class Assembly:
                 self._scene.ticks_per_s,
                 sections=self._scene.sections,
                 simulate_everything=self._everything,
+                recorded_runs=runs,
+                recorded_tables=tables,
             )
             with self._preparing(name, problems):
                 components[name] = block.cls(name, timeline.parameters(name), context)

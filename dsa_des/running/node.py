@@ -285,6 +285,7 @@ class Node:
                 )
             if len(message) == 0:
                 continue
+            message.check()
             _check_ticks(port, message.tick, ticks)
             if isinstance(message, RunEnd):
                 self.simulation.ends.note(message.tick, self.name)

@@ -146,7 +146,7 @@ class Simulation:
         grain = self.timeline.grain(window, check_rewinding)
         #: Blocks that cannot be rewound, and why: with one of them, loops run scan by scan.
         self.unwound = grain.unwound
-        assembly = Assembly(scene, self.timeline, simulate_everything, wrap_effect)
+        assembly = Assembly(scene, timeline, recorder, simulate_everything, wrap_effect)
         self.components: Mapping[str, Component] = assembly.components
         self.duration_s: Fraction = assembly.duration_s
         self.plan = assembly.plan

@@ -41,7 +41,11 @@ class Timeline:
         How the runs lie in time; known once `lay` was called.
     ends : RunEnds
         When each of them ends; from then on.
+    runs : int
+        How many there are.
     """
+
+    runs = 1
 
     time: ReplicaTime
     ends: RunEnds

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -26,6 +27,8 @@ from dsa_des.studies.study import Chunk, Study
 _AHEAD = 2
 _CONNECT_TIMEOUT_S = 5
 _SAFE_PATH = "PYTHONSAFEPATH"
+#: The folder that we were imported from.
+_HOME = str(Path(__file__).parents[2])
 
 
 class Executor(Protocol):
@@ -107,10 +110,10 @@ class _Worker:
 
     def submit(self, piece: Piece) -> None:
         """Run a piece after those that were given before."""
-        if self._pool is None:
-            self._pool = _new_pool(self.study)
         try:
             with not_from_here():
+                if self._pool is None:
+                    self._pool = _new_pool(self.study)
                 future = self._pool.submit(_work, piece.chunk)
         except BrokenProcessPool as error:  # it died since we looked
             future = Future()
@@ -153,12 +156,15 @@ def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
 
 @contextmanager
 def not_from_here() -> Iterator[None]:
-    """Let processes that are started meanwhile import nothing of the working directory.
+    """Let nothing of the working directory, or beside a script, stand in for another module.
 
-    Python puts it first on the module path of a process that it starts with ``-c``.
+    Python puts the working directory first on the module path of each process that it starts with
+    ``-c``: of workers, of the server that forks them, and of the tracker of what they share. Then
+    they get our own path, which begins with the script's folder; its modules are found last.
     """
-    before = os.environ.get(_SAFE_PATH)
+    before, path = os.environ.get(_SAFE_PATH), list(sys.path)
     os.environ[_SAFE_PATH] = "1"
+    sys.path[:] = _own_last(path)
     # Nor do they run the program again that started the study: it may be a script without a guard.
     program = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -166,10 +172,18 @@ def not_from_here() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = program
+        sys.path[:] = path
         if before is None:
             del os.environ[_SAFE_PATH]
         else:
             os.environ[_SAFE_PATH] = before
+
+
+def _own_last(path: list[str]) -> list[str]:
+    """Return a module path without the working directory, and a script's folder last."""
+    if sys.flags.safe_path or path[:1] == [_HOME]:
+        return path
+    return [place for place in [*path[1:], *path[:1]] if place not in ("", os.getcwd())]
 
 
 def _new_pool(study: Study) -> ProcessPoolExecutor:
@@ -296,6 +310,11 @@ def make_executor(kind: str, workers: int, scheduler: str | None) -> Executor:
         return Dask(scheduler)
     if scheduler is not None:
         raise UsageError("--scheduler belongs to --executor dask")
+    if workers > 1 and sys.flags.ignore_environment and not sys.flags.safe_path:
+        raise UsageError(
+            f"--workers {workers}: python -E has workers import from the working directory; "
+            "give python -P as well, or --workers 1"
+        )
     return Serial() if workers == 1 else Local(workers)
 
 

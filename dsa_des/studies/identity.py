@@ -1,17 +1,27 @@
 """The digest of all that fixes a study's results, and the ``study.json`` that holds it."""
 
+import contextlib
 import hashlib
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dsa_des.errors import UsageError
+from dsa_des.block.module_search import file_of
+from dsa_des.block.source_file import is_file, path_of, split_name
+from dsa_des.errors import SceneError, UsageError
+from dsa_des.files.input_files import resolve_home
+from dsa_des.files.manifest import RUN_JSON
 from dsa_des.record.version import __version__
+from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.record import StudyRecord, record_text
 from dsa_des.studies.sample import file_digest
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_tables import json_safe
+
+#: Texts for people, which name no file.
+_SAID = ("title", "description", "labels")
 
 
 def description_text(study: Study) -> str:
@@ -31,8 +41,11 @@ def description_text(study: Study) -> str:
     }
     if study.over:  # each member of a sample has seeds and draws of its own
         identity["over"] = sorted(study.over)
-    files = _files_in([study.base.data, study.sets, [axis.sets for axis in study.axes]])
+    given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
+    given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
+    beside = study.path.parent, study.scene_path.parent
     try:
+        files = _files_in([study.base.data, given], beside)
         identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
@@ -51,19 +64,66 @@ def record_of(study: Study) -> StudyRecord:
     return StudyRecord.model_validate_json(description_text(study))
 
 
-def _files_in(value: Any) -> set[Path]:
-    """Return the files that values name: encounters, terrain, tables.
+def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
+    """Return the files that values name: encounters, terrain, tables, modules.
 
-    Their content fixes results as much as the values do.
+    Their content fixes results as much as the values do. A relative name counts from the folder of
+    the file that holds it; whichever way a file is named, its content is what counts.
+
+    Parameters
+    ----------
+    value : object
+        Tables, lists and texts.
+    beside : sequence of Path
+        Folders in which modules are looked for.
     """
     if isinstance(value, Mapping):
-        return _files_in(list(value.values()))
+        return _files_in([item for key, item in value.items() if key not in _SAID], beside)
     if isinstance(value, list | tuple):
-        return set().union(*map(_files_in, value))
+        return set().union(*(_files_in(item, beside) for item in value))
     if not isinstance(value, str):
         return set()
     try:
-        path = getattr(value, "folder", Path()) / Path(value)
-        return {path.resolve()} if path.is_absolute() and path.is_file() else set()
+        found = _module_of(value, beside) or _named(value)
+        return set() if found is None else found | _extended_by(found)
     except (OSError, ValueError):  # a text that can be no path
         return set()
+
+
+def _named(text: str) -> set[Path] | None:
+    """Return the file of this name, or those of a run's folder."""
+    folder, path = getattr(text, "folder", None), resolve_home(text)
+    if folder is None and not path.is_absolute():
+        return None
+    whole = Path(os.path.abspath(Path(folder or "") / path))
+    if whole.is_file():
+        return {whole}
+    if (whole / RUN_JSON).is_file():
+        return {entry for entry in whole.iterdir() if entry.is_file()}
+    return None
+
+
+def _module_of(text: str, beside: Sequence[Path]) -> set[Path] | None:
+    """Return the file of a class that is named by its module or file."""
+    module, class_name = split_name(text)
+    if not class_name.isidentifier():
+        return None
+    if is_file(module):
+        return {path_of(text)} if path_of(text).is_file() else None
+    if not all(part.isidentifier() for part in module.split(".")):
+        return None
+    own = [Path(text.folder)] if hasattr(text, "folder") else []
+    file = Path(file_of(module, [*own, *beside]))
+    return {file} if file.is_absolute() and file.is_file() else None
+
+
+def _extended_by(files: set[Path]) -> set[Path]:
+    """Return what TOML files among some extend and name themselves."""
+    found: set[Path] = set()
+    for path in files:
+        if path.suffix == ".toml":
+            with contextlib.suppress(SceneError):  # its runs say what is wrong with it
+                scene = read_scene_file(path)
+                found |= {Path(os.path.abspath(source)) for source in scene.sources.values()}
+                found |= _files_in(scene.data, ())
+    return found

@@ -1,11 +1,13 @@
 """Checks of a study that need its scenes: every value of every axis, its draws and its metrics."""
 
+import contextlib
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_STUDY_SCANS
+from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -129,7 +131,8 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> list[Pr
     wrong: dict[int, str] | None = None
     for scene in scenes:
         try:
-            simulation = Simulation(scene_of(scene, study.replica(0)))
+            recorder = Recorder([], wanted=dict.fromkeys(_tables_read(study, scene), ()))
+            simulation = Simulation(scene_of(scene, study.replica(0)), recorder=recorder)
             if wrong is None and (said := _endless(study, simulation.scans)):
                 return [file.problem(("replicas",), said)]
             blocks = simulation.components
@@ -254,6 +257,15 @@ def _build_metrics(
         except ValueError as error:
             add(("metrics", spec.place), f"{error}{where}", spec.name)
     return built
+
+
+def _tables_read(study: Study, scene: Scene) -> set[str]:
+    """Return the tables that the metrics read; what is wrong with one is said elsewhere."""
+    found: set[str] = set()
+    for spec in study.metrics:
+        with contextlib.suppress(ValueError):
+            found.update(spec.build(scene).tables)
+    return found
 
 
 def one_per_value(study: Study) -> list[int]:

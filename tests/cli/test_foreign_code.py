@@ -232,3 +232,81 @@ def test_what_a_module_prints_does_not_spoil_json(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["simulated_s"] == 1
     assert done.stderr.splitlines()[0] == "mine: \\x1b[31mhello"
     assert "\x1b" not in done.stderr
+
+
+STUDY = f"scene = '{SCENE}'\nreplicas = 2\nruns_per_chunk = 1\nmetrics = ['first_detection']\n"
+#: Written over every module that Python's part of a worker's start and ours import.
+SHADOW = "open(__file__ + '.ran', 'w')\n"
+STARTED = "import dsa_des.studies.executors, multiprocessing.forkserver, sys; print(*sys.modules)"
+
+
+@pytest.fixture(scope="module")
+def shadows(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a study, and a file named like each module that a worker imports."""
+    home = tmp_path_factory.mktemp("shadows")
+    found = subprocess.run([sys.executable, "-P", "-c", STARTED], capture_output=True, text=True,
+                           check=True)  # fmt: skip
+    tops = {name.partition(".")[0] for name in found.stdout.split()} - {"__main__"}
+    assert {"multiprocessing", "re", "signal", "numpy", "dsa_des", "socket"} <= tops
+    for name in tops:
+        (home / f"{name}.py").write_text(SHADOW)
+    (home / "s.toml").write_text(f"{STUDY}set.duration_s = 1\n")
+    return home
+
+
+def ran(home: Path) -> list[str]:
+    return sorted(path.name for path in home.glob("*.ran"))
+
+
+@pytest.mark.parametrize("method", ["", "m.get_all_start_methods = lambda: ['spawn']\n"])
+def test_workers_run_nothing_of_the_working_directory(
+    shadows: Path, tmp_path: Path, method: str
+) -> None:
+    """Nor does the server that forks them, nor the tracker of what they share."""
+    program = tmp_path / "program.py"  # as ``dsa-des`` is: a script in a folder of its own
+    program.write_text(
+        f"import multiprocessing as m\n{method}from dsa_des.cli import main\n"
+        "if __name__ == '__main__': main()\n"
+    )
+    command = [sys.executable, str(program), "study", "s.toml", "--workers", "2", "--quiet"]
+    plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
+    done = subprocess.run([*command, "--out", str(tmp_path / "o")], cwd=shadows, env=plain,
+                          capture_output=True, text=True, timeout=100, check=False)  # fmt: skip
+    assert (done.returncode, ran(shadows)) == (0, []), done.stderr
+
+
+def test_workers_run_nothing_that_lies_beside_a_script(tmp_path: Path) -> None:
+    """Of modules that the script itself has not imported, and a metric of its own is found."""
+    (tmp_path / "own_sensor.py").write_text(
+        "from components.radar.swerling import SwerlingRadar\nclass Own(SwerlingRadar): pass\n"
+    )
+    (tmp_path / "script.py").write_text(f"""
+import sys, pathlib
+here = sys.path.pop(0)
+import dsa_des, dsa_des.library.study, dsa_des.studies.executors, multiprocessing.forkserver
+import concurrent.futures.process, multiprocessing.spawn, dsa_des.studies.runner
+sys.path.insert(0, here)
+for name in {{name.partition('.')[0] for name in sys.modules}} - {{'__main__'}}:
+    pathlib.Path(here, name + '.py').write_text({SHADOW!r})
+scene = dsa_des.load_scene({str(SCENE)!r}, duration_s=1, swaps=['radar=own_sensor:Own'])
+print(len(dsa_des.study(scene, metrics=['first_detection'], replicas=2, workers=2).runs))
+""")
+    (tmp_path / "elsewhere").mkdir()
+    plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
+    done = subprocess.run([sys.executable, str(tmp_path / "script.py")], cwd=tmp_path / "elsewhere",
+                          capture_output=True, text=True, timeout=100, env=plain,
+                          check=False)  # fmt: skip
+    assert (done.stdout, ran(tmp_path)) == ("2\n", []), done.stderr
+
+
+def test_the_program_run_as_a_module_runs_nothing_of_the_working_directory(shadows: Path) -> None:
+    # What Python itself looks for before it comes to us.
+    command = [sys.executable, "-P", "-c", "import runpy, sys; print(*sys.modules)"]
+    found = subprocess.run(command, capture_output=True, text=True, check=True)
+    for name in ("dsa_des", *found.stdout.split()):
+        (shadows / f"{name}.py").unlink(missing_ok=True)
+    plain = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
+    done = subprocess.run([sys.executable, "-m", "dsa_des", "check", "first_light"], cwd=shadows,
+                          capture_output=True, text=True, timeout=60, env=plain,
+                          check=False)  # fmt: skip
+    assert (done.returncode, ran(shadows)) == (0, []), done.stderr

@@ -11,10 +11,10 @@ from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 
 
-def tables_of(kind, scenes, **options):
-    """Return a simulation that has run and what it recorded."""
+def tables_of(kind, scenes, runs=1, **options):
+    """Return a simulation that has run, as one of `runs`, and what it recorded."""
     sink = MemorySink()
-    simulation = kind(scenes, recorder=Recorder([sink]), **options)
+    simulation = kind(scenes, recorder=Recorder([sink], runs=runs), **options)
     simulation.run()
     return simulation, sink.tables()
 
@@ -24,7 +24,7 @@ def same_as_alone(scenes, **options):
     simulation, together = tables_of(lock_step, scenes, **options)
     assert sum(table.num_rows for table in together.values()) > 0
     for number, scene in enumerate(scenes):
-        for name, alone in tables_of(Simulation, scene)[1].items():
+        for name, alone in tables_of(Simulation, scene, len(scenes))[1].items():
             mine = pc.equal(together[name]["replica"], number)
             got = together[name].filter(mine).drop_columns(["replica"]).combine_chunks()
             assert got.equals(alone), (number, name)

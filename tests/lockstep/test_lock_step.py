@@ -34,9 +34,9 @@ def variants(scene, changes=OFFSETS, seed=40):
     return [scene_of(scene, Replica(seed + i, change)) for i, change in enumerate(fine)]
 
 
-def recorded(simulation_type, scenes, **kwargs):
+def recorded(simulation_type, scenes, runs=1, **kwargs):
     sink = MemorySink()
-    simulation = simulation_type(scenes, recorder=Recorder([sink]), **kwargs)
+    simulation = simulation_type(scenes, recorder=Recorder([sink], runs=runs), **kwargs)
     simulation.run()
     return simulation, sink.tables()
 
@@ -45,7 +45,7 @@ def assert_equal_to_separate_runs(scenes, **kwargs):
     simulation, together = recorded(lock_step, scenes, **kwargs)
     rows = 0
     for number, scene in enumerate(scenes):
-        _, alone = recorded(Simulation, scene)
+        _, alone = recorded(Simulation, scene, len(scenes))
         for table, wanted in alone.items():
             got = together[table].filter(pc.equal(together[table]["replica"], number))
             assert got.drop_columns(["replica"]).combine_chunks().equals(wanted), (number, table)

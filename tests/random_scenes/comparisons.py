@@ -196,7 +196,7 @@ def _replicas_differ(case: Case, scene: Scene, dice: Dice) -> str:
         case.features.add("replica that fails")
         failure = str(error)
     how = f"replicas {[(one.seed, dict(one.changes)) for one in replicas]}"
-    apart = [run_replicas(scene, [replica])[0] for replica in replicas]
+    apart = [run_replicas(scene, [replica], runs=len(replicas))[0] for replica in replicas]
     for number, (one, other) in enumerate(zip(apart, run_replicas(scene, replicas), strict=True)):
         if found := _outcomes_differ(one, other):
             return f"{how}: number {number}: {found}"

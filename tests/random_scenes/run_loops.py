@@ -46,7 +46,7 @@ def judged(seed: int, folder: Path) -> tuple[str, set[str]]:
     if len(tables["manoeuvres"]["tick"]):
         features.add("manoeuvres")
     for number, one in enumerate(replicas):
-        (alone,) = run_replicas(scene, [one])
+        (alone,) = run_replicas(scene, [one], runs=len(replicas))
         assert isinstance(alone, Recorded)
         part = {
             table: {

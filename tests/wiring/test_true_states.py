@@ -56,6 +56,33 @@ def test_by_default_the_truth_is_there_where_it_is_small():
         assert ("truth" in tables(chain(radar, duration_s=duration_s))) is there
 
 
+@pytest.mark.parametrize("alone", [{}, {"processors": {"cpu": {"service_s": 0.001}}}])
+def test_replicas_are_counted_together_in_lock_step_and_one_by_one(alone):
+    """Three aircraft and 50 s: four replicas have 600 aircraft seconds, five have more."""
+    from dsa_des.replicas.changed_scene import Replica
+    from dsa_des.replicas.replicas import run_replicas
+
+    radar = {**HEARS_ALL, "scan_rate_hz": 0.1, **({"processor": "cpu"} if alone else {})}
+    loaded = dsa_des.load_scene(chain({"radar": radar}, duration_s=50, **alone))
+    for count, there in ((4, True), (5, False)):
+        found = run_replicas(loaded, [Replica(number) for number in range(count)])
+        assert [(run.shared is None) for run in found] == [bool(alone)] * count
+        assert [("truth" in run.tables) for run in found] == [there] * count
+
+
+def test_tables_that_nobody_reads_make_no_truth_and_one_that_is_read_does():
+    """Whatever the size of the scene, as a study chooses tables; ``truth = false`` stands."""
+    radar = {"radar": {**HEARS_ALL, "scan_rate_hz": 0.1}}
+    for duration_s in (20, 300):
+        for record, wanted, there in (
+            ({}, {"scans": ()}, False), (ON, {"scans": ()}, False),
+            ({}, {"truth": ("alt_m",)}, True), ({"truth": False}, {"truth": ("alt_m",)}, False),
+        ):  # fmt: skip
+            loaded = dsa_des.load_scene(chain(radar, duration_s=duration_s, record=record))
+            simulation = Simulation(loaded, recorder=Recorder([], wanted=wanted))
+            assert simulation.components["traffic"].says_truth is there
+
+
 def test_misses_of_late_rows_are_compared_with_the_truth_of_their_instant():
     """A fused row's true range is that between ownship and target at measured_s in the table."""
     import pymap3d
