@@ -55,7 +55,7 @@ def refined() -> Made:
                 "factor of about 0.8, as if P or a had been lowered as well (errata 23c).",
                 derived=derived)
         )  # fmt: skip
-    rows += [_area(cell) for cell in PRINTED["table-4.6"]]
+    rows += [_area(cell) for cell in PRINTED["fig-4.13"]]
     fighter = ranges["small_fighter"][90] / before["small_fighter"][90]
     why = "Its errors are printed without a sign: no ratio follows from them."
     rows.append(Row("abeam range, refined over first, small fighter", float(fighter), "", why))
@@ -68,7 +68,7 @@ def _area(cell: str) -> Row:
     name, key = cell.rsplit(" ", 1)
     file, field = f"{name}_refined", f"{key}_m2"
     return Row(f"Table 4.6, {CLASSES[name][0]}, {key}", getattr(aircraft(file).ir, field), "m²",
-               "", printed("table-4.6", cell),
+               "", printed("fig-4.13", cell),
                basis=configured("the file", f"aircraft/{file}.toml:ir.{field}"))  # fmt: skip
 
 

@@ -67,8 +67,8 @@ PRINTED: dict[str, dict[str, str]] = {
         "literature level head-on king air": "6.7",
         "literature level head-on convair": "7.7",
     },
-    # Square metres; the fighter's front and side are lost.
-    "table-4.6": {
+    # Table 4.6, square metres; the fighter's front and side are lost.
+    "fig-4.13": {
         "general_aviation front": "4.6",
         "general_aviation back": "4.6",
         "general_aviation side": "6",
