@@ -211,6 +211,35 @@ def _less_squares(
         part -= term
 
 
+# Beyond this many times its variance a measurement that tells nothing new is not inflated.
+_MOST = 1e9
+
+
+def variance_of_what_is_new(
+    variance: FloatArray, common: FloatArray, spread: FloatArray
+) -> FloatArray:
+    """Return the variances of independent errors that would tell a track as much.
+
+    Where the error of a measurement has the covariance κ with that of what a track expects of it
+    (of variance p), the best estimate of both has the variance (p R - κ²) / (p + R - 2 κ)
+    (Bar-Shalom, Campo, IEEE Trans. AES 22 (1986)); a measurement with an error of its own would
+    give the same with the variance p (p R - κ²) / (p - κ)².
+
+    Parameters
+    ----------
+    variance : (m, n)
+        R, of the measurements' errors.
+    common : (m, n)
+        How much of it is in earlier measurements too; κ is that or p, whichever is less.
+    spread : (m, n)
+        p.
+    """
+    shared = np.minimum(common, spread)
+    left = np.maximum(spread - shared, 1e-6 * spread)
+    new = spread * (spread * variance - shared * shared) / (left * left)
+    return np.where(common > 0.0, np.clip(new, variance, _MOST * variance), variance)
+
+
 def distance_squared(found: Innovation, residual: FloatArray) -> FloatArray:
     """Return the squared Mahalanobis distance of residuals (m, n), shape (n,)."""
     return squared_length(solve_lower(found.root, residual))

@@ -121,7 +121,8 @@ def _interacting(
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
     states, covariances, weights = BANK.predict(*known, dt_s)
     every = np.arange(len(dt_s))
-    said = BANK.measure(BANK.moments(kind, states, covariances, place), every, seen, spread)
+    moments = BANK.moments(kind, states, covariances, place)
+    said = BANK.measure(moments, every, seen, spread, None, weights)
     return BANK.update(states, covariances, weights, every, said, every)
 
 

@@ -150,6 +150,44 @@ _MISSES = {
 _NOISE = {"false_alarms_per_scan": 1.2, "detection_probability": 0.99}
 _LATE = {"delay_s": 0.3, "jitter_s": 0.2}
 
+#: The steps of the radar and of the cameras of `first_light`.
+_STEPS = {
+    "radar": {
+        "azimuth_resolution_deg": 1.0, "elevation_resolution_deg": 1.0, "range_resolution_m": 76.2,
+        "scan_rate_hz": 5,
+    },
+    "fast": {"azimuth_resolution_deg": 0.0358, "elevation_resolution_deg": 0.0293},
+    "slow": {"azimuth_resolution_deg": 0.0977, "elevation_resolution_deg": 0.0977},
+}  # fmt: skip
+_GRIDS = {
+    name: {k: v for k, v in one.items() if "error" not in k and k != "quantised"} | _STEPS[name]
+    for name, one in SENSORS.items()
+}
+
+
+def _closing() -> list[dict[str, Any]]:
+    """Return flights that come nearer at 130 m/s on bearings that hardly change."""
+    found = []
+    own = math.radians(OWNSHIP["heading_deg"])
+    for i, ahead_deg in enumerate(range(-40, 41, 10)):
+        bearing = own + math.radians(ahead_deg)
+        east = OWNSHIP["speed_mps"] * math.sin(own) - 130.0 * math.sin(bearing)
+        north = OWNSHIP["speed_mps"] * math.cos(own) - 130.0 * math.cos(bearing)
+        found.append({
+            "name": f"from_{ahead_deg}", "east_m": 7000.0 * math.sin(bearing) + 13.0 * i,
+            "north_m": 7000.0 * math.cos(bearing), "up_m": 90.0 + 17.0 * i, "climb_mps": 1.0,
+            "heading_deg": math.degrees(math.atan2(east, north)) % 360.0,
+            "speed_mps": math.hypot(east, north),
+        })  # fmt: skip
+    return found
+
+
+_BIASES = {"azimuth_bias_deg": 1.0, "elevation_bias_deg": 1.0, "range_bias_m": 40.0,
+           "scan_rate_hz": 5}  # fmt: skip
+_LASTING = {f"{name}_correlation_time_s": 5.0 for name in ("azimuth", "elevation", "range")} | {
+    "scan_rate_hz": 5
+}
+
 CASES = {
     "velocity": Case("constant velocity, radar 1 Hz with cameras at 20 and 2 Hz, ekf", _EKF),
     "velocity_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}),
@@ -174,6 +212,14 @@ CASES = {
                  wire=_LATE),
     "late_one_step": Case("the same, one_step", {**_EKF, "late": "one_step", "lag_s": 3},
                           wire=_LATE),
+    "grid": Case("nine that close in on steady bearings, radar and cameras that round to their "
+                 "grids, ekf as it is", {"type": "tracking.ekf"}, _closing(), sensors=_GRIDS),
+    "grid_imm": Case("the same, imm as it is", {"type": "tracking.imm"}, _closing(),
+                     sensors=_GRIDS),
+    "bias": Case("a radar with biases drawn for each run, ekf", _EKF,
+                 sensors={"radar": {**RADAR, **_BIASES}}),
+    "lasting": Case("a radar with errors that last 5 s, ekf", _EKF,
+                    sensors={"radar": {**RADAR, **_LASTING}}),
     "near": Case("passes at 240 m, ekf", _EKF, [NEAR]),
     "near_ukf": Case("the same, ukf", {**_EKF, "type": "tracking.ukf"}, [NEAR]),
 }  # fmt: skip

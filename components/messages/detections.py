@@ -4,6 +4,8 @@ Rows are scans (see `dsa_des.block.message`). Angles are in radians; azimuth is 
 elevation upward.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -71,6 +73,28 @@ MEASURED = (
 
 
 @dataclass(frozen=True)
+class LastingError:
+    """What of a quantity's error is not new at every look; all parts are in its variance.
+
+    Parameters
+    ----------
+    step : float
+        Of the grid to which the quantity is rounded; 0 for none.
+    bias_variance : float
+        Of what stays the same throughout a run.
+    variance : float
+        Of what is forgotten with a time constant.
+    lasts_s : float
+        That time constant.
+    """
+
+    step: float = 0.0
+    bias_variance: float = 0.0
+    variance: float = 0.0
+    lasts_s: float = math.inf
+
+
+@dataclass(frozen=True)
 class SensorOffer:
     """What a sensor says of its detections to the blocks that receive them.
 
@@ -89,6 +113,9 @@ class SensorOffer:
         Whether range rates beyond what is unambiguous are told as ones within.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
+    lasting : mapping of LastingError, or None
+        What of its errors lasts from look to look, by quantity (``azimuth``, ``elevation``,
+        ``range``, ``range_rate``), those without are new at every look; None where it does not say.
     clock : ClockSpec or None
         When it looks.
     latest_s, jitter_s : Fraction
@@ -107,6 +134,7 @@ class SensorOffer:
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
     folds_range_rate: bool = False
+    lasting: Mapping[str, LastingError] | None = None
     clock: ClockSpec | None = None
     latest_s: Fraction | None = None
     jitter_s: Fraction = Fraction(0)

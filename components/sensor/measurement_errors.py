@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.messages.constant_columns import constant_column, not_measured
+from components.messages.detections import LastingError
 from components.sensor.error_parameters import StatedError
 from components.sensor.grid import VARIANCE_OF, variance_of_step
 from components.sensor.look import Cells, Look
@@ -182,6 +184,26 @@ def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
     if p.errors == "signal":
         return {}
     return {VARIANCE_OF[name]: v for name, v in _mean_squares(p, _steps(p, steps)).items()}
+
+
+def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
+    """Return what of a sensor's errors lasts from look to look, by quantity.
+
+    Parameters
+    ----------
+    p : ErrorParameters
+    steps : mapping
+        Grid step of each measured quantity.
+    """
+    found = {}
+    for name, step in _steps(p, steps).items():
+        stated = _stated(p, name)
+        bias = mean_square(replace(stated, deviation=0.0), p.biases == "drawn")
+        lasts = stated.correlation_time_s
+        variance = 0.0 if lasts is None else stated.deviation**2
+        if step or bias or variance:
+            found[name] = LastingError(step, bias, variance, math.inf if lasts is None else lasts)
+    return found
 
 
 def _steps(p: Any, steps: Mapping[str, float]) -> dict[str, float]:

@@ -23,7 +23,11 @@ from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule
 from components.sensor.grid import AZIMUTH, ELEVATION
 from components.sensor.look import Cells, Look
-from components.sensor.measurement_errors import MeasurementErrors, constant_variances
+from components.sensor.measurement_errors import (
+    MeasurementErrors,
+    constant_variances,
+    lasting_errors,
+)
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import Mounting
 from components.sensor.parameters import SensorParameters
@@ -102,13 +106,19 @@ class Sensor(Measuring):
         """Say whether we measure range, and how finely we measure angles."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
+        lasting = lasting_errors(self.p, self.steps)
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
             reach = Mounting().build(self).reach(reach)
+            # In the ownship's axes each angle has some of both: the coarser stands for them.
+            angles = [lasting.pop(name) for name in ("azimuth", "elevation") if name in lasting]
+            if angles:
+                worst = max(angles, key=lambda one: one.step)
+                lasting |= {"azimuth": worst, "elevation": worst}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
-            clock=self.p.clock_spec(), **constant,
+            lasting=lasting, clock=self.p.clock_spec(), **constant,
         )  # fmt: skip
 
     @cached_property

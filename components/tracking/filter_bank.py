@@ -23,6 +23,7 @@ from components.estimation.kalman import (
     linear_moments,
     log_likelihood,
     updated,
+    variance_of_what_is_new,
 )
 from components.estimation.measurement import Kind, linearised, residual
 from components.estimation.motion import Motion, predict
@@ -45,12 +46,18 @@ class PairMeasurement:
         Least squared Mahalanobis distance of any model.
     log_likelihoods : (models, pairs)
         Of the detection, were it the track's and the model right.
+    learning : list of Innovation, or None
+        Those by which tracks and models' odds are updated, where errors are not all new.
+    log_odds : (models, pairs) or None
+        The likelihoods by these.
     """
 
     innovations: list[Innovation]
     residuals: list[FloatArray]
     distance: FloatArray
     log_likelihoods: FloatArray
+    learning: list[Innovation] | None = None
+    log_odds: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,8 @@ class FilterBank:
         track: IntArray,
         measured: FloatArray,
         variance: FloatArray,
+        common: FloatArray | None,
+        weights: FloatArray,
     ) -> PairMeasurement:
         """Return what every model says of pairs.
 
@@ -121,6 +130,11 @@ class FilterBank:
         moments : sequence of Moments
         track : (pairs,)
         measured, variance : (m, pairs)
+        common : (m, pairs) or None
+            Covariance of each error with that of the sensor's last measurement of the track: gates
+            take the whole error, updates what is new. None where all of it is.
+        weights : (models, n)
+            Probabilities of the tracks' models.
         """
         innovations = [found.innovation(variance, track) for found in moments]
         residuals = [residual(measured, found.expected) for found in innovations]
@@ -131,7 +145,18 @@ class FilterBank:
         distance = distances[0]
         for other in distances[1:]:
             distance = np.minimum(distance, other)
-        return PairMeasurement(innovations, residuals, distance, likelihoods)
+        if common is None:
+            return PairMeasurement(innovations, residuals, distance, likelihoods)
+        spread = np.zeros(variance.shape)
+        for weight, said in zip(weights, moments, strict=True):
+            for i in range(len(spread)):
+                spread[i] += selected(weight * said.total[i, i], track)
+        new = variance_of_what_is_new(variance, common, spread)
+        learning = [found.innovation(new, track) for found in moments]
+        odds = np.empty_like(likelihoods)
+        for i, (found, apart) in enumerate(zip(learning, residuals, strict=True)):
+            odds[i] = log_likelihood(found, distance_squared(found, apart))
+        return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
     def update(
         self,
@@ -163,13 +188,18 @@ class FilterBank:
                 apart if whole else selected(apart, which),
             )
             for x, p, found, apart in zip(
-                states, covariances, pairs.innovations, pairs.residuals, strict=True
+                states,
+                covariances,
+                pairs.learning or pairs.innovations,
+                pairs.residuals,
+                strict=True,
             )
         ]
         if len(self.models) == 1:
             new = weights if every else selected(weights, track)
         else:
-            new = modes.reweighted(selected(weights, track), selected(pairs.log_likelihoods, which))
+            odds = pairs.log_likelihoods if pairs.log_odds is None else pairs.log_odds
+            new = modes.reweighted(selected(weights, track), selected(odds, which))
         return [x for x, _ in moved], [p for _, p in moved], new
 
 

@@ -11,6 +11,7 @@ from components.estimation.batched import is_everything, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind
+from components.geometry.wrapping import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.filter_bank import PairMeasurement, log_mixture
 from components.tracking.rules import TrackerRules
@@ -97,6 +98,8 @@ def gated_pairs(
                 track,
                 _picked(scans.measured, rows, cells),
                 _picked(scans.variance, rows, cells),
+                common_errors(rules, part, track, scans, rows, cells, moments[0].expected),
+                part.weights,
             )
             gated = said.distance <= gate_threshold(rules.gate_probability, kind.size)
             held[entry[gated]] = True
@@ -214,7 +217,39 @@ def taken_pairs(said: PairMeasurement, which: IntArray) -> PairMeasurement:
         [selected(apart, which) for apart in said.residuals],
         said.distance[which],
         selected(said.log_likelihoods, which),
+        said.learning and [found.take(which) for found in said.learning],
+        None if said.log_odds is None else selected(said.log_odds, which),
     )
+
+
+def common_errors(
+    rules: TrackerRules,
+    part: TrackStore,
+    track: IntArray,
+    scans: Scans,
+    rows: list[int],
+    cells: IntArray,
+    expected: FloatArray,
+) -> FloatArray | None:
+    """Return what the errors of pairs' measurements have in common with their sensors' last ones.
+
+    None where all errors are new at every look.
+    """
+    if rules.lasting is None:
+        return None
+    source = scans.source[rows][:, cells]
+    there = np.maximum(source, 0)
+    when = part.seen_tick[there, track]
+    apart_s = np.abs(part.tick[track] - when) / rules.ticks_per_s
+    since_s = np.where((when < 0) | (source < 0), np.inf, apart_s)
+    moved = np.zeros(source.shape)
+    for place, row in enumerate(rows):
+        if row < 3:
+            moved[place] = selected(expected[place], track) - part.seen[row, there[place], track]
+    moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
+    moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
+    variance = scans.variance[rows][:, cells]
+    return rules.lasting.common(rows, there, variance, moved, since_s)
 
 
 def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:

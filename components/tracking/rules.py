@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 from components.messages.reach import Reach
 from components.tracking.filter_bank import FilterBank
+from components.tracking.lasting_errors import LastingErrors
 from components.tracking.life import LifeRules
 
 Association = Literal["nearest", "gnn", "jpda"]
@@ -41,6 +42,8 @@ class TrackerRules:
     rates_of : int
         Mask of the sensors whose range rates are used.
     ticks_per_s : int
+    lasting : LastingErrors or None
+        What of the sensors' errors is not new at every look.
     """
 
     bank: FilterBank
@@ -61,6 +64,7 @@ class TrackerRules:
     fields: tuple[Reach | None, ...]
     rates_of: int
     ticks_per_s: int
+    lasting: LastingErrors | None = None
 
     @property
     def widest_gate(self) -> float:

@@ -44,6 +44,8 @@ class Scans:
     measured, variance : (4, detections)
         Azimuth, elevation, range, range rate; NaN where not measured.
     contributors : (detections,)
+    source : (4, detections)
+        Index of the sensor that gave each quantity; -1 for none.
     """
 
     row: IntArray
@@ -56,6 +58,7 @@ class Scans:
     measured: FloatArray
     variance: FloatArray
     contributors: IntArray
+    source: IntArray
 
     def __len__(self) -> int:
         return len(self.row)
@@ -85,7 +88,7 @@ class Scans:
             self.row[looks], self.tick[looks], self.sensors[looks], self.tells_misses[looks],
             selected(self.pose, looks), selected(self.velocity, looks), offsets,
             selected(self.measured, which), selected(self.variance, which),
-            self.contributors[which],
+            self.contributors[which], self.source.take(which, axis=-1),
         )  # fmt: skip
 
     @classmethod
@@ -93,7 +96,7 @@ class Scans:
         """Return the looks of all parts, one after the other."""
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
         names = ("row", "tick", "sensors", "tells_misses", "pose", "velocity", "measured",
-                 "variance", "contributors")  # fmt: skip
+                 "variance", "contributors", "source")  # fmt: skip
         columns = {n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names}
         return cls(offsets=np.concatenate(([0], np.cumsum(counts))), **columns)
 
@@ -169,6 +172,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         measured=selected(measured, entries),
         variance=selected(variance, entries),
         contributors=mask[entries],
+        source=np.stack([fused.angle_source] * 2 + [fused.range_source] * 2)[:, entries],
     )
 
 

@@ -1,11 +1,13 @@
 """The start of tracks, from one detection each."""
 
+from typing import Any
+
 import numpy as np
 
 from components.estimation.batched import product, product_transposed, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import innovation, updated
-from components.estimation.measurement import linearised, position_of
+from components.estimation.measurement import Kind, expected, linearised, position_of
 from components.messages.state_tracks import TENTATIVE
 from components.tracking.gated_pairs import named
 from components.tracking.life import NEVER
@@ -78,14 +80,28 @@ def started(
             "nis": 0.0 * ones,
             "freedom": 0 * whole,
             "vain": np.where(mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1, 0, NEVER),
+            "seen": np.full((3, len(rules.fields), count), np.nan),
+            "seen_tick": np.full((len(rules.fields), count), -1),
             "weights": np.full((len(sizes), count), 1.0 / len(sizes)),
             **named(states, covariances),
         }
     )
+    if rules.lasting is not None:
+        born = born.with_columns(**now_seen(rules, born, place, mask))
     status = rules.life.judge(
         born.status, born.history, born.looks, born.misses, born.score, rules.start_score
     )
     return born.with_columns(status=status), next_number + counts
+
+
+def now_seen(rules: TrackerRules, part: TrackStore, place: Place, mask: IntArray) -> Any:
+    """Return the columns of where tracks were last seen after the sensors of a mask saw them."""
+    mine = (mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1).astype(bool)
+    here = expected(Kind(True), part.state0, place)
+    return {
+        "seen": np.where(mine[np.newaxis], here[:, np.newaxis], part.seen),
+        "seen_tick": np.where(mine, part.tick, part.seen_tick),
+    }
 
 
 def _tell_rates(

@@ -13,7 +13,7 @@ from components.tracking.life import LARGEST_SCORE, after_hits_and_misses, seein
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import Scans
 from components.tracking.soft_update import updated_by_all
-from components.tracking.start import started
+from components.tracking.start import now_seen, started
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -127,6 +127,9 @@ def looked_at(
     )
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = rules.life.judge(part.status, history, count, misses, score, rules.start_score)
+    if rules.lasting is not None:
+        mask = np.where(hit, changed.updated_by, 0)
+        changed = changed.with_columns(**now_seen(rules, changed, place, mask))
     changed = changed.with_columns(
         history=history, looks=count, misses=misses, score=score, vain=vain,
         updated_tick=np.where(hit, changed.tick, changed.updated_tick),

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from components.estimation.frame import Place, place_in_frame
 from components.estimation.measurement import Kind, linearised
 from components.messages.columns import COVARIANCE
+from components.messages.detections import SensorOffer
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
@@ -118,7 +119,18 @@ class StoneSoupTracker(Component):
                 offers |= producer.offer
         shares = left_out(offers, Fraction(0), self.context.duration_s)
         why = "no look is worked on after a later one"
-        return super().warnings() + [warning(name, share, why) for name, share in shares.items()]
+        found = [warning(name, share, why) for name, share in shares.items()]
+        for name, offer in sorted(offers.items()):
+            told = offer.lasting if isinstance(offer, SensorOffer) else None
+            if told is None or told:
+                what = (
+                    "what lasts of its errors is not said"
+                    if told is None
+                    else (f"errors of its {', '.join(sorted(told))} last from look to look")
+                )
+                found.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
+                             "too sure where errors are the same again")  # fmt: skip
+        return super().warnings() + found
 
     def _built(self) -> Any:
         name = self.p.builder

@@ -14,7 +14,9 @@ class TrackStore:
     A column is asked for as an attribute. States are ``state0``, ``state1``, … (d, n), one for each
     motion model, covariances ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely
     each model is. ``vain`` (sensors, n) counts each sensor's looks in vain since its last hit, from
-    `components.tracking.life.NEVER` where it had none.
+    `components.tracking.life.NEVER` where it had none. ``seen`` (3, sensors, n) is where the track
+    was expected, azimuth, elevation and range, when each sensor last updated it, and ``seen_tick``
+    (sensors, n) when that was; NaN and -1 where none did.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ class TrackStore:
         columns: dict[str, AnyArray] = {n: np.empty(0, dtype=t) for n, t in cls.PLAIN.items()}
         columns["weights"] = np.empty((len(sizes), 0))
         columns["vain"] = np.empty((sensors, 0), dtype=np.int64)
+        columns["seen"] = np.empty((3, sensors, 0))
+        columns["seen_tick"] = np.empty((sensors, 0), dtype=np.int64)
         for i, size in enumerate(sizes):
             columns[f"state{i}"] = np.empty((size, 0))
             columns[f"covariance{i}"] = np.empty((size, size, 0))

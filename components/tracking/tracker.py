@@ -16,6 +16,7 @@ from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.filter_bank import FilterBank
 from components.tracking.ladder import LADDERS
+from components.tracking.lasting_errors import LastingErrors
 from components.tracking.late_looks import (
     Before,
     Memory,
@@ -122,7 +123,15 @@ class Tracker(Component):
         if self.p.late == "drop":
             lag_s, why = Fraction(0), "late is 'drop'"
         shares = left_out(self._offers(), lag_s, self.context.duration_s)
-        return super().warnings() + [warning(n, share, why) for n, share in shares.items()]
+        found = [warning(n, share, why) for n, share in shares.items()]
+        for name, offer in sorted(self._offers().items()):
+            if not isinstance(offer, SensorOffer) or offer.lasting is None:
+                found.append(
+                    f"{name} does not say what of its errors lasts from look to look "
+                    "(SensorOffer.lasting): all are taken for new, and tracks are too sure where "
+                    "they are not"
+                )
+        return super().warnings() + found
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -189,6 +198,7 @@ class Tracker(Component):
                 1 << i for i, name in enumerate(sensors) if not self._why_no_rates(name, offers)
             ),
             ticks_per_s=self.context.ticks_per_s,
+            lasting=LastingErrors.of(offers, sensors),
         )
 
     def run(self, wake: Wake) -> StateTracks | None:
