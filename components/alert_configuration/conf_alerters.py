@@ -20,6 +20,7 @@ from components.well_clear.volume import Volume
 from dsa_des.text.safe_text import shortened
 
 _LEVEL = re.compile(r"alert_(\d{1,3})_(\w+)")
+_LEVEL_OF = re.compile(r"(.+)_alert_\d{1,3}_(\w+)")
 _CLASS = "load_core_detection_"
 _SPREADS = tuple(key for key in LEVEL_KEYS if key.startswith("spread_"))
 
@@ -39,6 +40,8 @@ class AlerterKeys:
         self._lines, self._problems = lines, problems
         self._used = {key for key in lines if key in KEYS} | {"alerters"}
         self._expected: set[str] = {*KEYS, "alerters"}
+        #: Alerters that the file holds and `alerters` does not name: they are ignored.
+        self.left_out: tuple[str, ...] = ()
 
     def alerters(self) -> tuple[Alerter, ...]:
         """Return all alerters in the order in which the key ``alerters`` names them."""
@@ -55,6 +58,7 @@ class AlerterKeys:
         # The longest name first: one may be the beginning of another.
         prefixes = {name: name.lower() + "_" for name in sorted(names, key=len, reverse=True)}
         found = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
+        self._leave_out(tuple(prefixes.values()))
         self._note_unknown()
         return tuple(alerter for name in names if (alerter := found[name]) is not None)
 
@@ -175,6 +179,22 @@ class AlerterKeys:
         except BadValue as error:
             self._problems.add(f"{name} {error}", line=number)
             return None
+
+    def _leave_out(self, named: tuple[str, ...]) -> None:
+        """Ignore the keys of whole alerters other than those with the prefixes `named`."""
+        free = self._lines.keys() - self._used
+        found: dict[str, str] = {}
+        for key in free:
+            match = _LEVEL_OF.fullmatch(key)
+            if match is None or match.group(2) != "detector":
+                continue
+            prefix = match.group(1) + "_"
+            if any(other.startswith(prefix + _CLASS) for other in free):
+                found[prefix] = self._lines[key][1][: len(prefix) - 1]
+        for prefix in found:
+            longer = tuple(other for other in named if other.startswith(prefix))
+            self._used |= {k for k in free if k.startswith(prefix) and not k.startswith(longer)}
+        self.left_out = tuple(sorted(found.values()))
 
     def _note_unknown(self) -> None:
         for key in sorted(self._lines.keys() - self._used):

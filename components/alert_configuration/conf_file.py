@@ -34,10 +34,11 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     problems = Problems(str(path))
     lines = _lines(Path(path), problems)
     values, units = _values(lines, problems)
-    alerters = AlerterKeys(lines, problems).alerters()
+    keys = AlerterKeys(lines, problems)
+    alerters = keys.alerters()
     _check_together(values, lines, problems)
     problems.raise_if_any()
-    return Configuration(alerters, values, units)
+    return Configuration(alerters, values, units, keys.left_out)
 
 
 def default_values() -> tuple[dict[str, Any], dict[str, str]]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
+from dsa_des.text.safe_text import shortened
 
 #: Regions of guidance from mild to severe.
 REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
@@ -57,15 +58,25 @@ class Configuration:
         Every other key of the file format, in SI units and radians.
     units : mapping
         The unit in which the file gives each key that has one.
+    left_out : tuple of str
+        Alerters that the file holds and its key `alerters` does not name.
     """
 
     alerters: tuple[Alerter, ...]
     values: Mapping[str, Any]
     units: Mapping[str, str]
+    left_out: tuple[str, ...] = ()
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a key, in SI units."""
         return self.values[key]
+
+    def notes(self) -> list[str]:
+        """Say what of its file it does not use."""
+        if not self.left_out:
+            return []
+        shown = shortened(", ".join(self.left_out))
+        return [f"alerters of the file that its key 'alerters' does not name are ignored: {shown}"]
 
     @property
     def most_levels(self) -> int:

@@ -198,5 +198,13 @@ def _show(configuration: Configuration, done: list[_Done], places: dict[str, Pat
     headings = ["file", "target", "highest level", *(f"level {k} from, s" for k in levels)]
     right = range(2, len(headings))
     print_table(console(), "Alerts, times as in the files", headings, rows, right=right)
+    for note in configuration.notes():
+        say(f"note: {note}")
+    for one in done:
+        if one.encounter.left_out:
+            say(
+                f"note: {one.path}: {one.encounter.left_out} rows of targets are left out: the "
+                "ownship has none at their times"
+            )
     for place in places.values():
         say(f"written: {place}")

@@ -111,6 +111,10 @@ class DaidalusAlerting(Component):
         self._followed = FollowedTracks()
         self._of_tracks = TrackMemory(memory_rule(configuration))
 
+    def warnings(self) -> list[str]:
+        """Say what of its configuration is not used."""
+        return self._configuration.notes()
+
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""
         for arrived in wake.arrivals("states"):

@@ -30,7 +30,7 @@ class Encounter(NamedTuple):
     time_s : (times,)
         As in the file.
     present : (times, targets) of bool
-        Where a target has a sample since the ownship's last one.
+        Where a target has a sample at the ownship's time.
     relative : six of (times, targets)
         East, north, up in m and their rates in m/s, ownship less intruder, in the ownship's plane.
     alerter : (times, targets) of int
@@ -46,6 +46,8 @@ class Encounter(NamedTuple):
     wind : (2, times)
         Of the air, towards the east and north, m/s; velocities are relative to the air, which
         changes none of the differences.
+    left_out : int
+        Samples of targets at other instants than the ownship's.
     """
 
     ownship: str
@@ -59,6 +61,7 @@ class Encounter(NamedTuple):
     own_plane: FloatArray
     target_plane: FloatArray
     wind: FloatArray
+    left_out: int
 
     @property
     def pairs(self) -> AlertPairs:
@@ -93,8 +96,8 @@ def read_encounter(
 
     Notes
     -----
-    Targets count at the ownship's times. One whose last sample is older than the ownship's but
-    younger than the ownship's previous one is flown straight to the ownship's time.
+    Targets count at the ownship's times: a sample at another instant is left out, as the reference
+    leaves it out.
     """
     samples = read_daa_samples(path, tuple(EXTRA_HEADERS))
     problems = Problems(str(path))
@@ -107,12 +110,11 @@ def read_encounter(
         for key, part in zip(("ve", "vn"), wind, strict=True):
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
-    place, present = _latest(own["time"], others)
+    place, present = _at_once(own["time"], others)
     targets = {key: _gather([o[key] for o in others], place) for key in own}
-    late_s = np.where(present, own["time"][:, np.newaxis] - targets["time"], 0.0)
     flat = "sx" in own
     state = _flat_states if flat else _projected_states
-    relative, own_state, own_plane, target_plane = state(own, targets, late_s)
+    relative, own_state, own_plane, target_plane = state(own, targets)
     which = _alerters(configuration, own, targets, present, problems)
     bounds = _bounds(configuration, own, targets, relative) if "s_ew_std" in own else None
     return Encounter(
@@ -127,6 +129,7 @@ def read_encounter(
         own_plane,
         target_plane,
         wind,
+        sum(len(other["time"]) for other in others) - int(present.sum()),
     )
 
 
@@ -142,14 +145,12 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
     return np.asarray(np.stack([own["ve"], own["vn"]]) - through_air)
 
 
-def _latest(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
-    """Return each target's last sample at each of the ownship's times, and whether it is new."""
-    place = np.stack([np.searchsorted(o["time"], own_s, side="right") - 1 for o in others], axis=1)
-    before = np.concatenate([[-np.inf], own_s[:-1]])
+def _at_once(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
+    """Return each target's sample at each of the ownship's times, and whether there is one."""
+    place = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
+    place = np.minimum(place, np.array([len(other["time"]) - 1 for other in others]))
     times = _gather([other["time"] for other in others], place)
-    # On its first row the ownship takes a target only with a sample of that very time.
-    since = np.where(np.isinf(before), np.nextafter(own_s, -np.inf), before)
-    return place, (place >= 0) & (times > since[:, np.newaxis])
+    return place, times == own_s[:, np.newaxis]
 
 
 def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:
@@ -159,14 +160,11 @@ def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:
 
 
 def _flat_states(
-    own: Samples, targets: Samples, late_s: FloatArray
+    own: Samples, targets: Samples
 ) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
     """Return the states of a file in east, north and up."""
     velocity = [(own[key][:, np.newaxis], targets[key]) for key in ("ve", "vn", "vu")]
-    at = [
-        (own[key][:, np.newaxis], targets[key] + late_s * rates[1])
-        for key, rates in zip(("sx", "sy", "sz"), velocity, strict=True)
-    ]
+    at = [(own[key][:, np.newaxis], targets[key]) for key in ("sx", "sy", "sz")]
     relative = tuple(mine - other for mine, other in [*at, *velocity])
     return (
         relative,
@@ -177,7 +175,7 @@ def _flat_states(
 
 
 def _projected_states(
-    own: Samples, targets: Samples, late_s: FloatArray
+    own: Samples, targets: Samples
 ) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
     """Return the states of a file in latitude and longitude, in the plane below the ownship."""
     own_lat, own_lon = (np.radians(own[key])[:, np.newaxis] for key in ("lat", "lon"))
@@ -187,11 +185,10 @@ def _projected_states(
     )
     theirs = east_north_mps(lat, lon, targets["ve"], targets["vn"], own_lat, own_lon)
     at = east_north_m(lat, lon, own_lat, own_lon)
-    up = own["alt"][:, np.newaxis] - (targets["alt"] + late_s * targets["vu"])
     relative = (
-        -(at[0] + late_s * theirs[0]),
-        -(at[1] + late_s * theirs[1]),
-        up,
+        -at[0],
+        -at[1],
+        own["alt"][:, np.newaxis] - targets["alt"],
         mine[0] - theirs[0],
         mine[1] - theirs[1],
         own["vu"][:, np.newaxis] - targets["vu"],

@@ -10,6 +10,7 @@ import logging
 import threading
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
@@ -19,9 +20,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from components.cdti.admission import OPERATOR, Admission
+from components.cdti.connection_limit import ConnectionLimit
 from components.cdti.page_messages import LARGEST_BYTES, Drawn, PageMessage, read_message
 from components.cdti.page_text import headers, page
 from dsa_des.errors import UsageError
+from dsa_des.terminal.terminal import say
 
 SOCKET = "/socket"
 #: Browsers at a time.
@@ -173,6 +176,8 @@ class DisplayServer:
         self._new, self._stop = asyncio.Condition(), asyncio.Event()
         quiet = logging.getLogger(f"{__name__}.connections")
         quiet.setLevel(logging.CRITICAL)  # what a stranger sends is no matter of the terminal's
+        limit = ConnectionLimit(partial(say, err=True))
+        self.loop.set_exception_handler(limit.on_error)
         try:
             server = await serve(
                 self._meet,
@@ -183,6 +188,7 @@ class DisplayServer:
                 compression=None,
                 server_header=None,
                 logger=quiet,
+                create_connection=limit.connection,
                 ping_interval=10,
                 ping_timeout=20,
                 close_timeout=1,

@@ -32,7 +32,9 @@ class Altitudes:
         self.values = np.broadcast_to(least + number * step, (len(own.up_m), len(number)))
         self.instantaneous = values["vertical_accel"] == 0.0 or values["vertical_rate"] == 0.0
         self._plan(values["vertical_accel"], values["vertical_rate"])
-        self._far_ones_alike(values["lookahead_time"], step)
+        # Where horizons count from now, level flights are asked for that begin beyond them.
+        alike_s = math.inf if values["bands_add_time_to_maneuver"] else values["lookahead_time"]
+        self._far_ones_alike(alike_s, step)
 
     def _plan(self, acceleration: float, rate: float) -> None:
         """Find the times and rates of the flights to all altitudes."""
@@ -157,26 +159,29 @@ class AltitudeConflicts:
             altitudes.chosen, (altitudes.accelerated_s, altitudes.held_s, altitudes.level_s)
         )
         self._level_s = np.zeros(t1.shape) if altitudes.instantaneous else t3 + 1.0
-        self._level = self._over(self._level_s)
+        # Inside recovery, who is level beyond the horizon keeps clear of the cylinder all the time.
+        self._late = (self._level_s > lookahead_s) & from_now
+        self._level = self._over(self._level_s, self._late)
         if altitudes.instantaneous:
             return
         self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, lookahead_s)
-        self._held = self._over(self._held_s)
+        self._held = self._over(self._held_s, np.zeros(t1.shape, dtype=bool))
         self._at_seconds(np.zeros(t1.shape), t1)
         self._at_seconds(np.ceil(t2), t3 + 1.0)
 
-    def _over(self, begin_s: FloatArray) -> Span:
-        begin_s = np.minimum(begin_s, self._lookahead_s)
-        flight = self._altitudes.flight_at(begin_s)
+    def _over(self, begin_s: FloatArray, late: BoolArray) -> Span:
+        before_s = np.minimum(begin_s, self._lookahead_s)
+        flight = self._altitudes.flight_at(np.where(late, begin_s, before_s))
+        begin_s = np.where(late, 0.0, before_s)
         return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s)
 
     def _at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
         """Find which flights are inside at the whole seconds of an interval."""
-        last_s = np.minimum(np.floor(last_s), self._lookahead_s)
+        last_s = np.floor(np.minimum(last_s, self._lookahead_s))
         # All flights of an acceleration share their first seconds, so these are few.
         for number in range(int(np.max(last_s - first_s, initial=-1.0)) + 1):
             time_s = first_s + number
-            due = time_s <= last_s
+            due = (time_s <= last_s) & (time_s < self._lookahead_s)
             if due.any():
                 flight = self._altitudes.flight_at(time_s)
                 span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
@@ -214,7 +219,8 @@ class AltitudeConflicts:
     def unsafe_before(self, until_s: FloatArray) -> BoolArray:
         """Tell which flights meet it until a time (n, 1)."""
         end_s = np.minimum(until_s, self._lookahead_s)
-        met = meets(self._level, self._level_s, end_s)
+        begin_s = np.where(self._late, 0.0, self._level_s)
+        met = meets(self._level, begin_s, np.where(self._late, self._lookahead_s, end_s))
         if not self._altitudes.instantaneous:
             met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, end_s))
         for instants in self._seconds:

@@ -143,7 +143,7 @@ class BandMemory:
         return line
 
     def _remember(self, bands: list[Band], own_value: float) -> None:
-        at = _band_at(bands, own_value)
+        at = band_at(bands, own_value)
         self._held = None
         if bands[at].region not in _SEVERE:
             return
@@ -155,7 +155,7 @@ class BandMemory:
             self._held = Band(last.low, first.high + FULL_TURN, first.region)
 
 
-def _band_at(bands: list[Band], value: float) -> int:
+def band_at(bands: list[Band], value: float) -> int:
     """Return the band that holds a value: of two that meet there, the free or milder one."""
     holding = [
         i
@@ -175,7 +175,7 @@ def _band_at(bands: list[Band], value: float) -> int:
 
 
 def _region_at(bands: list[Band], value: float) -> str:
-    return bands[_band_at(bands, value)].region
+    return bands[band_at(bands, value)].region
 
 
 def _painted_over(line: list[Band], held: Band, remembered: int) -> list[Band]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import REGIONS, Alerter, Configuration
-from components.guidance.intervals import Band, Interval, named_recovery, painted
+from components.guidance.intervals import FULL_TURN, Band, Interval, named_recovery, painted
 from components.guidance.kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
@@ -168,6 +168,8 @@ class _Painter:
         self._kind, self._layers = kind, layers
         self._cylinder_m = recovery_cylinder(configuration, altitude_m)
         several = kind.there.sum(axis=1) > 1
+        if kind.cyclic:  # steps that do not meet astern leave a gap there
+            several &= kind.values[:, -1] - kind.values[:, 0] > FULL_TURN * (1.0 - 1e-6)
         self._all_clear = several & np.logical_and.reduce(
             [~of_whom | (clear | ~kind.there).all(axis=1) for _, of_whom, clear in layers]
         )

@@ -121,17 +121,20 @@ class _Search:
                 for row in np.flatnonzero(leads).tolist():
                     recovery = Recovery(float(time_s[row]), _of_row(sizes, row), shrinks)
                     found[row] = recovery, intervals_of(self._kind, row, clear)
-                on &= ~leads
-            smallest = (sizes[0] == nmac[0]) & (sizes[1] == nmac[1])
-            ends = on & (smallest if values["ca_bands"] else True)
+                on = on & ~leads
+            ends = on
+            if values["ca_bands"]:
+                factor = 1.0 - values["ca_factor"]
+                sizes = (
+                    np.maximum(nmac[0], sizes[0] * factor),
+                    np.maximum(nmac[1], sizes[1] * factor),
+                )
+                shrinks += 1
+                # That of a collision is not looked at again: there is neither a time nor a way.
+                ends = on & (sizes[0] <= nmac[0]) & (sizes[1] <= nmac[1])
             for row in np.flatnonzero(ends).tolist():
                 found[row] = Recovery(-math.inf, _of_row(sizes, row), shrinks), []
-            on &= ~ends
-            factor = 1.0 - values["ca_factor"]
-            sizes = tuple(
-                np.maximum(least, size * factor) for least, size in zip(nmac, sizes, strict=True)
-            )
-            shrinks += 1
+            on = on & ~ends
         return [one for one in found if one is not None]
 
     def _try(self, sizes: Sizes) -> None:

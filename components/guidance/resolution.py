@@ -40,12 +40,12 @@ def resolution(
         Whether the values are directions, from 0 to 2 pi.
     """
     least = REGIONS.index(corrective_region)
-    red = [one.region != "RECOVERY" and REGIONS.index(one.region) >= least for one in bands]
+    red = [is_red(one, least) for one in bands]
     turns = (-FULL_TURN, 0.0, FULL_TURN) if cyclic else (0.0,)
     stretches: list[list[float]] = []
     for turn in turns:
-        for band, is_red in zip(bands, red, strict=True):
-            if not is_red:
+        for band, counts in zip(bands, red, strict=True):
+            if not counts:
                 continue
             low, high = band.low + turn, band.high + turn
             if stretches and same_place(stretches[-1][1], low):
@@ -64,19 +64,26 @@ def resolution(
     if cyclic:
         low_end = _direction(own_value, low_end, -math.inf)
         high_end = _direction(own_value, high_end, math.inf)
-    down, up = _away(own_value, low_end, cyclic), _away(own_value, high_end, cyclic)
-    return Resolution(low_end, high_end, bool(math.isfinite(high_end) and up <= down))
+    down, up = away(own_value, low_end, cyclic), away(own_value, high_end, cyclic)
+    nearer = up <= down or same_place(up, down)
+    return Resolution(low_end, high_end, bool(math.isfinite(high_end) and nearer))
+
+
+def is_red(band: Band, least: int) -> bool:
+    """Tell whether a band is as bad as region number `least`; one of recovery never is."""
+    return band.region != "RECOVERY" and REGIONS.index(band.region) >= least
 
 
 def _direction(own_value: float, edge: float, none: float) -> float:
     """Return an edge within [0, 2 pi), or `none` if it is half a turn away or more."""
-    away = abs(edge - own_value)
-    if not math.isfinite(edge) or away >= math.pi or same_place(away, math.pi):
+    way = abs(edge - own_value)
+    if not math.isfinite(edge) or way >= math.pi or same_place(way, math.pi):
         return none
     wrapped = edge % FULL_TURN
     return 0.0 if same_place(wrapped, FULL_TURN) else wrapped
 
 
-def _away(own_value: float, edge: float, cyclic: bool) -> float:
-    away = abs(edge - own_value)
-    return min(away, FULL_TURN - away) if cyclic and math.isfinite(away) else away
+def away(own_value: float, edge: float, cyclic: bool) -> float:
+    """Return how far an edge is from the own value, the shorter way round a circle."""
+    way = abs(edge - own_value)
+    return min(way, FULL_TURN - way) if cyclic and math.isfinite(way) else way

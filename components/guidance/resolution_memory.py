@@ -4,20 +4,20 @@ import math
 from typing import Any
 
 from components.alert_configuration.configuration import REGIONS
+from components.guidance.band_memory import band_at
 from components.guidance.intervals import FULL_TURN, Band, same_place
 from components.guidance.recovery import Recovery
-from components.guidance.resolution import Resolution
+from components.guidance.resolution import Resolution, away, is_red
 
-_SIDES = (-1.0, 1.0)
+_LOW, _HIGH = 0, 1
 
 
 class ResolutionMemory:
     """The memory of one kind of resolutions of one ownship.
 
-    An earlier way out is kept as long as what lies between it and the new one is not red, and there
-    has not been one on its side for long, or it is near the new one, or had a larger recovery
-    cylinder. The preferred side changes only when it is no longer young and the other way is
-    clearly shorter.
+    An earlier way out is kept while the preferred side is young, while the recovery cylinder was
+    larger, or while it is near the new one; and as long as the bands between the two are not red.
+    The preferred side changes only when it is no longer young and the other way clearly shorter.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ class ResolutionMemory:
         self._clear()
 
     def _clear(self) -> None:
-        self._kept = [math.nan, math.nan]
-        self._since_s = [0.0, 0.0]
+        self._shown = [math.nan, math.nan]
+        # How often the recovery cylinder had been made smaller for what is shown.
         self._shrinks = [-1, -1]
-        self._high: bool | None = None
-        self._high_since_s = 0.0
+        self._prefers_high = False
+        self._since_s: float | None = None
 
     def step(
         self,
@@ -66,78 +66,88 @@ class ResolutionMemory:
         if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
             self._clear()
         self._last_s = now_s
-        if found is None or self._hysteresis_s == 0.0:
-            self._clear()
+        if self._hysteresis_s == 0.0:
             return found
+        raw = [math.nan, math.nan] if found is None else [found.low, found.high]
         shrinks = -1 if recovery is None else recovery.shrinks
-        open_above = math.isfinite(found.high) or recovery is not None
-        for side, new in enumerate((found.low, found.high)):
-            # So the reference is seen to do: a way down or left is not kept where none leads up.
-            keeps = side == 1 or open_above
-            if keeps and self._keeps(side, new, bands, own_value, now_s, shrinks):
-                continue
-            if self._kept[side] != new:
-                if not math.isfinite(self._kept[side]):
-                    self._since_s[side] = now_s
-                self._kept[side] = new
-            self._shrinks[side] = shrinks
-        low, high = self._kept
-        return Resolution(low, high, self._prefers(now_s, own_value, low, high))
+        if self._since_s is None or now_s <= self._since_s or self._near == 0.0:
+            self._shown, self._shrinks, self._since_s = list(raw), [shrinks, shrinks], None
+        else:
+            young = now_s - self._since_s < self._persistence_s
+            for side in (_HIGH, _LOW):
+                holds = young or self._shrinks[side] < shrinks
+                if not self._keeps(side, raw[side], bands, own_value, holds):
+                    self._shown[side], self._shrinks[side] = raw[side], shrinks
+        self._prefer(now_s, raw, own_value, shrinks)
+        if found is None:
+            return None
+        return Resolution(self._shown[_LOW], self._shown[_HIGH], self._prefers_high)
 
     def _keeps(
-        self,
-        side: int,
-        new: float,
-        bands: list[Band],
-        own_value: float,
-        now_s: float,
-        shrinks: int,
+        self, side: int, raw: float, bands: list[Band], own_value: float, holds: bool
     ) -> bool:
-        old = self._kept[side]
-        if not (math.isfinite(old) and math.isfinite(new)):
+        """Tell whether the way out that was shown stays; `holds` however far it is."""
+        old = self._shown[side]
+        if not (math.isfinite(old) and math.isfinite(raw)):
             return False
-        far = self._away(side, old, own_value) - self._away(side, new, own_value)
-        if not self._free_between(side, new, old, far, bands):
+        beyond = self._outwards(side, own_value, old)
+        if not (beyond <= math.pi if self._cyclic else beyond >= 0.0):
             return False
-        young = now_s - self._since_s[side] < self._persistence_s
-        if not young and far < 0.0:  # by less than what is one place
+        if not holds and self._outwards(side, raw, old) >= self._near:
             return False
-        return young or self._shrinks[side] < shrinks or abs(far) <= self._near
+        return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
 
-    def _away(self, side: int, edge: float, own_value: float) -> float:
-        away = _SIDES[side] * (edge - own_value)
-        return away % FULL_TURN if self._cyclic else away
+    def _outwards(self, side: int, start: float, end: float) -> float:
+        """Return how far it is from one value to another, to a side."""
+        way = end - start if side == _HIGH else start - end
+        return way % FULL_TURN if self._cyclic else way
 
-    def _free_between(
-        self, side: int, new: float, old: float, far: float, bands: list[Band]
-    ) -> bool:
-        """Tell whether all from the new edge to the old one is free of red bands."""
-        if same_place(new, old):
-            return True
-        if far < 0.0:
+    def _band_of(self, side: int, edge: float, bands: list[Band]) -> int:
+        """Return which band that is not red begins above an edge, or ends below it."""
+        if self._cyclic and (same_place(edge, 0.0) or same_place(edge, FULL_TURN)):
+            return 0 if side == _HIGH else len(bands) - 1
+        free = [i for i, band in enumerate(bands) if not is_red(band, self._least_red)]
+        if side == _HIGH:
+            return next((i for i in free if same_place(bands[i].low, edge)), -1)
+        return next((i for i in reversed(free) if same_place(bands[i].high, edge)), -1)
+
+    def _leads(self, start: int, end: int, bands: list[Band]) -> bool:
+        """Tell whether bands lead to another one, towards the preferred side, and none is red."""
+        if start < 0:
             return False
-        for step in (0.0, FULL_TURN, -FULL_TURN) if self._cyclic else (0.0,):
-            for band in bands:
-                red = band.region != "RECOVERY" and REGIONS.index(band.region) >= self._least_red
-                start, end = (new, new + far) if side else (new - far, new)
-                low, high = band.low + step, band.high + step
-                overlaps = low < end and start < high
-                touches = same_place(low, end) or same_place(high, start)
-                if red and overlaps and not touches:
-                    return False
+        at = start
+        while at != end:
+            at += 1 if self._prefers_high else -1
+            if self._cyclic:
+                at %= len(bands)
+            if at == start or not 0 <= at < len(bands) or is_red(bands[at], self._least_red):
+                return False
         return True
 
-    def _prefers(self, now_s: float, own_value: float, low: float, high: float) -> bool:
-        down = self._away(0, low, own_value) if math.isfinite(low) else math.inf
-        up = self._away(1, high, own_value) if math.isfinite(high) else math.inf
-        now_high = math.isfinite(up) and up <= down
-        if self._high is None or now_high == self._high:
-            if self._high is None:
-                self._high_since_s = now_s
-            self._high = now_high
-            return now_high
-        only_one = math.isinf(up) or math.isinf(down)
-        old = now_s - self._high_since_s >= self._persistence_s
-        if only_one or (old and abs(up - down) >= self._near):
-            self._high, self._high_since_s = now_high, now_s
-        return self._high
+    def _prefer(self, now_s: float, raw: list[float], own_value: float, shrinks: int) -> None:
+        low, high = raw
+        if not (math.isfinite(low) or math.isfinite(high)):
+            self._prefers_high, self._since_s = False, None
+        elif not math.isfinite(high):
+            if self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+        elif not math.isfinite(low):
+            if not self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+        else:
+            down, up = (away(own_value, edge, self._cyclic) for edge in (low, high))
+            nearer_high = up <= down or same_place(up, down)
+            other = self._shrinks[_LOW if self._prefers_high else _HIGH]
+            mine = self._shrinks[_HIGH if self._prefers_high else _LOW]
+            if self._since_s is None:
+                self._prefers_high, self._since_s = nearer_high, now_s
+            elif now_s - self._since_s < self._persistence_s or abs(up - down) < self._near:
+                return
+            elif other <= mine and nearer_high != self._prefers_high:
+                self._switch(now_s, raw, shrinks)
+
+    def _switch(self, now_s: float, raw: list[float], shrinks: int) -> None:
+        self._prefers_high, self._since_s = not self._prefers_high, now_s
+        for side in (_LOW, _HIGH):
+            if self._shrinks[side] >= shrinks:
+                self._shown[side] = raw[side]

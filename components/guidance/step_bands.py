@@ -39,7 +39,10 @@ class StepConflicts:
         self._steps = steps
         self._lookahead_s = lookahead_s
         self._count = np.abs(steps.number)
-        begin_s = np.minimum(steps.time_s, lookahead_s)  # later ones are not asked for
+        # In recovery, one that ends beyond its horizon keeps clear of the cylinder all the time.
+        self._late = (steps.time_s > lookahead_s) & from_now
+        # Others that end later are not asked for.
+        begin_s = np.where(self._late, 0.0, np.minimum(steps.time_s, lookahead_s))
         end_s = lookahead_s + steps.step_time_s
         self._span = detector.span(steps.flight, intruder, begin_s, end_s)
         self._takes_time = bool(steps.step_time_s.any())
@@ -88,7 +91,9 @@ class StepConflicts:
 
     def unsafe_before(self, until_s: FloatArray) -> BoolArray:
         """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
-        met = meets(self._span, self._steps.time_s, np.minimum(self._lookahead_s, until_s))
+        begin_s = np.where(self._late, 0.0, self._steps.time_s)
+        end_s = np.where(self._late, self._lookahead_s, np.minimum(self._lookahead_s, until_s))
+        met = meets(self._span, begin_s, end_s)
         met &= self._steps.there
         if self._takes_time:
             until_s = np.minimum(until_s, self._lookahead_s)

@@ -8,7 +8,7 @@ import numpy as np
 from components.alert_configuration.configuration import Alerter, Configuration
 from components.alert_configuration.margins import Deviations, margins
 from components.guidance.bands import Guidance, guidance_of_many
-from components.guidance.intervals import FULL_TURN
+from components.guidance.intervals import FULL_TURN, same_place
 from components.guidance.regions import GuidedIntruders
 from components.guidance.resolution import resolution
 from components.guidance.situation import State
@@ -118,5 +118,5 @@ def smaller(changes: tuple[float, float]) -> float | None:
     None where there is neither.
     """
     low, high = changes
-    change = high if high <= -low else low
+    change = high if high <= -low or same_place(high, -low) else low
     return change if math.isfinite(change) else None

@@ -1,15 +1,24 @@
 """The beam sweep as an effect: when the beam passes each target, and where that is then."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from components.geometry.wrapping import TWO_PI
 from components.messages.detections import Detections
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.radar.beam_sweep import first_illumination, illumination_offset_s
+from components.radar.beam_sweep import (
+    SWEEP_SHARE,
+    first_illumination,
+    illumination_offset_s,
+    off_nearest,
+    two_way_gain,
+)
 from components.radar.field_of_view import azimuth_width_rad
+from components.sensor.look import Cells
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.block.message import per_row
@@ -37,6 +46,59 @@ class BeamSweep(Effect):
     def build(self, block: Any) -> "Sweep":
         """Return the sweep of this radar's beam."""
         return Sweep(block)
+
+
+class BeamShape(Effect):
+    """What a target off the beam's axis loses: between beam positions, or on average in a sweep.
+
+    The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
+    target is looked at by the nearest. A beam that sweeps passes over it in azimuth: its pulses
+    then have the mean gain within the half-power width. Both ways, of a Gaussian beam. A cue's
+    beam points at its target.
+    """
+
+    name = "beam shape"
+    acts_on = "beam shape"
+    lockstep = True
+    neutral = False
+    outside_the_proof = "no target is amid every beam"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``beam_shape_loss``."""
+        return Verdict.of_flag(block.p, "beam_shape_loss")
+
+    def build(self, block: Any) -> "OffAxis":
+        """Return what gives the share of a target's echo that is left."""
+        return OffAxis(block)
+
+
+class OffAxis:
+    """The share of the echoes of targets off the axes of one radar's beams."""
+
+    def __init__(self, block: Any) -> None:
+        self._block = block
+        positions, reach = block.p.beams, block.p.reach()
+        low_rad, high_rad = reach.elevation_rad
+        self._columns = reach.azimuth_rad[0], azimuth_width_rad(reach), positions.azimuth
+        self._bars = low_rad, high_rad - low_rad, positions.elevation
+        self._beam_rad = [
+            math.radians(width)
+            for width in (block.p.azimuth_beamwidth_deg, block.p.elevation_beamwidth_deg)
+        ]
+
+    def __call__(self, cells: Cells) -> FloatArray:
+        """Return the share of each cell's echo, at most 1."""
+        azimuth_rad, elevation_rad = self._block.axes(
+            cells.body_azimuth_rad, cells.body_elevation_rad
+        )
+        swept = np.mod(azimuth_rad - self._columns[0], TWO_PI)
+        left = two_way_gain(off_nearest(elevation_rad - self._bars[0], *self._bars[1:]),
+                            self._beam_rad[1])  # fmt: skip
+        if self._block.p.beam_sweep:
+            left = left * SWEEP_SHARE
+        else:
+            left = left * two_way_gain(off_nearest(swept, *self._columns[1:]), self._beam_rad[0])
+        return np.where(cells.is_cued(), 1.0, left)
 
 
 @dataclass(eq=False)

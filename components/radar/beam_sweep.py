@@ -6,6 +6,7 @@ what is left of the period: it looks one way only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,12 @@ from dsa_des.arrays.types import BoolArray
 # of times in a run of days.
 _MET_RAD = 1e-9
 _MOST_STEPS = 60
+#: Mean gain both ways of a Gaussian beam within its half-power width, -1.67 dB: what is left of the
+#: pulses of a beam that sweeps over a target (L. V. Blake, Proc. IRE 41, 1953, has 1.6 dB).
+SWEEP_SHARE = (
+    0.5 * math.sqrt(math.pi) * math.erf(math.sqrt(2.0 * math.log(2.0)))
+    / math.sqrt(2.0 * math.log(2.0))
+)  # fmt: skip
 
 
 def illumination_offset_s(
@@ -164,6 +171,27 @@ def first_illumination(
         offset = np.where(met, offset, guess)
         met = met | (np.abs(found) <= _MET_RAD)
     return offset, lit
+
+
+def two_way_gain(off_axis_rad: FloatArray, beamwidth_rad: float) -> FloatArray:
+    """Return the gain of a Gaussian beam both ways over that on its axis: 1/4 at half its width."""
+    share: FloatArray = np.exp(-8.0 * math.log(2.0) * (off_axis_rad / beamwidth_rad) ** 2)
+    return share
+
+
+def off_nearest(angle_rad: FloatArray, width_rad: float, beams: int) -> FloatArray:
+    """Return how far a direction is off the nearest of some beams that share a width evenly.
+
+    Parameters
+    ----------
+    angle_rad : ndarray
+        From the edge of the width.
+    width_rad : float
+    beams : int
+    """
+    step = width_rad / beams
+    number = np.clip(np.floor(angle_rad / step), 0, beams - 1)
+    return np.asarray(angle_rad - (number + 0.5) * step)
 
 
 def _into_sweep(angle: FloatArray, width: float) -> FloatArray:

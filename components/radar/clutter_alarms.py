@@ -13,10 +13,10 @@ from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections, in_measured_order
 from components.messages.targets import RelativeTargets
 from components.radar.clutter import clutter_detection_probability
-from components.radar.clutter_effects import beamwidths_rad, terrain_of
+from components.radar.clutter_effects import RainClutter, beamwidths_rad, terrain_of
 from components.radar.false_alarm_effects import MOST_PER_SCAN
 from components.radar.field_of_view import cells_of_radar
-from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, ground_clutter_rcs_m2
+from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -27,7 +27,8 @@ class ClutterAlarms(Effect):
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
     ``clutter_threshold = "noise"`` every resolution cell that the beam shares with the ground may
     be reported, by its clutter-to-noise ratio, beside the false alarms of noise. The ground is
-    where the radar truly looks; behind a moving-target filter none is reported.
+    where the radar truly looks; behind a moving-target filter none is reported. Rain and what
+    sidelobes meet cross it in every cell.
     """
 
     lockstep = True
@@ -41,8 +42,8 @@ class ClutterAlarms(Effect):
         p = block.p
         if not (p.false_alarms and p.enabled):
             return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
-        if terrain_of(block) is None:
-            return Verdict(False, "[terrain] height_m is not given")
+        if terrain_of(block) is None and not RainClutter().verdict(block).simulated:
+            return Verdict(False, "[terrain] height_m is not given, and rain has no echo")
         if p.clutter_threshold != "noise":
             return Verdict(False, "clutter_threshold is 'adaptive': they are as many as of noise")
         if p.moving_target_filter != "none":
@@ -54,12 +55,13 @@ class ClutterAlarms(Effect):
         return GroundReports(block)
 
 
-class _GroundCells:
-    """Cells of the ground as effects on the SNR ask for them."""
+class _CellsOf:
+    """Cells without a target as effects on the SNR ask for them."""
 
-    def __init__(self, range_m: FloatArray, own_alt_m: float, ground_alt_m: float) -> None:
-        self.range_m = range_m
-        self.alt_m = np.full(len(range_m), ground_alt_m)
+    def __init__(
+        self, range_m: FloatArray, own_alt_m: float, elevation_rad: FloatArray, alt_m: FloatArray
+    ) -> None:
+        self.range_m, self.elevation_rad, self.alt_m = range_m, elevation_rad, alt_m
         self._own_alt_m = own_alt_m
 
     def __len__(self) -> int:
@@ -156,14 +158,13 @@ class GroundReports:
         if targets.own_attitude is None:
             raise ValueError("clutter's false alarms need to know how the ownship is turned")
         own_alt_m = float(targets.own_alt_m[row])
-        height_m = own_alt_m - self._terrain.height_m
         turned = [
             float(targets.own_attitude[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")
         ]
         elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
         parts = [
-            (depth + beam * self._cells.range, *self._clutter(height_m, own_alt_m, depth, away))
-            for depth, beam, away in self._lit(height_m, elevation_rad)
+            (depth + beam * self._cells.range, *self._clutter(own_alt_m, depth, away))
+            for depth, beam, away in self._lit(own_alt_m, elevation_rad)
         ]
         if not parts:
             return np.empty(0, dtype=np.int64), np.empty(0)
@@ -180,9 +181,15 @@ class GroundReports:
         return cell[crossing], cnr[crossing]
 
     def _lit(
-        self, height_m: float, elevation_rad: FloatArray
+        self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Give each range cell that holds ground, the beams that meet it, and where they point."""
+        """Give each range cell with clutter, the beams that meet it, and where they point."""
+        if any(echo.diffuse for echo in self._block.echoes):
+            everywhere = np.arange(len(elevation_rad))
+            for depth in range(len(self._range_m)):
+                yield depth, everywhere, elevation_rad
+            return
+        height_m = own_alt_m - self._terrain.height_m
         reach_rad = BEAM_REACH_BEAMWIDTHS * self._beam_rad[1]
         for depth, range_m in enumerate(self._range_m.tolist()):
             if range_m >= height_m:
@@ -192,19 +199,23 @@ class GroundReports:
                     yield depth, beam, elevation_rad[beam]
 
     def _clutter(
-        self, height_m: float, own_alt_m: float, depth: int, elevation_rad: FloatArray
+        self, own_alt_m: float, depth: int, elevation_rad: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return how often the ground in some cells crosses the threshold, and its CNR."""
-        terrain = self._terrain
+        """Return how often the clutter in some cells crosses the threshold, and its CNR."""
         range_m = np.full(len(elevation_rad), self._range_m[depth])
-        rcs_m2 = ground_clutter_rcs_m2(
-            range_m, elevation_rad, height_m, gamma_db=terrain.clutter_gamma_db,
-            azimuth_beamwidth_rad=self._beam_rad[0], elevation_beamwidth_rad=self._beam_rad[1],
-            range_resolution_m=self._block.range_step_m,
-        )  # fmt: skip
-        cells: Any = _GroundCells(range_m, own_alt_m, terrain.height_m)
-        cnr = self._block.echo_snr(cells, rcs_m2)
+        mean, diffuse = np.zeros(len(range_m)), np.zeros(len(range_m))
+        for echo in self._block.echoes:
+            alt_m = own_alt_m + range_m * np.sin(elevation_rad)
+            if not echo.diffuse:
+                alt_m = np.full(len(range_m), self._terrain.height_m)
+            cells: Any = _CellsOf(range_m, own_alt_m, elevation_rad, alt_m)
+            cnr = self._block.echo_snr(cells, echo(cells))
+            if echo.diffuse:
+                diffuse = diffuse + cnr
+            else:
+                mean = mean + cnr
         pfa = clutter_detection_probability(
-            0.0, cnr, false_alarm_probability=self._pfa, clutter=terrain.clutter_mean
-        )
-        return pfa, cnr
+            0.0, mean, false_alarm_probability=self._pfa, diffuse_cnr=diffuse,
+            clutter=self._block.context.sections["terrain"].clutter_mean,
+        )  # fmt: skip
+        return pfa, mean + diffuse

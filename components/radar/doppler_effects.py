@@ -1,11 +1,12 @@
 """Doppler processing as an effect: a filter that takes out what moves like the ground."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from components.radar.clutter_effects import beamwidths_rad, terrain_of
-from components.radar.moving_target_filter import MovingTargetFilter, platform_spread_m_s
+from components.radar.clutter_effects import Echo, terrain_of
+from components.radar.moving_target_filter import MovingTargetFilter
 from components.radar.range_rate import motion_of_cells
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
@@ -20,7 +21,8 @@ class DopplerFilter(Effect):
     The range rates are those of the two aircraft as they fly, and of the ground in the target's
     range cell as the ownship flies over it. The notch lies at the ground's (``clutter_lock``) or at
     0. The ground's echo is spread by the beam's width across the ownship's course and by its own
-    motion ([terrain] ``clutter_motion_m_s``).
+    motion ([terrain] ``clutter_motion_m_s``); rain is blown and falls, and what sidelobes meet lies
+    all around.
     """
 
     lockstep = True
@@ -49,37 +51,36 @@ class DopplerProcessing:
         )
         self._locked: bool = p.clutter_lock
         self._limit = 10.0 ** (-0.1 * p.improvement_limit_db)
-        self._beam_rad, _ = beamwidths_rad(block)
         self._terrain = terrain_of(block)
 
-    def __call__(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
-        """Return the factors on the power of each cell's target and of its ground.
+    def __call__(self, cells: Cells, echoes: Sequence[Echo]) -> tuple[FloatArray, list[FloatArray]]:
+        """Return the factors on the power of each cell's target and of each echo beside it.
 
         Parameters
         ----------
         cells : Cells
+        echoes : sequence of Echo
 
         Returns
         -------
-        (target, ground) : arrays (cells,)
+        target : (cells,)
+        beside : list of (cells,)
         """
         if len(cells) == 0:
-            return np.empty(0), np.empty(0)
+            return np.empty(0), [np.empty(0)] * len(echoes)
         range_rate_m_s, velocity_m_s = motion_of_cells(cells)
         ground_m_s = -self._along_ground(cells, velocity_m_s)
-        speed_m_s = np.sqrt(sum(part * part for part in velocity_m_s))
-        spread_m_s = np.zeros(len(cells))
-        if self._terrain is not None:
-            spread_m_s += self._terrain.clutter_motion_m_s
-        if self._beam_rad > 0.0:
-            platform = platform_spread_m_s(speed_m_s, ground_m_s, self._beam_rad)
-            spread_m_s = np.hypot(spread_m_s, platform)
         centre_m_s = ground_m_s if self._locked else np.zeros(len(cells))
-        passed, residue = self._filter.gains(
-            range_rate_m_s - centre_m_s, ground_m_s - centre_m_s, spread_m_s
-        )
+        passed, _ = self._filter.gains(range_rate_m_s - centre_m_s)
+        residues = []
+        for echo in echoes:
+            rate_m_s, spread_m_s = echo.range_rates(cells, velocity_m_s, ground_m_s)
+            _, residue = self._filter.gains(
+                range_rate_m_s - centre_m_s, rate_m_s - centre_m_s, spread_m_s
+            )
+            residues.append(residue + self._limit)
         # In the middle of the notch there is still a look, at noise.
-        return np.maximum(passed, _LEAST_GAIN), residue + self._limit
+        return np.maximum(passed, _LEAST_GAIN), residues
 
     def _along_ground(self, cells: Cells, velocity_m_s: tuple[FloatArray, ...]) -> FloatArray:
         """Return the ownship's velocity towards the ground in each target's range cell."""

@@ -101,7 +101,8 @@ def ground_clutter_rcs_m2(
     and analysis", Proc. IEEE 73(2), 1985); patch A = R θ_az · min(ΔR / cos ψ, R θ_el / sin ψ),
     limited by the range cell or, looking steeply down, by the beam; two-way gain of a Gaussian
     beam g = exp(-8 ln 2 (Δ/θ_el)²), Δ between the beam's axis and the ground at that range.
-    Sidelobes and the spread of the ground's depression over the patch are left out.
+    Sidelobes (`ground_ring_rcs_m2`) are left out, and the spread of the ground's depression over
+    the patch.
     """
     for name, value in (
         ("azimuth_beamwidth_rad", azimuth_beamwidth_rad),
@@ -130,6 +131,36 @@ def ground_clutter_rcs_m2(
     gain = np.exp(-8.0 * _LN_2 * off_axis * off_axis)
     rcs = 10.0 ** (0.1 * float(reflectivity)) * sine * across * along * gain
     return unflatten(np.where(lit, rcs, 0.0), shape)
+
+
+def ground_ring_rcs_m2(
+    range_m: ArrayLike, height_m: ArrayLike, *, gamma_db: float, range_resolution_m: float
+) -> Any:
+    """Return the RCS of the ground at a slant range in all directions, which sidelobes meet.
+
+    Parameters
+    ----------
+    range_m, height_m : array_like, m
+        Slant range, and height above terrain, above 0.
+    gamma_db : float, dB
+        As for `ground_clutter_rcs_m2`.
+    range_resolution_m : float, m
+        Above 0.
+
+    Returns
+    -------
+    array of the broadcast shape, m²
+        σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area
+        whatever the height. 0 nearer than the height.
+    """
+    positive("range_resolution_m", range_resolution_m)
+    shape, (distance, height) = broadcast_flat(
+        range_m=not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+    )
+    sine = np.minimum(height, distance) / _or_height(distance, height)
+    area = 2.0 * math.pi * distance * range_resolution_m
+    rcs = 10.0 ** (0.1 * float(gamma_db)) * sine * area
+    return unflatten(np.where(distance >= height, rcs, 0.0), shape)
 
 
 def _or_height(distance: Any, height: Any) -> Any:

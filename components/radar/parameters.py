@@ -19,10 +19,30 @@ from dsa_des.block.component import Parameters
 class RadarParameters(RadarErrorParameters, ClutterParameters):
     """Parameters of every radar."""
 
+    def without_effect(self) -> list[str]:
+        """Say that what a circular polarisation rejects belongs to no other."""
+        said = super().without_effect()
+        if self.polarisation != "circular":
+            because = f"polarisation is '{self.polarisation}'"
+            said += self.idle("rain_rejection_db", because=because)
+        return said
+
     beam_sweep: bool = Field(
         default=False,
         description="Whether a beam sweeps clockwise over the field of view once per scan: each "
         "target is measured at the instant it is lit, which is recorded.",
+    )
+    polarisation: Literal["horizontal", "vertical", "slant", "circular"] = Field(
+        default="slant",
+        description="Polarisation of the wave, 'slant' being linear at 45 deg. Rain attenuates "
+        "slant and circular waves alike, and echoes circular ones less (rain_rejection_db).",
+    )
+    rain_rejection_db: float = Field(
+        default=15.0,
+        ge=0,
+        le=40,
+        description="How much less of the rain's echo a circular polarisation receives, dB: 10 in "
+        "heavy rain to 30 in drizzle (assumption).",
     )
 
 
@@ -35,12 +55,22 @@ class Calibration(Parameters):
     swerling: int = Field(
         default=1, ge=0, le=5, description="Fluctuation model the range was stated for."
     )
+    false_alarm_probability: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="Probability of false alarm that the range was stated for; by default the "
+        "radar's own in the file that calibrates it. Whoever overrides that one moves the "
+        "threshold and keeps the hardware.",
+    )
 
 
 class LinkBudgetParameters(
     SignalErrorParameters, RadarParameters, TimeBudgetParameters, CuedRadarParameters
 ):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
+
+    as_written_with = {("calibrate", "false_alarm_probability"): "false_alarm_probability"}
 
     power_w: float = Field(gt=0, description="Transmitted power, W.")
     antenna_gain_db: float = Field(description="Gain of the antenna, both ways the same, dB.")
@@ -74,9 +104,6 @@ class LinkBudgetParameters(
         lt=1,
         description="Probability of false alarm per scan and resolution cell, for false_alarms; "
         "by default false_alarm_probability.",
-    )
-    polarisation: Literal["horizontal", "vertical", "circular"] = Field(
-        default="circular", description="Polarisation of the wave; rain attenuates each unlike."
     )
     aspect_rcs: bool = Field(
         default=True, description="Whether an aircraft's rcs_table is used; else its rcs_dbsm."
@@ -121,6 +148,19 @@ class LinkBudgetParameters(
         return look.summed
 
     @property
+    def calibrated_pfa(self) -> float:
+        """Probability of false alarm at which the calibration's range holds."""
+        stated = None if self.calibrate is None else self.calibrate.false_alarm_probability
+        return self.false_alarm_probability if stated is None else stated
+
+    @property
+    def stated_pulses_summed(self) -> int:
+        """Pulses summed non-coherently in the look that the link budget describes."""
+        if self.budget == "dwell" and self.integration == "noncoherent":
+            return self.stated_pulses or 1
+        return self.pulses
+
+    @property
     def cell_pfa(self) -> float:
         """Probability of false alarm per scan and resolution cell."""
         if self.cell_false_alarm_probability is None:
@@ -154,17 +194,14 @@ class LinkBudgetParameters(
         )
         if self.calibrate is None:
             return budget
-        summed = self.pulses
-        if self.budget == "dwell" and self.integration == "noncoherent":
-            summed = self.stated_pulses or 1
         try:
             bandwidth_hz = calibrated_bandwidth(
                 budget,
                 rcs_dbsm=self.calibrate.rcs_dbsm,
                 range_km=self.calibrate.range_km,
                 pd=self.calibrate.pd,
-                pulses=summed,
-                false_alarm_probability=self.false_alarm_probability,
+                pulses=self.stated_pulses_summed,
+                false_alarm_probability=self.calibrated_pfa,
                 model=f"swerling{self.calibrate.swerling}",
             )
         except ValueError as error:

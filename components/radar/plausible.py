@@ -16,6 +16,9 @@ _RANGES = {
 }
 #: Noise above the threshold in one look of a hundred is more than any radar's operator bears.
 HIGH_FALSE_ALARM_PROBABILITY = 0.01
+#: Gain times beamwidths in square degrees.
+GAIN_TIMES_BEAM = 30_000.0
+MOST_GAIN_DISAGREEMENT_DB = 3.0
 _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 
@@ -64,6 +67,58 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     return [
         f"false_alarm_probability is {pfa:g} per look ({whose}): half of the looks at a target "
         f"detect at an SNR of {snr_db:.1f} dB; with 1e-6, as radars have, it takes far more"
+    ]
+
+
+def moved_threshold(parameters: Any, pd: float) -> list[str]:
+    """Say what is left of a calibration's Pd where the threshold is not the one it was stated for.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+    pd : float
+        Of the calibration's target at its range, with the threshold in use.
+    """
+    known = parameters.calibrate
+    if known is None or parameters.calibrated_pfa == parameters.false_alarm_probability:
+        return []
+    return [
+        f"calibrate holds at false_alarm_probability {parameters.calibrated_pfa:g} and the "
+        f"threshold is set for {parameters.false_alarm_probability:g}: the hardware stays, and Pd "
+        f"at {known.range_km:g} km is {pd:.3g} instead of {known.pd:g}"
+    ]
+
+
+def beam_against_gain(parameters: Any) -> list[str]:
+    """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
+
+    Parameters
+    ----------
+    parameters : LinkBudgetParameters
+
+    Notes
+    -----
+    A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are
+    built (M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 9.2, has 26,000; C. A.
+    Balanis, Antenna Theory, section 2.6, 30,000).
+    """
+    p = parameters
+    widths_deg = p.azimuth_beamwidth_deg, p.elevation_beamwidth_deg
+    whose = "azimuth_beamwidth_deg and elevation_beamwidth_deg are"
+    if p.azimuth_beamwidth_deg is None:
+        widths_deg = p.azimuth_resolution_deg, p.elevation_resolution_deg
+        whose = "no beamwidths are given, and the grid that stands for the beam is"
+    azimuth_deg, elevation_deg = widths_deg
+    if not (azimuth_deg and elevation_deg):
+        return []
+    gain_db = 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg))
+    if abs(gain_db - p.antenna_gain_db) <= MOST_GAIN_DISAGREEMENT_DB:
+        return []
+    alike_deg = math.sqrt(GAIN_TIMES_BEAM / 10.0 ** (0.1 * p.antenna_gain_db))
+    return [
+        f"antenna_gain_db is {p.antenna_gain_db:g}, which is a beam of {alike_deg:.3g} x "
+        f"{alike_deg:.3g} deg, and {whose} {azimuth_deg:g} x {elevation_deg:g} deg, which is "
+        f"{gain_db:.3g} dB: clutter, false alarms and what is told apart go by the beam"
     ]
 
 

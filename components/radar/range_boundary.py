@@ -1,6 +1,5 @@
 """The crudest radar: all inside its range is detected (``radar.range_boundary``, §2.2.2)."""
 
-from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -8,7 +7,13 @@ from pydantic import Field, model_validator
 
 from components.radar.beam_effects import BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
-from components.radar.clutter_effects import BoundaryClutter, terrain_of
+from components.radar.clutter_effects import (
+    BoundaryClutter,
+    Echo,
+    RainClutter,
+    SidelobeClutter,
+    terrain_of,
+)
 from components.radar.doppler_effects import DopplerFilter
 from components.radar.ladder import DETECTION
 from components.radar.parameters import RadarParameters
@@ -19,6 +24,7 @@ from components.radar.range_effects import BlindRange
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.time_budget import unambiguous_range_m
+from components.radar.weather_effects import WEATHER_EFFECTS, deaf_to_weather, said_of_rain
 from components.sensor.cued_looks import CUED_INPUTS, refuse_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
@@ -35,13 +41,13 @@ class RangeBoundaryParameters(RadarParameters):
         default=0.0,
         ge=-100,
         le=100,
-        description="Target that the range is stated for, dBsm; used with ground clutter only.",
+        description="Target that the range is stated for, dBsm; used with clutter and rain only.",
     )
     boundary_pd: float = Field(
         default=0.9,
         gt=0,
         lt=1,
-        description="Pd at that range (Swerling I); used with ground clutter and CFAR only.",
+        description="Pd at that range (Swerling I); used with clutter, rain and CFAR only.",
     )
     false_alarm_probability: float = Field(
         default=1e-6,
@@ -53,21 +59,13 @@ class RangeBoundaryParameters(RadarParameters):
     frequency_hz: float | None = Field(
         default=None,
         gt=0,
-        description="Carrier, Hz; for a moving_target_filter and range_rate_folds.",
+        description="Carrier, Hz; for weather, a moving_target_filter and range_rate_folds.",
     )
     prf_hz: float | None = Field(
         default=None,
         gt=0,
         description="Pulse repetition frequency, Hz; as frequency_hz.",
     )
-
-    def without_effect(self) -> list[str]:
-        """Say which keys belong to Doppler processing that there is not."""
-        said = super().without_effect()
-        if self.moving_target_filter == "none" and not self.range_rate_folds:
-            because = "moving_target_filter is 'none' and range_rate_folds is false"
-            said += self.idle("frequency_hz", because=because)
-        return said
 
     @model_validator(mode="after")
     def _carrier(self) -> Self:
@@ -100,7 +98,8 @@ class RangeBoundary(Radar):
     Ground clutter brings the boundary nearer: for the target that it is stated for, the noise at
     the boundary has that target's echo over the SNR that `boundary_pd` needs; the ground's echo
     comes on top of it, and a threshold from reference cells needs the CFAR loss more. A
-    moving-target filter changes both echoes.
+    moving-target filter changes both echoes. With ``frequency_hz`` it obeys the weather: air and
+    rain take from both, and rain echoes as the ground does.
     """
 
     Parameters = RangeBoundaryParameters
@@ -108,36 +107,44 @@ class RangeBoundary(Radar):
     lockstep = True
     side_by_side = True
     hooks = {
-        "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
+        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
     effects = (
+        *WEATHER_EFFECTS,
         BlindRange(),
         BoundaryClutter(),
+        RainClutter(),
+        SidelobeClutter(),
         DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
         BeamSweep(),
     )
     ladders = (DETECTION,)
-    _clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
     _cfar: Averaging | None = None
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         frequency_hz = parameters.frequency_hz
+        self._echoes: list[Echo] = []
         self.wavelength_m = None if frequency_hz is None else SPEED_OF_LIGHT_M_S / frequency_hz
 
     def setup(self) -> None:
         """Take what the scene's effects do to the boundary."""
         super().setup()
         refuse_cues(self)
-        (self._clutter_rcs_m2,) = self.built("clutter") or [None]
+        self._echoes = self.built("clutter")
         (self._cfar,) = self.built("threshold from reference cells") or [None]
 
     def warnings(self) -> list[str]:
-        """Say that clutter counts as signal, where it does."""
-        return [*super().warnings(), *clutter_as_signal(self.p, terrain_of(self))]
+        """Say that clutter counts as signal, where it does, and what it hears of the weather."""
+        return [
+            *super().warnings(),
+            *clutter_as_signal(self.p, terrain_of(self)),
+            *deaf_to_weather(self),
+            *said_of_rain(self),
+        ]
 
     def look(self, cells: Cells) -> Look:
         """Detect every cell: the gate has kept those out of range away."""
@@ -145,26 +152,33 @@ class RangeBoundary(Radar):
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
         margin_db = 40.0 * np.log10(ratio)
         detected = np.ones(len(cells), dtype=bool)
-        if not (self._clutter_rcs_m2 is self._cfar is self.doppler is None):
-            margin_db = self._margin_db(cells, margin_db)
-            detected = margin_db >= 0.0
+        through = np.ones(len(cells))
         for factor in self.snr_factors:
-            detected &= factor(cells) > 0.0
+            through = through * factor(cells)
+        heard = through > 0.0
+        lossy = bool((through[heard] != 1.0).any())
+        if lossy or self._echoes or not (self._cfar is self.doppler is None):
+            margin_db = self._margin_db(cells, margin_db, np.where(heard, through, 1.0))
+            detected = margin_db >= 0.0
+        detected &= heard
         # Of equal targets the nearer one has the stronger echo.
         detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
         return Look(detected, margin_db)
 
-    def _margin_db(self, cells: Cells, over_noise_db: FloatArray) -> FloatArray:
+    def _margin_db(
+        self, cells: Cells, over_noise_db: FloatArray, through: FloatArray
+    ) -> FloatArray:
         """Return the margin over what is in the cell, in dB, from that over noise."""
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
-        signal, alone = np.ones(len(cells)), 10.0 ** (-0.1 * over_noise_db)
+        signal, alone = through, 10.0 ** (-0.1 * over_noise_db)
         noise = alone
-        residue = np.ones(len(cells))
+        residues: Any = [1.0] * len(self._echoes)
         if self.doppler is not None:
-            signal, residue = self.doppler(cells)
-        if self._clutter_rcs_m2 is not None:
-            clutter = residue * self._clutter_rcs_m2(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
+            passed, residues = self.doppler(cells, self._echoes)
+            signal = through * passed
+        for echo, residue in zip(self._echoes, residues, strict=True):
+            clutter = through * residue * echo(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
             if p.clutter_threshold == "noise":
                 signal = signal + clutter
             else:

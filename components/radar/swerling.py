@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.radar.clutter import clutter_detection_probability
-from components.radar.clutter_effects import terrain_of
+from components.radar.clutter_effects import Clutter, terrain_of
 from components.radar.detection import detection_probability, probability_of_cells
 from components.radar.detection_rung import ExactDetection, picked_method
 from components.radar.fading import Fading, LastingFluctuation
@@ -190,7 +190,8 @@ class SwerlingRadar(LinkBudgetRadar):
         if allowed is None:
             return math.inf
         steepness = self.steepest_pd()
-        others = {"aspect RCS", *(effect.name for effect in WEATHER_EFFECTS)}
+        others = {"aspect RCS", "beam shape", "rain echo", "sidelobe clutter"}
+        others |= {effect.name for effect in WEATHER_EFFECTS}
         if steepness is None or others & set(self.context.effects):
             return 0.0
         # |4 ln(1 ± e)| is at most 4 e / (1 - e).
@@ -203,26 +204,27 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Draw every cell against its probability of detection."""
-        snr, cnr = self.received(cells)
+        snr, clutter = self.received(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
             confidence[chosen] = snr_db[chosen] - self._reference(model)
-        pd = self._pd_of_cells(cells, snr, cnr)
+        pd = self._pd_of_cells(cells, snr, clutter)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
-        noise = draw >= self._of_target(cells, pd, cnr) if self.p.errors == "signal" else None
+        noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
+        cnr = None if clutter is None else clutter.total
         return Look(echo & (draw < pd), confidence, extras, heard(snr, cnr), noise)
 
-    def _of_target(self, cells: Cells, pd: FloatArray, cnr: FloatArray | None) -> FloatArray:
+    def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.
 
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
         pfa: Any = self.p.false_alarm_probability
-        if cnr is not None or self._cued_detector(cells) is not None:
-            pfa = self._pd_of_cells(cells, np.zeros(len(cells)), cnr)
+        if clutter is not None or self._cued_detector(cells) is not None:
+            pfa = self._pd_of_cells(cells, np.zeros(len(cells)), clutter)
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
     def snr(self, cells: Cells) -> FloatArray:
@@ -259,17 +261,17 @@ class SwerlingRadar(LinkBudgetRadar):
             p.cued_false_alarm_probability or p.false_alarm_probability,
         )
 
-    def _pd_of_cells(self, cells: Cells, snr: FloatArray, cnr: FloatArray | None) -> FloatArray:
+    def _pd_of_cells(self, cells: Cells, snr: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability of detection of every cell."""
         pd = np.empty(len(cells))
         cued = self._cued_detector(cells)
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
-            clutter = None if cnr is None else cnr[chosen]
-            found = self._pd(snr[chosen], model, clutter, *usual)
+            beside = None if clutter is None else clutter.of(chosen)
+            found = self._pd(snr[chosen], model, beside, *usual)
             if cued is not None:
                 inside = cells.is_cued()[chosen]
-                found = np.where(inside, self._pd(snr[chosen], model, clutter, *cued), found)
+                found = np.where(inside, self._pd(snr[chosen], model, beside, *cued), found)
             pd[chosen] = found
         return pd
 
@@ -277,26 +279,32 @@ class SwerlingRadar(LinkBudgetRadar):
         self,
         snr: FloatArray,
         model: int,
-        cnr: FloatArray | None,
+        clutter: Clutter | None,
         pulses: int,
         false_alarm_probability: float,
     ) -> FloatArray:
         """Return Pd of one model's cells; where there is clutter, of the echo within it."""
         p, name = self.p, f"swerling{model}"
-        kind = "" if cnr is None else self.context.sections["terrain"].clutter_mean
-        adaptive = p.clutter_threshold == "adaptive"
-        if cnr is not None and adaptive and kind == "fluctuating":
-            # Clutter that fluctuates like noise is more noise to a threshold that follows it.
-            snr, cnr = snr / (1.0 + cnr), None
+        kind = "" if clutter is None else self.context.sections["terrain"].clutter_mean
+        mean, diffuse = np.zeros(0), np.zeros(0)
+        if clutter is not None:
+            mean, diffuse = clutter.mean, clutter.diffuse
+            if kind == "fluctuating":
+                mean, diffuse = np.zeros(len(mean)), mean + diffuse
+            if p.clutter_threshold == "adaptive":
+                # Clutter that fluctuates like noise is more noise to a threshold that follows it.
+                noise = 1.0 + diffuse
+                snr, mean, diffuse = snr / noise, mean / noise, np.zeros(len(mean))
         if self.cfar is not None:
             return self.cfar.probability(snr, name)
         pd = probability_of_cells(snr, pulses, false_alarm_probability, name, self._method)
-        if cnr is None or not cnr.any():
+        if not (mean.any() or diffuse.any()):
             return pd
-        cluttered = np.flatnonzero(cnr)
+        cluttered = np.flatnonzero(mean + diffuse)
         pd[cluttered] = clutter_detection_probability(
             snr[cluttered],
-            cnr[cluttered],
+            mean[cluttered],
+            diffuse_cnr=diffuse[cluttered],
             false_alarm_probability=false_alarm_probability,
             model=name,
             clutter=kind,

@@ -11,11 +11,19 @@ from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
 from components.radar.aspect_rcs import mean_rcs_m2
-from components.radar.beam_effects import BeamSweep
+from components.radar.beam_effects import BeamShape, BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
 from components.radar.clutter_alarms import ClutterAlarms
-from components.radar.clutter_effects import GroundClutter, terrain_of
+from components.radar.clutter_effects import (
+    Clutter,
+    Echo,
+    GroundClutter,
+    RainClutter,
+    SidelobeClutter,
+    terrain_of,
+)
 from components.radar.cued_parameters import dwell_factor
+from components.radar.detection import detection_probability
 from components.radar.doppler_effects import DopplerFilter
 from components.radar.false_alarm_effects import FalseAlarms
 from components.radar.field_of_view import cells_of_radar
@@ -23,10 +31,12 @@ from components.radar.ladder import DETECTION, RCS
 from components.radar.measured_strength import MeasuredStrength
 from components.radar.parameters import LinkBudgetParameters, budget_report
 from components.radar.plausible import (
+    beam_against_gain,
     clutter_as_signal,
     high_false_alarms,
     implausible,
     many_false_alarms,
+    moved_threshold,
     two_thresholds,
 )
 from components.radar.radar_block import Radar
@@ -36,7 +46,7 @@ from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.signal_errors import heard, signal_variances
 from components.radar.time_effects import TimeBudget, time_report
-from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out
+from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out, said_of_rain
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
@@ -65,14 +75,18 @@ class LinkBudgetRadar(Radar):
     hooks = {
         "mean RCS": "(cells) -> each cell's mean RCS in m²",
         "energy of a look": "what the time of a scan leaves for each beam",
-        "clutter": "(cells) -> RCS in m² of the ground in each cell's resolution cell",
+        "clutter": "(cells) -> RCS in m² of what else echoes in each cell's resolution cell",
+        "beam shape": "(cells) -> share of a target's echo that is left off the beam's axis",
         "threshold from reference cells": "Pd, required SNR and loss of a CFAR detector",
     }
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
         BlindRange(),
+        BeamShape(),
         GroundClutter(),
+        RainClutter(),
+        SidelobeClutter(),
         DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
@@ -94,7 +108,9 @@ class LinkBudgetRadar(Radar):
         self._echo_budget = self.budget
         #: Each cell's mean RCS, m².
         self.mean_rcs_m2: Callable[[Cells], FloatArray] = mean_rcs_m2
-        self._clutter_rcs_m2: Callable[[Cells], FloatArray] | None = None
+        #: What gives an echo beside the target.
+        self.echoes: list[Echo] = []
+        self._beam_shape: Callable[[Cells], FloatArray] | None = None
         self.cfar: Averaging | None = None
         self._roster: Roster | None = None
 
@@ -103,7 +119,8 @@ class LinkBudgetRadar(Radar):
         super().setup()
         self._echo_budget = self._without_blind_range()
         (self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]
-        (self._clutter_rcs_m2,) = self.built("clutter") or [None]
+        self.echoes = self.built("clutter")
+        (self._beam_shape,) = self.built("beam shape") or [None]
         (self.cfar,) = self.built("threshold from reference cells") or [None]
         if self.built("cue") and self.p.cued_dwell_factor is not None:
             self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
@@ -142,26 +159,34 @@ class LinkBudgetRadar(Radar):
             snr = snr * factor(cells)
         return snr
 
-    def clutter_cnr(self, cells: Cells) -> FloatArray | None:
-        """Return each cell's clutter-to-noise ratio (linear), or None where there is no ground."""
-        if self._clutter_rcs_m2 is None:
-            return None
-        return self.echo_snr(cells, self._clutter_rcs_m2(cells))
-
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances that follow from the ratio of signal to noise and clutter."""
         return signal_variances(self.p, signal["snr"])
 
-    def received(self, cells: Cells) -> tuple[FloatArray, FloatArray | None]:
-        """Return the SNR of each echo that stands for its cell, and the CNR if there is ground.
+    def received(self, cells: Cells) -> tuple[FloatArray, Clutter | None]:
+        """Return the SNR of each echo that stands for its cell, and the clutter if there is any.
 
         Both as the detector has them: behind a moving-target filter, where there is one.
         """
-        snr, cnr = self.snr(cells), self.clutter_cnr(cells)
+        snr, beside = self.snr(cells), [self.echo_snr(cells, echo(cells)) for echo in self.echoes]
+        if self._beam_shape is not None:
+            snr = snr * self._beam_shape(cells)
         if self.doppler is not None:
-            passed, residue = self.doppler(cells)
-            snr, cnr = snr * passed, None if cnr is None else cnr * residue
-        return self.resolved(cells, snr), cnr
+            passed, residues = self.doppler(cells, self.echoes)
+            snr = snr * passed
+            beside = [cnr * left for cnr, left in zip(beside, residues, strict=True)]
+        return self.resolved(cells, snr), self._clutter(cells, beside)
+
+    def _clutter(self, cells: Cells, beside: list[FloatArray]) -> Clutter | None:
+        if not beside:
+            return None
+        mean, diffuse = np.zeros(len(cells)), np.zeros(len(cells))
+        for echo, cnr in zip(self.echoes, beside, strict=True):
+            if echo.diffuse:
+                diffuse = diffuse + cnr
+            else:
+                mean = mean + cnr
+        return Clutter(mean, diffuse)
 
     def false_alarm_zero_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
@@ -193,10 +218,26 @@ class LinkBudgetRadar(Radar):
             *implausible(self.p),
             *high_false_alarms(self.p, snr_db),
             *said_of_cues(self),
+            *self._said_of_calibration(),
             *self._said_of_false_alarms(),
             *clutter_as_signal(self.p, terrain_of(self)),
+            *beam_against_gain(self.p),
+            *said_of_rain(self),
             *gas_left_out(self),
         ]
+
+    def _said_of_calibration(self) -> list[str]:
+        p = self.p
+        if p.calibrate is None or p.calibrated_pfa == p.false_alarm_probability:
+            return []
+        model, pulses = f"swerling{p.calibrate.swerling}", p.stated_pulses_summed
+        snr = required_snr(
+            p.calibrate.pd, pulses=pulses, false_alarm_probability=p.calibrated_pfa, model=model
+        )
+        pd = detection_probability(
+            snr, pulses=pulses, false_alarm_probability=p.false_alarm_probability, model=model
+        )
+        return moved_threshold(p, float(pd))
 
     def _said_of_false_alarms(self) -> list[str]:
         if not (self.p.false_alarms and self.p.enabled):
@@ -252,7 +293,8 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def look(self, cells: Cells) -> Look:
         """Compare every cell's SNR with the threshold."""
-        snr, cnr = self.received(cells)
+        snr, clutter = self.received(cells)
+        cnr = None if clutter is None else clutter.total
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, 1.0))
         margin = snr_db - self._threshold_of(cells)

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from components.geometry.field_of_view import sector_width_rad
 from components.geometry.wrapping import TWO_PI
+from components.radar.resolution_parameters import ResolutionParameters
 from components.radar.time_budget import (
     BeamPositions,
     beam_positions,
@@ -15,7 +16,6 @@ from components.radar.time_budget import (
     round_trip_s,
     unambiguous_range_m,
 )
-from components.sensor.parameters import SensorParameters
 
 #: More pulses than this are not summed: Pd was checked up to here.
 MOST_PULSES_SUMMED = 1000
@@ -48,7 +48,7 @@ class LookEnergy:
     summed: int
 
 
-class TimeBudgetParameters(SensorParameters):
+class TimeBudgetParameters(ResolutionParameters):
     """Parameters of what a radar's scan costs in time."""
 
     budget: Literal["free", "dwell"] | None = Field(
@@ -57,14 +57,14 @@ class TimeBudgetParameters(SensorParameters):
         "'free': a scan takes no time (the thesis's). By default free, but a scan rate that the "
         "stated beams and dwell cannot do is refused.",
     )
-    azimuth_beamwidth_deg: float | None = Field(
-        default=None, gt=0, le=360, description="Half-power beamwidth in azimuth, deg."
-    )
-    elevation_beamwidth_deg: float | None = Field(
-        default=None, gt=0, le=180, description="Half-power beamwidth in elevation, deg."
-    )
     beam_spacing: float = Field(
         default=1.0, gt=0, le=2, description="From beam to beam of a scan, in beamwidths."
+    )
+    beam_shape_loss: bool = Field(
+        default=False,
+        description="Whether a target loses what lies off the beam's axis: that between the "
+        "scan's beam positions, and the mean over a sweep. The link budget, and a range that "
+        "calibrates it, are of a target amid the beam.",
     )
     prf_hz: float | None = Field(default=None, gt=0, description="Pulse repetition frequency, Hz.")
     dwell_s: float | None = Field(
@@ -86,10 +86,10 @@ class TimeBudgetParameters(SensorParameters):
 
     @model_validator(mode="after")
     def _time(self) -> Self:
-        if (self.azimuth_beamwidth_deg is None) != (self.elevation_beamwidth_deg is None):
+        if self.beam_shape_loss and self.beams is None:
             raise ValueError(
-                "azimuth_beamwidth_deg and elevation_beamwidth_deg belong together: give both or "
-                "neither"
+                "beam_shape_loss is true and azimuth_beamwidth_deg and elevation_beamwidth_deg "
+                "are not given: the loss is that of a beam"
             )
         if self.dwell_s is not None and self.pulses_per_dwell is not None:
             raise ValueError("dwell_s and pulses_per_dwell say the same: give one of them")

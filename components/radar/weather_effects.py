@@ -9,11 +9,15 @@ from components.atmosphere.altitude_table import AttenuationTable, attenuation_t
 from components.atmosphere.gas import gas_specific_attenuation
 from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
 from components.environment.tables import Weather
+from components.radar.clutter_effects import no_rain_echo
 from components.radar.radar_block import CellFactor
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
+from components.radar.volume_clutter import HIGHEST_RAYLEIGH_HZ
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
+
+_NO_CARRIER = "frequency_hz is not given"
 
 
 class Attenuation(Effect):
@@ -28,8 +32,10 @@ class Attenuation(Effect):
     def build(self, block: Any) -> CellFactor:
         """Return the factor on every cell's SNR."""
         weather = block.context.sections["weather"]
+        if block.wavelength_m is None:
+            return lambda cells: np.ones(len(cells))
         table = attenuation_table(
-            SPEED_OF_LIGHT_M_S / block.budget.wavelength,
+            SPEED_OF_LIGHT_M_S / block.wavelength_m,
             **{"gas": False, **self.settings(weather, block)},
         )
 
@@ -48,7 +54,7 @@ class Attenuation(Effect):
         max |dPd / d ln SNR| per unit of ln SNR.
         """
         reach_m = block.reach.range_max_m
-        steepness = block.steepest_pd()
+        steepness = block.steepest_pd() if hasattr(block, "steepest_pd") else None
         if not math.isfinite(reach_m) or steepness is None:
             return {}
         weather = block.context.sections["weather"]
@@ -72,6 +78,25 @@ def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
     return 1.1 * float(max(level.max(), slanted.max()))
 
 
+def deaf_to_weather(block: Any) -> list[str]:
+    """Say that weather does nothing to a radar whose carrier is not known.
+
+    Parameters
+    ----------
+    block : Radar
+    """
+    weather = block.context.sections.get("weather")
+    if weather is None or block.wavelength_m is not None or not block.p.enabled:
+        return []
+    there = [key for key in ("gas", "rain_rate_mm_h", "fog_water_g_m3") if getattr(weather, key)]
+    if not there:
+        return []
+    return [
+        f"[weather] {' and '.join(there)}: no effect on this radar, whose frequency_hz is not "
+        "given: its boundary lies where range_km says, in any weather"
+    ]
+
+
 class Gas(Attenuation):
     """Oxygen and water vapour (ITU-R P.676-12, reference atmosphere P.835-6)."""
 
@@ -81,12 +106,38 @@ class Gas(Attenuation):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] gas``."""
         if block.context.sections["weather"].gas:
+            if block.wavelength_m is None:
+                return Verdict(False, _NO_CARRIER)
             return Verdict(True, "[weather] gas is true", self.bound(block))
         return Verdict(False, "[weather] gas is false")
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return gas only; with no gas called for, a table without it."""
         return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
+
+
+def said_of_rain(block: Any) -> list[str]:
+    """Say where rain has no echo, or where its echo is taken for more than it is.
+
+    Parameters
+    ----------
+    block : Radar
+    """
+    weather = block.context.sections.get("weather")
+    if weather is None or not weather.rain_rate_mm_h or not block.p.enabled:
+        return []
+    if block.wavelength_m is None:
+        return []  # said of all weather
+    if why := no_rain_echo(block):
+        return [f"rain has no echo for this radar: {why}"]
+    frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
+    if frequency_hz <= HIGHEST_RAYLEIGH_HZ:
+        return []
+    return [
+        f"rain echo: at {frequency_hz / 1e9:.3g} GHz drops are no longer small against the "
+        f"wavelength, and Rayleigh's formula, good up to {HIGHEST_RAYLEIGH_HZ / 1e9:g} GHz, gives "
+        "more echo than there is"
+    ]
 
 
 # Below it clear air takes less than 0.04 dB/km both ways from an echo; no radar's range notices.
@@ -139,6 +190,8 @@ class Rain(Attenuation):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] rain_rate_mm_h``."""
         rate = block.context.sections["weather"].rain_rate_mm_h
+        if rate and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
         because = f"[weather] rain_rate_mm_h is {rate:g}"
         return Verdict(rate > 0, because, self.bound(block) if rate > 0 else {})
 
@@ -147,7 +200,8 @@ class Rain(Attenuation):
         return {
             "rain_rate_mm_h": weather.rain_rate_mm_h,
             "rain_height_m": weather.rain_top_m,
-            "polarisation": block.p.polarisation,
+            # P.838-3 has one coefficient for a circular wave and a linear one at 45 degrees.
+            "polarisation": "circular" if block.p.polarisation == "slant" else block.p.polarisation,
         }
 
 
@@ -160,6 +214,8 @@ class Fog(Attenuation):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] fog_water_g_m3``."""
         water = block.context.sections["weather"].fog_water_g_m3
+        if water and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
         because = f"[weather] fog_water_g_m3 is {water:g}"
         return Verdict(water > 0, because, self.bound(block) if water > 0 else {})
 

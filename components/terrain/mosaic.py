@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from components.terrain.raster import ElevationRaster
+from components.terrain.raster import ElevationRaster, refuse_many_nodes
 
 # Nodes of neighbours must fall onto each other to this share of a step.
 _FIT = 1e-3
-_MOST_NODES = 400_000_000
 
 
 def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
@@ -55,11 +54,7 @@ def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
         for axis in (0, 1)
     ]
     rows, columns = high[0] - low[0], high[1] - low[1]
-    if rows * columns > _MOST_NODES:
-        raise ValueError(
-            f"{first.name} and the others span {rows:,} by {columns:,} nodes: at most "
-            f"{_MOST_NODES:,} are held"
-        )
+    refuse_many_nodes(f"{first.name} with the others", rows, columns)
     height = np.full((rows, columns), np.nan, dtype=np.float32)
     for (south, west), one in zip(corners, rasters, strict=True):
         at = slice(south - low[0], None), slice(west - low[1], None)

@@ -17,6 +17,19 @@ from components.geometry.wrapping import past
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
 _EDGE = 1e-6
 
+#: Heights that are held at most: seven square degrees at 30 m, some 0.4 GB, thrice that while read.
+MOST_NODES = 100_000_000
+
+
+def refuse_many_nodes(name: str, rows: int, columns: int) -> None:
+    """Raise ValueError if a raster is larger than what is held; before any of it is read."""
+    if rows * columns > MOST_NODES:
+        raise ValueError(
+            f"{name} spans {rows:,} by {columns:,} nodes: at most {MOST_NODES:,} are held; cut it "
+            "to where the scene's flights are (gdalwarp -te WEST SOUTH EAST NORTH) or make it "
+            "coarser (-tr)"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ElevationRaster:

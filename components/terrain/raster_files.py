@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from components.terrain.mosaic import mosaic
-from components.terrain.raster import ElevationRaster
+from components.terrain.raster import ElevationRaster, refuse_many_nodes
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, status_of
 from dsa_des.text.safe_text import shortened
@@ -71,8 +71,9 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
         raise ValueError(
             f"{name}: the name of an .hgt file must say its south-west corner, as N45W076.hgt does"
         )
+    nodes = math.isqrt(path.stat().st_size // 2)
+    refuse_many_nodes(name, nodes, nodes)
     data = path.read_bytes()
-    nodes = math.isqrt(len(data) // 2)
     if nodes < 2 or 2 * nodes * nodes != len(data):
         raise ValueError(
             f"{name} has {len(data):,} bytes: an .hgt file holds as many rows as columns of two "
@@ -97,6 +98,7 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
         ) from None
     try:
         with rasterio.open(path) as file:
+            refuse_many_nodes(name, file.height, file.width)
             band = file.read(1, masked=True)
             crs, transform = file.crs, file.transform
     except (RasterioError, OSError) as error:

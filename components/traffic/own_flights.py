@@ -10,8 +10,12 @@ from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
 from components.traffic.flight_protocols import EachFlight
 from components.traffic.leg_table import LegTable
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.steered_flight import AROUND_S, SteeredFlight, flown_from
+from components.traffic.steered_flight import (
+    AROUND_S,
+    SteeredFlight,
+    SteeredPart,
+    flown_from,
+)
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -35,7 +39,7 @@ class OwnFlights:
         #: How many parts each of them has.
         self.count = np.zeros(count, dtype=np.int64)
         self._parts: LegTable | None = None
-        self._flown: list[ScriptedTrajectory] = []
+        self._flown: list[SteeredPart] = []
 
     @classmethod
     def of(cls, steered: Sequence[SteeredFlight], flights: EachFlight) -> OwnFlights:
@@ -60,7 +64,7 @@ class OwnFlights:
         made._part[there] = np.arange(len(made._flown))
         return made
 
-    def parts_of(self, ownship: int) -> tuple[tuple[float, ScriptedTrajectory], ...]:
+    def parts_of(self, ownship: int) -> tuple[tuple[float, SteeredPart], ...]:
         """Return what an ownship flies after each of its manoeuvres, and from when on, s."""
         columns = range(int(self.count[ownship]))
         return tuple(
@@ -113,7 +117,11 @@ class OwnFlights:
         around = self.each(
             np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
         ).reshaped((len(ownship), len(AROUND_S)))
-        new = flown_from("ownship", around, time_s, told)
+        before = [
+            self._flown[self._part[own, self.count[own] - 1]] if self.count[own] else None
+            for own in ownship.tolist()
+        ]
+        new = flown_from("ownship", around, time_s, told, before)
         table = LegTable(new)
         self._parts = table if self._parts is None else LegTable.joined(self._parts, table)
         if int(self.count[ownship].max()) + 1 >= self._start_s.shape[1]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
 from components.messages.steering import Manoeuvre
-from components.traffic.legs import AnyLeg, Climb, ScriptedTrajectory, Straight, Turn
+from components.traffic.legs import AnyLeg, ScriptedTrajectory, Straight, Turn
 from dsa_des.arrays.types import FloatArray
 
 # Changes of speed are flown in steps no longer than this, each at its mean speed: with 2 m/s² the
@@ -21,6 +21,10 @@ _SPEED_STEP_S = 0.5
 # Track and speed are taken over this time around a manoeuvre: right to 1e-4 in a turn of 3 deg/s.
 _BASE_S = 0.5
 AROUND_S = np.array([-_BASE_S, 0.0, _BASE_S])
+_SHORTEST_PIECE_S = 1e-9
+
+#: How long, s, at which mean rate, and how that changes each second; one after the other.
+Pieces = tuple[tuple[float, float, float], ...]
 
 
 class SteerableFlight(Protocol):
@@ -37,7 +41,10 @@ class SteerableFlight(Protocol):
 
 
 class SteeredFlight:
-    """A flight up to its first manoeuvre; each is a turn, climb or descent, and then straight on.
+    """A flight up to its first manoeuvre, then what it is told: turns, climbs, speeds together.
+
+    A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
+    climb. The flight's own script ends with the first one.
 
     It never changes: `steered` returns another one, so that a run can go back to the flight it had.
 
@@ -45,12 +52,12 @@ class SteeredFlight:
     ----------
     flight : object with `name` and `at(time_s)`
         What is flown until the first manoeuvre.
-    parts : tuple of (start in s, ScriptedTrajectory)
+    parts : tuple of (start in s, SteeredPart)
         What is flown from then on.
     """
 
     def __init__(
-        self, flight: SteerableFlight, parts: tuple[tuple[float, ScriptedTrajectory], ...] = ()
+        self, flight: SteerableFlight, parts: tuple[tuple[float, SteeredPart], ...] = ()
     ) -> None:
         self.name, self.flight, self.parts = flight.name, flight, parts
 
@@ -60,7 +67,7 @@ class SteeredFlight:
         return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
 
     def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
-        """Return the flight that does as it is told from a time on, levels off and flies on.
+        """Return the flight that does as it is told from a time on, beside what it still does.
 
         Parameters
         ----------
@@ -68,11 +75,11 @@ class SteeredFlight:
             Not before an earlier manoeuvre.
         told : Manoeuvre
             A turn or a change of altitude begins and ends at once: without a change of speed along
-            the path's projection, and without acceleration upward. Speeds change steadily, each
-            without the other.
+            the path's projection, and without acceleration upward. Speeds change steadily.
         """
         around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
-        (part,) = flown_from(self.name, around, np.array([time_s]), [told])
+        before = self.parts[-1][1] if self.parts else None
+        (part,) = flown_from(self.name, around, np.array([time_s]), [told], [before])
         return SteeredFlight(self.flight, (*self.parts, (time_s, part)))
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -95,9 +102,116 @@ class SteeredFlight:
         return TrajectoryState(*(np.concatenate(c)[order] for c in columns)).reshaped(times.shape)
 
 
+class SteeringPlan(NamedTuple):
+    """What is still to be flown of turns, climbs and speeds, side by side, and what comes after.
+
+    Parameters
+    ----------
+    turns : Pieces
+        Rates in deg/s; then straight on.
+    climbs : Pieces
+        In m/s.
+    climb_mps : float
+        Afterwards.
+    speeds : Pieces
+        Over ground, in m/s.
+    speed_mps : float
+        Afterwards.
+    """
+
+    turns: Pieces
+    climbs: Pieces
+    climb_mps: float
+    speeds: Pieces
+    speed_mps: float
+
+    def after(self, elapsed_s: float) -> SteeringPlan:
+        """Return what is left of it after some time."""
+        return self._replace(
+            turns=_left(self.turns, elapsed_s),
+            climbs=_left(self.climbs, elapsed_s),
+            speeds=_left(self.speeds, elapsed_s),
+        )
+
+    def told(self, told: Manoeuvre, alt_m: float) -> SteeringPlan:
+        """Return it with the parts that are told anew, from an altitude; the others stay."""
+        plan = self
+        if told.turn_rad != 0.0:
+            rate_deg_s = math.copysign(math.degrees(told.rate_rad_s), told.turn_rad)
+            angle_rad = math.radians(math.degrees(abs(told.turn_rad)))
+            plan = plan._replace(
+                turns=((angle_rad / abs(math.radians(rate_deg_s)), rate_deg_s, 0.0),)
+            )
+        if told.vertical_speed_mps != 0.0:
+            climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
+            plan = plan._replace(
+                climbs=_ramp(climb_mps, told.vertical_speed_mps, told.vertical_acceleration_mps2),
+                climb_mps=climb_mps + told.vertical_speed_mps,
+            )
+        elif told.climb_m != 0.0:
+            rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
+            rise_s = (alt_m + told.climb_m - alt_m) / rate_mps
+            plan = plan._replace(
+                climbs=((rise_s, rate_mps, 0.0),) if rise_s > 0.0 else (), climb_mps=0.0
+            )
+        if told.speed_mps != 0.0:
+            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
+            change = max(told.speed_mps, -speed_mps)
+            plan = plan._replace(
+                speeds=_ramp(speed_mps, change, told.acceleration_mps2),
+                speed_mps=speed_mps + change,
+            )
+        return plan
+
+    def legs(self) -> list[AnyLeg]:
+        """Return it as legs, each as long as nothing changes; the last one is for ever."""
+        legs: list[AnyLeg] = []
+        plan = self
+        while plan.turns or plan.climbs or plan.speeds:
+            parts = plan.turns, plan.climbs, plan.speeds
+            lasts_s = min(part[0][0] for part in parts if part)
+            climb_mps = _mean(plan.climbs, lasts_s, plan.climb_mps)
+            speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
+            if plan.turns:
+                rate_deg_s = plan.turns[0][1]
+                legs.append(Turn(lasts_s, speed_mps, climb_mps, rate_deg_s=rate_deg_s))
+            else:
+                legs.append(Straight(lasts_s, speed_mps, climb_mps))
+            plan = plan.after(lasts_s)
+        return [*legs, Straight(speed_mps=plan.speed_mps, climb_mps=plan.climb_mps)]
+
+
+def _left(pieces: Pieces, elapsed_s: float) -> Pieces:
+    for number, (lasts_s, mean, change) in enumerate(pieces):
+        # What rounding leaves of a piece is none.
+        if elapsed_s < lasts_s - _SHORTEST_PIECE_S:
+            gone_s = max(elapsed_s, 0.0)
+            return ((lasts_s - gone_s, mean + 0.5 * change * gone_s, change), *pieces[number + 1 :])
+        elapsed_s -= lasts_s
+    return ()
+
+
+def _mean(pieces: Pieces, first_s: float, without: float) -> float:
+    """Return the mean rate over the first seconds of the first piece, or what is flown without."""
+    if not pieces:
+        return without
+    lasts_s, mean, change = pieces[0]
+    return mean - 0.5 * change * (lasts_s - first_s)
+
+
+class SteeredPart(ScriptedTrajectory):
+    """What is flown after a manoeuvre, with the plan that it follows."""
+
+    plan: SteeringPlan
+
+
 def flown_from(
-    name: str, around: TrajectoryState, time_s: FloatArray, told: Sequence[Manoeuvre]
-) -> list[ScriptedTrajectory]:
+    name: str,
+    around: TrajectoryState,
+    time_s: FloatArray,
+    told: Sequence[Manoeuvre],
+    before: Sequence[SteeredPart | None],
+) -> list[SteeredPart]:
     """Return what aircraft fly from a manoeuvre on.
 
     Parameters
@@ -108,19 +222,36 @@ def flown_from(
         Arrays (n, 3): where each would be without it, `AROUND_S` of its time.
     time_s : (n,)
     told : sequence of n Manoeuvre
+    before : sequence of n SteeredPart or None
+        What each flies after an earlier manoeuvre; the parts of it that are not told anew go on.
     """
     middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     # Ends of the chord seen from its middle, so that the track is the one there.
     ends = [part[:, [0, 2]] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     north, east, _ = line_of_sight_ned(*middle, *ends)
     found = []
-    for row, (at_s, manoeuvre) in enumerate(zip(time_s.tolist(), told, strict=True)):
+    rows = zip(time_s.tolist(), told, before, strict=True)
+    for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
         place = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
-        along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
-        climb_mps = 0.5 * (high - low) / _BASE_S
-        found.append(_flown_from(name, place, along, climb_mps, at_s, manoeuvre))
+        if earlier is None:
+            along = float(north[row, 1] - north[row, 0]), float(east[row, 1] - east[row, 0])
+            heading_deg = math.degrees(math.atan2(along[1], along[0]))
+            speed_mps = math.hypot(*along) / (2.0 * _BASE_S)
+            plan = SteeringPlan(
+                (), (), _own_climb(0.5 * (high - low) / _BASE_S, manoeuvre), (), speed_mps
+            )
+        else:
+            heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
+            plan = earlier.plan.after(at_s - earlier.start_time_s)
+        found.append(_flown_from(name, place, heading_deg, at_s, plan.told(manoeuvre, here)))
     return found
+
+
+def _own_climb(climb_mps: float, told: Manoeuvre) -> float:
+    """Return the climb that is left of a flight's own: a turn or a climb ends it."""
+    ends = told.turn_rad != 0.0 or told.climb_m != 0.0
+    return 0.0 if ends and told.vertical_speed_mps == 0.0 else climb_mps
 
 
 # A study's metrics fly again what its runs flew.
@@ -128,49 +259,30 @@ def flown_from(
 def _flown_from(
     name: str,
     place: tuple[float, float, float],
-    along_m: tuple[float, float],
-    climb_mps: float,
+    heading_deg: float,
     time_s: float,
-    told: Manoeuvre,
-) -> ScriptedTrajectory:
-    speed = math.hypot(*along_m) / (2.0 * _BASE_S)
-    return ScriptedTrajectory(
+    plan: SteeringPlan,
+) -> SteeredPart:
+    part = SteeredPart(
         name,
         lat_deg=place[0],
         lon_deg=place[1],
         alt_m=place[2],
-        heading_deg=math.degrees(math.atan2(along_m[1], along_m[0])),
-        speed_mps=speed,
-        legs=_legs(told, place[2], speed, climb_mps),
+        heading_deg=heading_deg,
+        speed_mps=plan.speed_mps,
+        legs=plan.legs(),
         start_time_s=time_s,
     )
+    part.plan = plan
+    return part
 
 
-def _legs(told: Manoeuvre, alt_m: float, speed_mps: float, climb_mps: float) -> list[AnyLeg]:
-    """Return the legs of a manoeuvre from an altitude and speeds, the last one for ever."""
-    if told.speed_mps != 0.0:
-        change = max(told.speed_mps, -speed_mps)
-        means, last_s = _ramp(change, told.acceleration_mps2)
-        legs: list[AnyLeg] = [
-            Straight(duration_s=last_s, speed_mps=speed_mps + v, climb_mps=climb_mps) for v in means
-        ]
-        return [*legs, Straight(speed_mps=speed_mps + change, climb_mps=climb_mps)]
-    if told.vertical_speed_mps != 0.0:
-        means, last_s = _ramp(told.vertical_speed_mps, told.vertical_acceleration_mps2)
-        legs = [Climb(duration_s=last_s, climb_mps=climb_mps + v) for v in means]
-        return [*legs, Climb(climb_mps=climb_mps + told.vertical_speed_mps)]
-    if told.climb_m != 0.0:
-        rate_mps = math.copysign(told.climb_rate_mps, told.climb_m)
-        return [Climb(climb_mps=rate_mps, to_alt_m=alt_m + told.climb_m), Straight()]
-    turn = Turn(
-        rate_deg_s=math.copysign(math.degrees(told.rate_rad_s), told.turn_rad),
-        angle_deg=math.degrees(abs(told.turn_rad)),
-    )
-    return [turn, Straight()]
-
-
-def _ramp(change_mps: float, acceleration_mps2: float) -> tuple[list[float], float]:
-    """Return the mean changes over the equal steps of a steady change, and how long each is."""
+def _ramp(from_mps: float, change_mps: float, acceleration_mps2: float) -> Pieces:
+    """Return a steady change of speed in equal steps, each at its mean."""
     time_s = abs(change_mps) / acceleration_mps2
     count = max(math.ceil(time_s / _SPEED_STEP_S), 1)
-    return [change_mps * (k + 0.5) / count for k in range(count)], max(time_s / count, 1e-9)
+    lasts_s = max(time_s / count, 1e-9)
+    rate_mps2 = math.copysign(acceleration_mps2, change_mps)
+    return tuple(
+        (lasts_s, from_mps + change_mps * (k + 0.5) / count, rate_mps2) for k in range(count)
+    )

@@ -1,9 +1,10 @@
 """Parameters of blocks and of a scene's tables: exact numbers, paths, and keys that do nothing."""
 
 import os
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import (
     BaseModel,
@@ -79,6 +80,10 @@ class Parameters(BaseModel):
     """Parameters of a block: every field has its unit in its name, bounds and a description."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+    #: Tables of a block whose key, not given, is what another key of the block was in the file that
+    #: wrote the table first, whatever it is overridden by later: (table, its key) → that other key.
+    as_written_with: ClassVar[Mapping[tuple[str, str], str]] = {}
 
     @field_validator("*", mode="after")
     @classmethod

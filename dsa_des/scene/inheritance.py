@@ -52,6 +52,7 @@ class Inheritance:
 
     def __init__(self, sources: dict[Key, str], problems: list[Problem]) -> None:
         self.of_other_type: dict[Key, str] = {}
+        self.beside: dict[Key, dict[str, Any]] = {}
         self._sources = sources
         self._problems = problems
         self._any_removals = False
@@ -83,6 +84,27 @@ class Inheritance:
             else:
                 base[key] = value
         return base
+
+    def note_beside(self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key) -> None:
+        """Note what stands beside each table of a block that a file is the first to write.
+
+        Parameters
+        ----------
+        own : mapping
+            What the file itself says at `at`.
+        merged : mapping
+            The same with what it extends.
+        at : tuple
+        """
+        for key, value in own.items():
+            inherited = merged.get(key)
+            if not (isinstance(value, dict) and isinstance(inherited, dict)):
+                continue
+            if len(at) == 2 and at[0] == "blocks":
+                values = {k: v for k, v in merged.items() if not isinstance(v, dict | list)}
+                self.beside.setdefault((*at, key), values)
+            elif len(at) < 2 and (at or key == "blocks"):
+                self.note_beside(value, inherited, (*at, key))
 
     def finished(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
         """Return the tables of a file that is read to its end, without what was to be removed."""
@@ -137,6 +159,7 @@ class Inheritance:
 
     def _forget(self, container: Any, key: Key) -> None:
         """Forget where a key was written; later items of a list move up."""
+        self.beside.pop(key, None)
         for known in [known for known in self._sources if known[: len(key)] == key]:
             del self._sources[known]
         if isinstance(container, list):

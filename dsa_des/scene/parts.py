@@ -105,6 +105,7 @@ def read_blocks(
         classes[name] = cls
         notes += drop_of_other_type(scene_file, name, cls)
         extra, given = split_options(table, cls.Parameters)
+        given = _as_written(scene_file, key, given, cls.Parameters)
         try:
             with strangers_code(ValidationError):
                 parameters = cls.Parameters.model_validate(given)
@@ -119,6 +120,18 @@ def read_blocks(
         check_lookalikes(scene_file, key, given, cls.Parameters, problems)
         blocks[name] = Block(name, str(absolute(type_name)), cls, parameters, options)
     return classes, blocks
+
+
+def _as_written(
+    scene_file: SceneFile, key: Key, given: dict[str, Any], model: Any
+) -> dict[str, Any]:
+    """Return a block's parameters with what its tables take from the file that wrote them first."""
+    for (name, inner), outer in getattr(model, "as_written_with", {}).items():
+        table, beside = given.get(name), scene_file.beside.get((*key, name))
+        if isinstance(table, dict) and beside is not None and inner not in table:
+            then = beside.get(outer, model.model_fields[outer].default)
+            given = {**given, name: {**table, inner: then}}
+    return given
 
 
 def read_processors(

@@ -53,18 +53,20 @@ class SceneFile:
         For each key path that was written, the file (or ``command line``).
     of_other_type : dict
         Keys of blocks that were inherited from a table of another type → that type.
+    beside : dict
+        Tables within blocks → the values that stood beside them in the file that wrote them first.
     """
 
     path: Path
     data: dict[str, Any]
     sources: dict[Key, str] = field(default_factory=dict)
     of_other_type: dict[Key, str] = field(default_factory=dict)
+    beside: dict[Key, dict[str, Any]] = field(default_factory=dict)
 
     def copy(self) -> "SceneFile":
         """Return tables that can be changed without changing these."""
-        return SceneFile(
-            self.path, deepcopy(self.data), dict(self.sources), dict(self.of_other_type)
-        )
+        data, beside = deepcopy(self.data), dict(self.beside)
+        return SceneFile(self.path, data, dict(self.sources), dict(self.of_other_type), beside)
 
     def source_of(self, key: Key) -> str:
         """Return the file in which `key`, or the nearest table around it, was written."""
@@ -92,7 +94,8 @@ def read_scene_file(path: Path | str) -> SceneFile:
     data = reader.file(path, (), ())
     if problems:
         raise SceneError(problems)
-    return SceneFile(path, data, reader.sources, reader.inheritance.of_other_type)
+    told = reader.inheritance
+    return SceneFile(path, data, reader.sources, told.of_other_type, told.beside)
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
@@ -117,7 +120,8 @@ def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
     if problems:
         raise SceneError(replace(p, source=name) if p.source == str(place) else p for p in problems)
     sources = {k: name if file == str(place) else file for k, file in reader.sources.items()}
-    return SceneFile(Path(name), data, sources, reader.inheritance.of_other_type)
+    told = reader.inheritance
+    return SceneFile(Path(name), data, sources, told.of_other_type, told.beside)
 
 
 class _Reader:
@@ -136,7 +140,7 @@ class _Reader:
         real, tables = self._read[path]
         if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
             self.sources[at] = str(path)
-            return self.inheritance.finished(self._table(tables, path, at, (*chain, real)), at)
+            return self._finished(tables, self._table(tables, path, at, (*chain, real)), at)
         if isinstance(tables, TomlError):
             self.problems.append(Problem(str(path), "", str(tables)))
             return {}
@@ -161,7 +165,11 @@ class _Reader:
         return {}
 
     def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
-        return self.inheritance.finished(self._table(tables, path, (), (path,)), ())
+        return self._finished(tables, self._table(tables, path, (), (path,)), ())
+
+    def _finished(self, own: Mapping[str, Any], merged: dict[str, Any], at: Key) -> dict[str, Any]:
+        self.inheritance.note_beside(own, merged, at)
+        return self.inheritance.finished(merged, at)
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values

@@ -151,3 +151,27 @@ def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     result = call(tmp_path / "in", "--conf", conf(tmp_path), "--out", tmp_path / "tables")
     assert result.exit_code == 2 and "holds no .daa or .xyz file" in result.stderr
+
+
+def test_alerters_that_are_not_named_are_ignored_with_one_note(tmp_path: Path) -> None:
+    """As the reference does; the table is that of a file without them."""
+    named = CONF.replace("alerters = One_Two, One", "alerters = One")
+    alone = named.splitlines(keepends=True)
+    tables = []
+    for text in (named, "".join(line for line in alone if not line.startswith("One_Two"))):
+        out = tmp_path / "alerts.csv"
+        result = call(head_on(tmp_path / "a.xyz"), "--conf", conf(tmp_path, text), "--out", out)
+        assert result.exit_code == 0, result.stderr
+        tables.append((out.read_text(encoding="utf-8"), result.output.count("note:")))
+        assert ("One_Two" in result.output) == (len(tables) == 1)
+    assert tables[0][0] == tables[1][0]
+    assert [notes for _, notes in tables] == [1, 0]
+
+
+def test_a_slip_in_a_named_alerter_is_still_an_error(tmp_path: Path) -> None:
+    text = CONF.replace("One_alert_1_region", "One_alert_1_regoin")
+    result = call(
+        head_on(tmp_path / "a.xyz"), "--conf", conf(tmp_path, text), "--out", tmp_path / "o.csv"
+    )
+    assert result.exit_code == 2
+    assert "One_alert_1_regoin" in result.stderr

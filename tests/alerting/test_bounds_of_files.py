@@ -54,16 +54,13 @@ late -41.28 174.23 1600 120 80 -4 0.7
 """
 
 
-def test_a_sample_that_is_late_is_flown_to_the_ownship_s_time(tmp_path: Path) -> None:
-    """0.3 s at 80 m/s towards 120 degrees, sinking; places by minutes of arc of a nautical mile."""
+def test_a_sample_at_another_instant_than_the_ownship_s_is_left_out(tmp_path: Path) -> None:
+    """Its row at the start counts; places by minutes of arc of a nautical mile."""
     (tmp_path / "a.conf").write_text(CONF, encoding="utf-8")
     (tmp_path / "a.daa").write_text(DAA, encoding="utf-8")
     found = read_encounter(tmp_path / "a.daa", read_conf(tmp_path / "a.conf"))
-    first, second = (np.array([part[row, 0] for part in found.relative]) for row in (0, 1))
-    assert first[:2] == pytest.approx(
+    assert found.present.tolist() == [[True], [False]]
+    assert found.left_out == 1
+    assert [found.relative[row][0, 0] for row in (0, 1)] == pytest.approx(
         [-0.03 * 60 * 1852 * math.cos(math.radians(41.29)), -0.02 * 60 * 1852], rel=1e-3
     )
-    way = math.radians(120.0)
-    moved = [-24.0 * math.sin(way), -24.0 * math.cos(way), 0.3 * 4.0]
-    assert second[:3] - first[:3] == pytest.approx(moved, rel=2e-3)
-    assert second[3:] == pytest.approx(first[3:])

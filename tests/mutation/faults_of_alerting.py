@@ -106,8 +106,8 @@ FAULTS = [
         _GROUP,
         "components/guidance/resolution_memory.py",
         (_MEMORY,),
-        ("kept-for-ever", "return young or", "return True or"),
-        ("sides-change-at-once", "if only_one or (old and", "if True or (old and"),
+        ("kept-for-ever", "young = now_s - self._since_s <", "young = 0 * now_s <"),
+        ("sides-change-at-once", "elif now_s - self._since_s <", "elif 2 * self._persistence_s <"),
     ),
     *in_file(
         _GROUP,
@@ -295,7 +295,7 @@ FAULTS = [
         _GROUP,
         "components/alerting/encounter.py",
         ("alerting/test_bounds_of_files.py",),
-        ("late-samples-stay", "-(at[0] + late_s * theirs[0])", "-(at[0])"),
+        ("other-instants-count", "times == own_s[:, np.newaxis]", "times >= own_s[:, np.newaxis]"),
         ("bounds-of-the-ownship", "find(*mine) + find(*theirs)", "find(*mine) + 0 * find(*theirs)"),
         (
             "velocity-as-wrong-as-position",

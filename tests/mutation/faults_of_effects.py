@@ -72,8 +72,7 @@ FAULTS = [
         ("factors-not-called", "for factor in self.snr_factors:", "for factor in ():"),
         ("only-the-first-factor", "for factor in self.snr_factors:",
          "for factor in self.snr_factors[:1]:"),
-        ("clutter-not-fetched", '(self._clutter_rcs_m2,) = self.built("clutter") or [None]',
-         '(self._clutter_rcs_m2,) = [None]'),
+        ("clutter-not-fetched", 'self.echoes = self.built("clutter")', 'self.echoes = []'),
         ("aspect-not-fetched", '(self.mean_rcs_m2,) = self.built("mean RCS") or [constant_rcs_m2]',
          '(self.mean_rcs_m2,) = [constant_rcs_m2]'),
     ),
@@ -84,7 +83,7 @@ FAULTS = [
          "(self._models,) = [steady]"),
         ("table-for-the-exact", '(self._method,) = self.built("method of Pd") or ["table"]',
          '(self._method,) = ["albersheim"]'),
-        ("clutter-not-in-pd", "if cnr is None or not cnr.any():", "if True:"),
+        ("clutter-not-in-pd", "if not (mean.any() or diffuse.any()):", "if True:"),
     ),
     *in_file(
         _GROUP, "components/radar/rcs_effects.py",

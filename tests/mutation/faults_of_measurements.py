@@ -114,7 +114,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/radar/swerling.py", _IN_CELL,
         ("ground-taken-for-the-target",
-         "if cnr is not None or self._cued_detector(cells) is not None:", "if False:"),
+         "if clutter is not None or self._cued_detector(cells) is not None:", "if False:"),
     ),
     *in_file(
         _GROUP, "components/radar/fading.py",
@@ -140,7 +140,9 @@ FAULTS = [
         ("ground-where-it-is-believed", "self._block.axes.pointing(*self._beams)",
          "self._block.axes.to_body(*self._beams)"),
         ("ground-in-the-ownship-s-axes", "self._block.axes.pointing(*self._beams)", "self._beams"),
-        ("ground-that-always-fluctuates", "clutter=terrain.clutter_mean", 'clutter="fluctuating"'),
+        ("ground-that-always-fluctuates",
+         'clutter=self._block.context.sections["terrain"].clutter_mean',
+         'clutter="fluctuating"'),
         ("axes-before-they-are-built", "self._beams = azimuth, elevation",
          "self._beams = azimuth, elevation\n        self._body"),
     ),

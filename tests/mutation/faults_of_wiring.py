@@ -138,8 +138,9 @@ FAULTS = [
          '"rain_height_m": math.inf'),
         ("rain-top-is-fog-top", '"rain_height_m": weather.rain_top_m',
          '"rain_height_m": weather.fog_top_m'),
-        ("polarisation-ignored", '"polarisation": block.p.polarisation',
-         '"polarisation": "circular"'),
+        ("polarisation-ignored",
+         '"circular" if block.p.polarisation == "slant" else block.p.polarisation',
+         '"circular"'),
         ("rain-rate-is-fog-water", '"rain_rate_mm_h": weather.rain_rate_mm_h',
          '"rain_rate_mm_h": weather.fog_water_g_m3'),
         ("attenuated-as-if-level", 'cells.range_m, cells.of_row("own_alt_m"), cells.alt_m, table',
@@ -150,10 +151,10 @@ FAULTS = [
         ("attenuated-one-way", "return two_way_transmission(loss_db)",
          "return two_way_transmission(0.5 * loss_db)"),
         ("carrier-of-another-band",
-         "SPEED_OF_LIGHT_M_S / block.budget.wavelength,\n"
+         "SPEED_OF_LIGHT_M_S / block.wavelength_m,\n"
          '            **{"gas": False, **self.settings(weather, block)},\n        )\n\n'
          "        def factor",
-         "1e10 + 0.0 * block.budget.wavelength,\n"
+         "1e10 + 0.0 * block.wavelength_m,\n"
          '            **{"gas": False, **self.settings(weather, block)},\n        )\n\n'
          "        def factor"),
     ),
@@ -162,7 +163,7 @@ FAULTS = [
         (_BUDGET, "wiring/test_calibrated_radars.py", _RADAR, "radar/test_radar_effects.py"),
         ("calibrated-as-swerling-1", 'model=f"swerling{self.calibrate.swerling}"',
          'model="swerling1"'),
-        ("calibrated-for-one-pulse", "                pulses=summed,\n",
+        ("calibrated-for-one-pulse", "                pulses=self.stated_pulses_summed,\n",
          "                pulses=1,\n"),
         ("calibrated-at-pd-one-half", "pd=self.calibrate.pd,", "pd=0.5,"),
         ("calibrated-at-another-range", "range_km=self.calibrate.range_km,", "range_km=1.0,"),
@@ -183,7 +184,7 @@ FAULTS = [
     *in_file(
         _GROUP, "components/radar/parameters.py", "wiring/test_calibrated_radars.py",
         ("calibrated-at-another-alarm-rate",
-         "false_alarm_probability=self.false_alarm_probability,",
+         "false_alarm_probability=self.calibrated_pfa,",
          "false_alarm_probability=1e-6,"),
     ),
     *in_file(
@@ -200,8 +201,8 @@ FAULTS = [
          "pulses=1,\n            false_alarm_probability=self.p.false"),
         ("clutter-under-the-noise", "margin = margin - 10.0 * np.log10(1.0 + cnr)",
          "margin = margin - 10.0 * np.log10(1.0 + 0.0 * cnr)"),
-        ("weather-spares-clutter", "return self.echo_snr(cells, self._clutter_rcs_m2(cells))",
-         "return self._echo_budget.snr_of_cells(cells.range_m, self._clutter_rcs_m2(cells))"),
+        ("weather-spares-clutter", "[self.echo_snr(cells, echo(cells)) for echo in self.echoes]",
+         "[self._echo_budget.snr_of_cells(cells.range_m, echo(cells)) for echo in self.echoes]"),
     ),
     *in_file(
         _GROUP, "components/radar/time_parameters.py", "wiring/test_time_budget_keys.py",
@@ -222,7 +223,7 @@ FAULTS = [
         _GROUP, "components/radar/parameters.py", "wiring/test_time_budget_keys.py",
         ("energy-of-the-stated-look", "        budget = self._stated_link_budget()\n",
          "        return self._stated_link_budget()\n"),
-        ("calibrated-for-one-of-many", "summed = self.stated_pulses or 1", "summed = 1"),
+        ("calibrated-for-one-of-many", "return self.stated_pulses or 1", "return 1"),
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py",
@@ -338,7 +339,8 @@ FAULTS = [
         _GROUP, "components/radar/swerling.py",
         ("wiring/test_clutter_hides_targets.py", "wiring/test_noise_lies_in_its_cell.py",
          "radar/test_ground_clutter_effect.py", "wiring/test_radars_together.py"),
-        ("clutter-raises-no-threshold", "snr, cnr = snr / (1.0 + cnr), None", "cnr = None"),
+        ("clutter-raises-no-threshold",
+         "snr, mean, diffuse = snr / noise, mean / noise", "mean, diffuse = mean"),
         ("average-forgotten", "return self.cfar.probability(snr, name)", "pass"),
         ("threshold-stays-at-the-noise", "threshold=p.clutter_threshold,", 'threshold="noise",'),
         ("noise-is-all-there-is", "(pd - pfa) / np.maximum(1.0 - pfa", "pd - pfa * np.maximum(0.0"),
@@ -347,8 +349,8 @@ FAULTS = [
         _GROUP, "components/radar/threshold_radar.py",
         ("wiring/test_clutter_hides_targets.py", "wiring/test_moving_target_filters.py"),
         ("loss-of-no-average", "self.threshold_db += self.cfar.loss_db", "self.cfar.loss_db"),
-        ("filter-spares-clutter", "None if cnr is None else cnr * residue", "cnr"),
-        ("filter-spares-targets", "snr, cnr = snr * passed, None if", "snr, cnr = snr, None if"),
+        ("filter-spares-clutter", "[cnr * left for cnr, left", "[cnr for cnr, left"),
+        ("filter-spares-targets", "snr = snr * passed", "snr = 1.0 * snr"),
     ),
     *in_file(
         _GROUP, "components/radar/range_boundary.py",
@@ -358,8 +360,7 @@ FAULTS = [
         ("boundary-of-one-square-metre", "10.0 ** (-0.1 * p.boundary_rcs_dbsm)", "1.0"),
         ("boundary-without-a-loss", "margin_db = margin_db - self._cfar.loss_db",
          "self._cfar.loss_db"),
-        ("boundary-of-slow-targets", "signal, residue = self.doppler(cells)",
-         "_, residue = self.doppler(cells)"),
+        ("boundary-of-slow-targets", "signal = through * passed", "signal = through"),
     ),
     *in_file(
         _GROUP, "components/radar/doppler_effects.py", "wiring/test_moving_target_filters.py",
@@ -368,8 +369,6 @@ FAULTS = [
         ("notch-at-the-target-s-height", "elevation_rad = -np.arcsin(sine)", "pass"),
         ("ground-comes-from-behind", "ground_m_s = -self._along", "ground_m_s = self._along"),
         ("climb-upside-down", "- down * np.sin(elevation_rad)", "+ down * np.sin(elevation_rad)"),
-        ("still-ground", "spread_m_s += self._terrain.clutter_motion_m_s", "pass"),
-        ("beam-without-width", "spread_m_s = np.hypot(spread_m_s, platform)", "pass"),
         ("no-limit", "residue + self._limit", "residue"),
     ),
     *in_file(
@@ -396,7 +395,38 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/clutter_effects.py", "wiring/test_ground_clutter_in_ned.py",
-        ("gamma-ignored", "gamma_db=terrain.clutter_gamma_db", "gamma_db=-15.0"),
+        ("gamma-ignored", "gamma_db=self.terrain.clutter_gamma_db,\n            azimuth",
+         "gamma_db=-15.0,\n            azimuth"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/clutter_effects.py", "wiring/test_moving_target_filters.py",
+        ("still-ground", "np.hypot(self.terrain.clutter_motion_m_s, platform)", "platform"),
+        ("beam-without-width", "np.hypot(self.terrain.clutter_motion_m_s, platform)",
+         "np.hypot(self.terrain.clutter_motion_m_s, 0.0 * platform)"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/clutter_effects.py", "wiring/test_rain_echo.py",
+        ("rain-that-rejects-nothing",
+         "per_m *= 10.0 ** (-0.1 * block.p.rain_rejection_db)", "pass"),
+        ("rain-against-the-wind", "wind_from_deg) + math.pi", "wind_from_deg)"),
+        ("rain-that-rises",
+         "wind * math.sin(towards), fall_m_s", "wind * math.sin(towards), -fall_m_s"),
+        ("sidelobes-one-way", "10.0 ** (0.2 * block.p.sidelobe_level_db)",
+         "10.0 ** (0.1 * block.p.sidelobe_level_db)"),
+        ("rain-without-a-top",
+         "highest_m=self.weather.rain_top_m,\n        )", "highest_m=1e6,\n        )"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/volume_clutter.py", "wiring/test_rain_echo.py",
+        ("rain-below-the-ground", "_below((lowest_m - height) / spread)", "0.0"),
+        ("turbulence-forgotten", "_TURBULENCE_M_S**2 + fall**2", "fall**2"),
+        ("half-the-shell", "2.0 * math.pi * distance * range_resolution_m",
+         "math.pi * distance * range_resolution_m"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/beam_effects.py", "wiring/test_rain_echo.py",
+        ("bars-for-columns", "*self._bars[1:]", "*self._columns[1:]"),
+        ("swept-like-any-other", "left = left * SWEEP_SHARE", "pass"),
     ),
     *in_file(
         _GROUP, "components/fusion/gated.py", "wiring/test_gated_fusion_angles.py",

@@ -41,6 +41,8 @@ heading_deg = 180
 speed_mps = 60
 """
 GROUND = "[terrain]\nheight_m = 60\nclutter_gamma_db = -20\n"
+NARROW = "azimuth_beamwidth_deg = 1\nelevation_beamwidth_deg = 1\n"
+NO_BEAM = 'remove = ["azimuth_beamwidth_deg", "elevation_beamwidth_deg"]\n'
 #: Clutter counts as signal: the threshold stays at the noise.
 STAYS = 'clutter_threshold = "noise"\n'
 
@@ -53,7 +55,7 @@ def scene(configs, tmp_path):
             SCENE.format(
                 base=configs / "first_light.toml",
                 terrain=terrain,
-                radar=radar,
+                radar=radar if "remove" in radar else NARROW + radar,
                 swerling=swerling,
                 climb=climb,
             ),
@@ -183,7 +185,10 @@ BAD = [
     ({"terrain": "[terrain]\nheight_m = 1000"}, r"\[terrain\] height_m is 1000: it must be below"),
     ({"terrain": "[terrain]\nheight_m = 500", "climb": -40}, r"500: .* is at 480 m at 13 s"),
     ({"radar": "range_resolution_m = 0"}, "range_resolution_m is 0: ground clutter"),
-    ({"radar": "elevation_resolution_deg = 0"}, "elevation_resolution_deg is 0: ground clutter"),
+    (
+        {"radar": NO_BEAM + "elevation_resolution_deg = 0"},
+        "elevation_resolution_deg is 0: ground clutter",
+    ),
     ({"radar": "pulses = 3\nintegration_gain_db = 0"}, "pulses is 3: ground clutter"),
     ({"terrain": '[terrain]\nclutter_mean = "wavering"'}, "constant"),
     ({"terrain": "[terrain]\nheight_m = 99999"}, "less than or equal to 10000"),

@@ -28,7 +28,11 @@ north_m = 5000
 heading_deg = 250
 speed_mps = 80
 """
-CELLS = "cell_false_alarm_probability = 2e-6\nfalse_alarms = true\n"
+NOISY = "cell_false_alarm_probability = 2e-6\nfalse_alarms = true\n"
+NARROW = "azimuth_beamwidth_deg = 1\nelevation_beamwidth_deg = 1\n"
+NO_BEAM = 'remove = ["azimuth_beamwidth_deg", "elevation_beamwidth_deg"]\n'
+#: 220 x 40 cells of one degree.
+CELLS = NOISY + NARROW
 
 
 @pytest.fixture
@@ -222,7 +226,7 @@ BAD = [
         r"false_alarm_probability\) is 0.05: with 13,860,000 .* at most 0.00722",
     ),
     ("false_alarms = true\nrange_resolution_m = 0", "range_resolution_m is 0"),
-    (CELLS + "azimuth_resolution_deg = 0", "azimuth_resolution_deg is 0"),
+    (NOISY + NO_BEAM + "azimuth_resolution_deg = 0", "azimuth_resolution_deg is 0"),
     (CELLS + "minimum_range_m = 6000\nrange_km = 5", "range_km is 5: it must be above"),
     ("cell_false_alarm_probability = 1.5", "less than 1"),
 ]
@@ -233,7 +237,7 @@ def test_false_alarms_need_cells_and_a_sane_number(scene, radar, message):
     # The thesis's radar with 8 times its cells, 220 x 40 x 15000/9.525: 693,000 false alarms by
     # scan at Pfa 0.05; 100,000 are allowed, 0.00722 of the cells.
     if radar == "false_alarms = true":
-        radar += "\nrange_resolution_m = 9.525"
+        radar += f"\nrange_resolution_m = 9.525\n{NARROW}"
     with pytest.raises(SceneError, match=message):
         Simulation(load_scene(scene(radar)))
 

@@ -115,3 +115,98 @@ def test_who_is_told_more_often_than_others_flies_as_if_alone():
             alone = alone.steered(time_s, manoeuvre)
         for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
             assert np.array_equal(got, expected)
+
+
+def reckoned(start, told, times):
+    """North, east, up and heading of who flies all that is told side by side, in small steps."""
+    north = east = up = 0.0
+    heading, climb, speed = start
+    step_s, found = 0.01, []
+    turns, climbs, goes, faster = 0.0, 0.0, 0.0, 0.0
+    turn_rate = climb_rate = push = lift = 0.0
+    waiting = list(told)
+    for number in range(round(max(times) / step_s) + 1):
+        while waiting and waiting[0][0] <= number * step_s + 1e-9:
+            new = waiting.pop(0)[1]
+            if new.turn_rad:
+                turns, turn_rate = new.turn_rad, math.copysign(new.rate_rad_s, new.turn_rad)
+            if new.climb_m:
+                climbs, climb_rate = new.climb_m, math.copysign(new.climb_rate_mps, new.climb_m)
+                goes = climb = 0.0
+            if new.vertical_speed_mps:
+                goes, lift = new.vertical_speed_mps, new.vertical_acceleration_mps2
+                climb, climbs = climb + (climb_rate if climbs else 0.0), 0.0
+            if new.speed_mps:
+                faster, push = new.speed_mps, new.acceleration_mps2
+        found.append((north, east, up, heading))
+        part_s = min(step_s, turns / turn_rate) if turns else 0.0
+        rise_s = min(step_s, climbs / climb_rate) if climbs else 0.0
+        gain = math.copysign(min(push * step_s, abs(faster)), faster)
+        more = math.copysign(min(lift * step_s, abs(goes)), goes)
+        along = (speed + 0.5 * gain) * step_s
+        track = heading + 0.5 * turn_rate * part_s
+        north, east = north + along * math.cos(track), east + along * math.sin(track)
+        up += climb_rate * rise_s + (climb + 0.5 * more) * step_s
+        heading, speed, climb = heading + turn_rate * part_s, speed + gain, climb + more
+        turns = turns - turn_rate * part_s if part_s == step_s else 0.0
+        climbs = climbs - climb_rate * rise_s if rise_s == step_s else 0.0
+        faster, goes = faster - gain, goes - more
+    return np.array([found[round(t / step_s)] for t in times])
+
+
+TURN = Manoeuvre(turn_rad=math.radians(40.0), rate_rad_s=math.radians(2.0))
+BACK = Manoeuvre(turn_rad=math.radians(-65.0), rate_rad_s=math.radians(3.0))
+CLIMB = Manoeuvre(climb_m=120.0, climb_rate_mps=4.0)
+SINK = Manoeuvre(climb_m=-70.0, climb_rate_mps=2.5)
+FASTER = Manoeuvre(speed_mps=22.0, acceleration_mps2=0.8)
+SLOWER = Manoeuvre(speed_mps=-31.0, acceleration_mps2=1.1)
+RISING = Manoeuvre(vertical_speed_mps=3.0, vertical_acceleration_mps2=1.0)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        [(5.0, TURN), (11.0, CLIMB)],
+        [(5.0, CLIMB), (11.0, TURN)],
+        [(5.0, TURN), (9.0, CLIMB), (10.0, FASTER), (30.0, SLOWER)],
+        [(5.0, CLIMB), (12.0, SINK)],  # the second replaces the first
+        [(5.0, TURN), (12.0, BACK), (13.0, RISING)],
+        [(5.0, RISING), (20.0, BACK), (24.0, SINK)],
+        [(5.0, FASTER), (5.0, SINK), (5.0, TURN)],
+        [(4.0, TURN._replace(climb_m=55.0, climb_rate_mps=3.0, speed_mps=9.0,
+                             acceleration_mps2=0.5))],
+    ],
+)  # fmt: skip
+def test_turns_climbs_and_speeds_are_flown_together(told):
+    """South of the equator at 217 deg: a command replaces its own part and no other."""
+    own = ScriptedTrajectory(
+        "own", lat_deg=-33.9, lon_deg=18.4, alt_m=800.0, heading_deg=217.0, speed_mps=55.0
+    )
+    flight = SteeredFlight(own)
+    for time_s, manoeuvre in told:
+        flight = flight.steered(time_s, manoeuvre)
+    times = np.array([4.0, 8.5, 11.5, 12.5, 17.0, 24.0, 26.0, 33.0, 41.0, 60.0])
+    want = reckoned((math.radians(217.0), 0.0, 55.0), told, times)
+    state = flight.at(times)
+    north, east, _ = line_of_sight_ned(
+        -33.9, 18.4, 800.0, state.lat_deg, state.lon_deg, np.full(len(times), 800.0)
+    )
+    assert np.abs(state.alt_m - 800.0 - want[:, 2]).max() < 0.1
+    turned = np.remainder(state.yaw_rad - want[:, 3] + 1.0, 2.0 * math.pi) - 1.0
+    assert np.abs(turned).max() < math.radians(0.06)  # the meridians meet by so much
+    assert np.hypot(north - want[:, 0], east - want[:, 1]).max() < 0.5
+
+
+def test_a_turn_that_a_climb_meets_ends_where_it_would_have_ended():
+    """And so do others that are told of at the same instants, flown together with it."""
+    commands = [(10.0, TURN), (13.1, CLIMB), (13.1, FASTER), (29.7, SINK)]
+    alone = SteeredFlight(STRAIGHT)
+    for time_s, manoeuvre in commands:
+        alone = alone.steered(time_s, manoeuvre)
+    only = SteeredFlight(STRAIGHT).steered(10.0, TURN)
+    ends = np.array([30.0])
+    assert alone.at(ends).yaw_rad == pytest.approx(only.at(ends).yaw_rad, abs=1e-4)
+    times = np.linspace(0.0, 80.0, 33)
+    for found in flown_as_told([STRAIGHT] * 2, [commands, commands]):
+        for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
+            assert np.array_equal(got, expected)

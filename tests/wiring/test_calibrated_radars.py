@@ -1,11 +1,17 @@
 """A calibrated radar has the stated Pd at the stated range, by the model it was stated for."""
 
 import math
+from pathlib import Path
 
 import pytest
+from covering import covers
 from scipy.optimize import brentq
 from scipy.special import chndtr
 from wired import Row, chain, rows, run
+
+import dsa_des
+from dsa_des.running.simulation import Simulation
+from dsa_des.running.warnings import warnings_of
 
 PFA = 1e-3
 OWN = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400, "heading_deg": 217, "roll_deg": -27}
@@ -118,3 +124,109 @@ def test_each_target_fluctuates_by_its_own_model():
     for model in range(5):
         row = found[f"swerling{model}"]
         assert row["detection_probability"] == pytest.approx(pd_of(snr, model), rel=1e-6)
+
+
+#: A sensor's own file: Pd 0.83 of Swerling I at 4.2 km with its own threshold, here 1e-3.
+OWN_FILE = """type = "radar.swerling"
+scan_rate_hz = 20
+power_w = 50
+antenna_gain_db = 28
+wavelength_m = 0.03
+calibrate = { rcs_dbsm = 5, range_km = 4.2, pd = 0.83 }
+"""
+
+
+def pd_and_snr_db(scene: dsa_des.Scene) -> tuple[float, float]:
+    """Of a steady place in the scene: the probability and the SNR of the first detection."""
+    row = rows(dsa_des.run(scene))[0]
+    return row["detection_probability"], row["snr_db"]
+
+
+def lowered(path: Path, how: str, own_pfa: str) -> dsa_des.Scene:
+    """A scene whose threshold is set for 0.01, by one of the ways in which a scene says so."""
+    (path / "sensor.toml").write_text(f"{own_pfa}{OWN_FILE}")
+    lower = "false_alarm_probability = 0.01\n"
+    scene = path / "scene.toml"
+    scene.write_text(
+        f"""duration_s = 1
+wires = ["traffic -> transform -> gate -> radar"]
+[blocks]
+transform = {{ type = "geometry.ellipsoid" }}
+gate = {{ type = "gate" }}
+[blocks.traffic]
+type = "traffic.scripted"
+ownship = {{ lat_deg = -41.3, lon_deg = 174, alt_m = 2400, heading_deg = 217, roll_deg = -27 }}
+[[blocks.traffic.intruders]]
+name = "one"
+east_m = -2520
+north_m = -2688
+up_m = 2016
+rcs_dbsm = 5
+swerling = 1
+[blocks.radar]
+extends = "sensor.toml"
+{lower if how == "scene" else ""}"""
+    )
+    if how == "extending scene":
+        scene = path / "outer.toml"
+        scene.write_text(f'extends = "scene.toml"\n[blocks.radar]\n{lower}')
+    found = dsa_des.load_scene(scene)
+    if how == "set":
+        found = found.set({"blocks.radar.false_alarm_probability": 0.01})
+    if how == "swapped":
+        found = found.swap(radar="radar.threshold").swap(radar="radar.swerling")
+        found = found.set({"blocks.radar.false_alarm_probability": 0.01})
+    if how == "other range":  # the range is another's, and still stated for the file's own Pfa
+        found = found.set({"blocks.radar.calibrate": {"rcs_dbsm": 5, "range_km": 4.2, "pd": 0.83},
+                           "blocks.radar.false_alarm_probability": 0.01})  # fmt: skip
+    if how == "written out":
+        found = found.set({"blocks.radar.false_alarm_probability": 0.01})
+        return dsa_des.load_scene(found.resolved())
+    return found
+
+
+@covers("calibrate.false_alarm_probability", of=("radar.swerling", "radar.threshold"))
+@pytest.mark.parametrize(
+    "how",
+    ["scene", "extending scene", "set", "swapped", "other range", "written out"],
+)
+@pytest.mark.parametrize(
+    ("own_pfa", "stated"), [("false_alarm_probability = 1e-3\n", 1e-3), ("", 0.05)]
+)
+def test_whoever_moves_the_threshold_keeps_the_hardware(tmp_path, how, own_pfa, stated):
+    """The SNR is that of the file's own Pfa, or of the default where it gives none."""
+    pd, snr_db = pd_and_snr_db(lowered(tmp_path, how, own_pfa))
+    needed = math.log(stated) / math.log(0.83) - 1.0
+    assert snr_db == pytest.approx(10.0 * math.log10(needed), abs=1e-4)
+    assert pd == pytest.approx(0.01 ** (1.0 / (1.0 + needed)), rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["radar.swerling", "radar.threshold"])
+def test_a_calibration_may_say_at_which_false_alarm_probability_it_holds(kind):
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.83, "false_alarm_probability": 0.05}
+    radar = {**RADAR, "type": kind, "calibrate": calibrate}
+    row = seen(chain({"radar": radar}, ownship=OWN, targets=[at(2000, 5.0, 1)]))
+    assert row is not None
+    needed = math.log(0.05) / math.log(0.83) - 1.0
+    expected_db = 10.0 * math.log10(needed) + 40.0 * math.log10(4200 / 2000)
+    assert row["snr_db"] == pytest.approx(expected_db, abs=1e-4)
+    scene = dsa_des.load_scene(chain({"radar": radar}, ownship=OWN, targets=[at(2000, 5.0, 1)]))
+    (said,) = [text for text in warnings_of(Simulation(scene)) if "calibrate holds" in text]
+    assert f"{PFA ** (1.0 / (1.0 + needed)):.3g} instead of 0.83" in said
+
+
+def test_a_study_over_thresholds_is_one_of_one_radar():
+    """A threshold radar's limit goes with the fourth root of what its threshold needs."""
+    calibrate = {"rcs_dbsm": 5.0, "range_km": 4.2, "pd": 0.83}
+    radar = {**RADAR, "type": "radar.threshold", "calibrate": calibrate}
+    target = {"name": "one", "north_m": 6000, "east_m": 0, "up_m": 0, "speed_mps": 100,
+              "heading_deg": 180, "rcs_dbsm": 5}  # fmt: skip
+    scene = chain({"radar": radar}, ownship={"lat_deg": -41, "lon_deg": 174, "alt_m": 900},
+                  targets=[target], duration_s=45)  # fmt: skip
+    axes = {"blocks.radar.false_alarm_probability": [1e-2, PFA, 1e-5]}
+    found = dsa_des.study(scene, axes=axes, replicas=1, workers=1, metrics=["first_detection"])
+    known = math.log(PFA) / math.log(0.83) - 1.0
+    for row in found.runs.to_pylist():
+        needed = math.log(row["radar.false_alarm_probability"]) / math.log(0.83) - 1.0
+        limit_m = 4200.0 * (known / needed) ** 0.25
+        assert row["first_detection_range_m.radar"] == pytest.approx(limit_m - 2.5, abs=3)

@@ -14,6 +14,8 @@ from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, Operator
 from components.operator.decision_table import read_decisions
 from components.operator.desk import MOST_WAITING, Desk, Laid
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 
 HUMAN, RECORDED = "operator.human", "operator.recorded"
@@ -236,3 +238,45 @@ def test_a_decision_knows_the_alerts_that_have_come_of_its_own_target(tmp_path):
     told = rows(found, "manoeuvres")
     assert [row["time_s"] for row in told] == [46.1, 46.4]
     assert (told[0]["turn_rad"], told[1]["climb_m"]) == (0.4, -70.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "turned_rad", "climbed_m"),
+    [
+        ("43.51,turn,,-0.6,\n46,climb,,,30\n", -0.6, 30.0),
+        ("43.51,climb,,,30\n46,turn,,-0.6,\n", -0.6, 30.0),
+        ("43.51,climb,,,30\n46,climb,,,-20\n", 0.0, -20.0),
+    ],
+)
+def test_a_turn_and_a_climb_are_flown_together(tmp_path, table, turned_rad, climbed_m):
+    """Neither ends the other, in any window and in lock step; a second climb replaces one."""
+    wanted = scene(tmp_path, truth=True, vertical_rate_mps=4.0, scan_rate_hz=2)
+    head = "time_s,decision,target,turn_rad,climb_m\n"
+    (tmp_path / "table.csv").write_text(head + table)
+
+    def tables(*scenes, **keywords):
+        sink = MemorySink()
+        recorder = Recorder([sink])
+        if len(scenes) > 1:
+            lock_step(list(scenes), recorder=recorder).run()
+        else:
+            Simulation(scenes[0], recorder=recorder, **keywords).run()
+        return sink.tables()
+
+    loaded = dsa_des.load_scene(wanted)
+    alone = tables(loaded)
+    own = [row for row in alone["truth"].to_pylist() if row["target"] is None]
+    turned = math.remainder(own[-1]["heading_rad"] - own[0]["heading_rad"], 2 * math.pi)
+    assert turned == pytest.approx(turned_rad, abs=2e-3)
+    first_s, second_s = (row["time_s"] + 1.0 for row in alone["manoeuvres"].to_pylist())
+    own_mps = (own[1]["alt_m"] - own[0]["alt_m"]) / (own[1]["time_s"] - own[0]["time_s"])
+    begun_m = own[0]["alt_m"] + own_mps * (first_s - own[0]["time_s"])
+    if turned_rad == 0.0:
+        begun_m += 4.0 * (second_s - first_s)
+    assert own[-1]["alt_m"] - begun_m == pytest.approx(climbed_m, abs=0.1)
+    assert all(alone[name].equals(found) for name, found in tables(loaded, window=1).items())
+    both = tables(*(scene_of(loaded, Replica(seed, {})) for seed in (3, 4)))["truth"].to_pylist()
+    for replica in (0, 1):
+        theirs = [row for row in both if row["replica"] == replica and row["target"] is None]
+        for name in ("lat_deg", "lon_deg", "alt_m", "heading_rad"):
+            assert [row[name] for row in theirs] == [row[name] for row in own]

@@ -24,6 +24,21 @@ def tables(scene, **options):
     return sink.tables()
 
 
+def test_simulating_everything_adds_looks_in_vain_and_changes_no_other():
+    """Of a camera that cannot see as far as the target is, at first."""
+    loaded = dsa_des.load_scene("first_light", duration_s=40, sets=["record.looks=true"])
+    spared, whole = (
+        dsa_des.run(loaded, simulate_everything=everything)["looks"].to_pylist()
+        for everything in (False, True)
+    )
+    assert [row["detected"] for row in spared] == [row["detected"] for row in whole]
+    added = [two for one, two in zip(spared, whole, strict=True) if one != two]
+    alone = [one for one, two in zip(spared, whole, strict=True) if one != two]
+    assert added and all(row["evaluated"] and not row["detected"] for row in added)
+    assert not any(row["evaluated"] for row in alone)
+    assert any(row["evaluated"] and not row["detected"] for row in spared)
+
+
 @covers("looks", of=("[record]",))
 def test_every_sensor_looks_at_every_target_and_says_what_came_of_it():
     blind = sensor("radar.range_boundary", azimuth_deg=[100, 101], scan_rate_hz=2)

@@ -13,6 +13,7 @@ from components.evidence.thesis.plotting import RADAR as RADAR_COLOUR
 from components.radar.cfar import cfar_loss_db
 from components.radar.moving_target_filter import MovingTargetFilter
 from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
+from components.radar.volume_clutter import rain_reflectivity_per_m, rain_volume_m3
 
 FIGURE = "clutter.png"
 _GAMMAS_DB = (-60, -55, -50, -45, -40, -35, -30, -25, -20, -15, -10)
@@ -31,7 +32,7 @@ _WAYS: tuple[tuple[str, Mapping[str, Any], str, str], ...] = (
 _HEAD = """# Thresholds, clutter and Doppler
 
 What a radar reports rests on one threshold. This page says what it follows, what ground clutter
-does to it, and what a moving-target filter takes out; keys are in the
+and rain do to it, and what a moving-target filter takes out; keys are in the
 [reference](reference.md), physics in `components/radar/`.
 
 ## One threshold
@@ -45,6 +46,11 @@ target; with false alarms it fills one cell in twenty, and `check` and `run` say
 false_alarms is true and false_alarm_probability is 0.05: with 15,000 resolution cells that makes
 750 false alarms per scan, 0.05 in every cell; radars have 1e-6 per cell or less
 ```
+
+A range that calibrates a radar (`calibrate`) holds at the probability of false alarm of the file
+that states it, or at `calibrate.false_alarm_probability`. Who lowers `false_alarm_probability` in a
+scene, with `--set` or in a study raises the threshold; the hardware stays, Pd at that range falls,
+and `check` says to what.
 
 `cell_false_alarm_probability` counts false alarms at a threshold of its own, and a warning says so.
 
@@ -77,7 +83,40 @@ among them, are left out.
 
 `radar.range_boundary` has neither noise nor a threshold. Its boundary is taken as the range of
 one target (`boundary_rcs_dbsm`, `boundary_pd`, `false_alarm_probability`); clutter and the CFAR
-loss then bring it nearer, if its grid has cells that can hold ground.
+loss then bring it nearer, if its cells have a size. With `frequency_hz` it obeys the weather too;
+without, `check` says that no weather changes it.
+
+## Beams
+
+`azimuth_beamwidth_deg` and `elevation_beamwidth_deg` are the width of the beam, `range_cell_m` the
+depth of a cell; the grid of reports (`azimuth_resolution_deg` and so on) is how finely values are
+said, and stands for a beam only where none is given. Clutter, the number of false alarms and what
+is told apart go by the beam. A gain is 30,000 over the product of its beamwidths in degrees; where
+the two contradict each other by more than 3 dB, `check` says so. Every radar that is shipped states
+its beam: OASys's is not printed, and 5.8 deg follow from its gain.
+
+- `sidelobe_level_db`: ground and rain at the target's range all around, at a mean level below the
+  beam (a ring of 2π R ΔR of ground, and of rain a shell). By default there are no sidelobes.
+- `beam_shape_loss`: a target between the scan's beams loses what their shape takes, 6 dB at half a
+  beamwidth both ways; a beam that sweeps in azimuth has its mean over the pulses, 1.67 dB. Off by
+  default: a range that was flown has it in it.
+
+## Rain
+
+`[weather] rain_rate_mm_h` attenuates, and echoes: η = π⁵ |K|² Z / λ⁴ with Z = 200 R^1.6, times the
+volume of a Gaussian beam, π R² θ φ ΔR / (8 ln 2), as far as it rains there (`rain_top_m`, and the
+ground). Of the radar below, at 5 km and 3 cm, by rain rate:
+
+{rain}
+
+Drops scatter after Rayleigh: up to 35 GHz, where the formula is within 4 dB of Mie's up to 25 mm/h;
+above, `check` says that it gives too much. A linear wave hears all of it; of a circular one the
+antenna rejects `rain_rejection_db`. Rain is noise that differs from look to look, and from pulse to
+pulse. Before a filter it moves with the wind and falls (2.6 Z^0.107 m/s), spread by turbulence (1
+m/s), shear over the beam (0.42 · 4 m/s/km · R φ) and the platform: a notch that is locked to the
+ground leaves rain that the wind blows. An average of cells follows rain as it follows the ground,
+and a threshold that stays reports it in every cell. A radar whose cells have no size hears no rain,
+and `check` says so.
 
 ## Doppler
 
@@ -132,9 +171,25 @@ def page(images: Path, *, seeds: int = 10) -> str:
     }
     text = _HEAD.format(
         figure=FIGURE, prf=RADAR["prf_hz"], blind=found.blind_speed_m_s, bank_loss=bank_loss,
-        seeds=seeds, **losses,
+        seeds=seeds, rain="\n".join(rain_table()), **losses,
     )  # fmt: skip
     return text + "\n".join(table(seeds)) + "\n"
+
+
+def rain_table() -> list[str]:
+    """Return the lines of the table of rain: its reflectivity, and its RCS beside a target."""
+    beams = [math.radians(RADAR[f"{axis}_beamwidth_deg"]) for axis in ("azimuth", "elevation")]
+    volume_m3 = rain_volume_m3(
+        5000.0, 0.0, 0.0, azimuth_beamwidth_rad=beams[0], elevation_beamwidth_rad=beams[1],
+        range_resolution_m=RADAR["range_resolution_m"], lowest_m=-math.inf, highest_m=math.inf,
+    )  # fmt: skip
+    lines = ["| rain, mm/h | Z, dBZ | η, dB m²/m³ | in the cell, dBsm |", "|---|---|---|---|"]
+    for rate in (1.0, 4.0, 16.0, 25.0):
+        eta = rain_reflectivity_per_m(rate, wavelength_m())
+        z_db = 10.0 * math.log10(200.0 * rate**1.6)
+        cells = f"{z_db:.1f} | {10 * math.log10(eta):.1f} | {10 * math.log10(eta * volume_m3):.1f}"
+        lines.append(f"| {rate:g} | {cells} |")
+    return lines
 
 
 def wavelength_m() -> float:

@@ -8,13 +8,13 @@ import numpy as np
 
 from dsa_des.library.runs import run
 
-#: The thesis's radar with a carrier and PRF for Doppler, and a Pfa as radars have it.
+#: A radar with a carrier and PRF for Doppler, a gain that is its beam's, and a Pfa as radars have.
 RADAR: dict[str, Any] = {
-    "type": "radar.swerling", "scan_rate_hz": 20, "power_w": 2.0, "antenna_gain_db": 29.5,
+    "type": "radar.swerling", "scan_rate_hz": 20, "power_w": 2.0, "antenna_gain_db": 35.7,
     "frequency_hz": 10e9, "calibrate": {"rcs_dbsm": 3.01, "range_km": 5.0, "pd": 0.5},
-    "false_alarm_probability": 1e-6, "reference_pd": 0.5, "azimuth_resolution_deg": 2.0,
-    "elevation_resolution_deg": 4.0, "range_resolution_m": 50.0, "prf_hz": 7000.0,
-    "range_km": 12.0,
+    "false_alarm_probability": 1e-6, "reference_pd": 0.5, "azimuth_beamwidth_deg": 2.0,
+    "elevation_beamwidth_deg": 4.0, "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 4.0,
+    "range_resolution_m": 50.0, "prf_hz": 7000.0, "range_km": 12.0,
 }  # fmt: skip
 OWN_MPS, HEIGHT_M, BELOW_M, AWAY_M = 50.0, 600.0, 500.0, 9000.0
 

@@ -121,7 +121,7 @@ def approach_of(scene: Scene) -> HeadOn:
             rcs_dbsm=radar.calibrate.rcs_dbsm,
             range_m=1000.0 * radar.calibrate.range_km,
             pd=radar.calibrate.pd,
-            false_alarm_probability=radar.false_alarm_probability,
+            false_alarm_probability=radar.calibrated_pfa,
             of_dbsm=target.rcs_dbsm,
         ),
         radar.pulses_per_dwell,

@@ -1,0 +1,121 @@
+"""Bands and recovery of random states against the published rules, one manoeuvre at a time."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from components.alert_configuration.conf_file import default_values
+from components.alert_configuration.configuration import Alerter, Configuration, Level
+from components.guidance.bands import guidance_of_many
+from components.guidance.kinds import KINDS
+from components.guidance.regions import GuidedIntruders
+from components.guidance.situation import State
+from components.well_clear.volume import Volume
+from tests.guidance.plain_guidance import Plain
+
+COUNT = 24
+DEG = math.pi / 180.0
+VALUES = {
+    **default_values()[0],
+    "lookahead_time": 90.0, "step_hdir": 7.0 * DEG, "step_hs": 8.0, "step_vs": 2.0,
+    "step_alt": 130.0, "turn_rate": 2.6 * DEG, "horizontal_accel": 1.7, "vertical_accel": 1.1,
+    "vertical_rate": 3.1,
+    "min_hs": 20.0, "max_hs": 110.0, "min_vs": -14.0, "max_vs": 12.0, "min_alt": 130.0,
+    "max_alt": 1900.0, "min_horizontal_recovery": 820.0, "min_vertical_recovery": 95.0,
+    "horizontal_nmac": 170.0, "vertical_nmac": 33.0, "ca_bands": True, "ca_factor": 0.3,
+    "recovery_stability_time": 2.5, "corrective_region": "MID",
+}  # fmt: skip
+#: Region, volume, alerting time, early alerting time; every size is another.
+LEVELS = [
+    ("FAR", ("time_to_entry", 900.0, 210.0, 28.0, 9.0), 50.0, 66.0),
+    ("MID", ("modified_tau", 850.0, 130.0, 21.0, 0.0), 44.0, 59.0),
+    ("NEAR", ("time_to_closest", 640.0, 105.0, 13.0, 4.0), 25.0, 37.0),
+]
+ALERTER = Alerter(
+    "plain",
+    tuple(Level(Volume(*v[1:], v[0]), region, t, early) for region, v, t, early in LEVELS),
+)
+
+
+def drawn(random, within_s=70.0):
+    """Return an ownship at 217 deg or so, and two intruders, of which many are near."""
+    track, speed = random.normal(217.0, 8.0) * DEG, random.choice([20.0, 34.0, 61.0, 109.7])
+    climb, up = random.choice([0.0, 2.4, -9.0, 12.0]), random.choice([131.0, 700.0, 1212.0, 1899.0])
+    own = [0.0, 0.0, up, speed * math.sin(track), speed * math.cos(track), climb]
+    others = []
+    for near in (1.0, 3.0):
+        way, fast = random.uniform(0, 2 * math.pi), random.uniform(5.0, 80.0)
+        rates = np.array([fast * math.sin(way), fast * math.cos(way), random.normal(0, 2.0)])
+        miss = random.normal(0.0, 1.0, 3) * np.array([500.0, 500.0, 90.0]) * near
+        rel = miss + random.uniform(0.0, within_s) * (np.array(own[3:]) - rates)
+        others.append([*(np.array(own[:3]) + rel), *rates])
+    return own, others, random.integers(0, 4, 2).tolist()
+
+
+def compare(kind, values, draws):
+    """Compare our bands with the plain ones between all places they could end."""
+    configuration = Configuration((ALERTER,), values, {})
+    own = State(*np.array([one[0] for one in draws]).T)
+    intruders = [
+        GuidedIntruders(
+            State(*np.array([one[1][n] for one in draws]).T),
+            ALERTER,
+            np.array([one[2][n] for one in draws]),
+        )
+        for n in (0, 1)
+    ]
+    seen = []
+    found = guidance_of_many(kind, configuration, own, intruders)
+    for guided, (state, others, early) in zip(found, draws, strict=True):
+        plain = Plain(kind, values, state)
+        layers, recovery = plain.layers(LEVELS, others, early)
+        if recovery is None:
+            assert guided.recovery is None
+        else:
+            assert (guided.recovery.time_s, guided.recovery.shrinks) == recovery
+        turn = 2 * math.pi if kind == "hdir" else math.inf
+        places = sorted({plain.least, plain.most, *(value % turn for value in plain.at)})
+        for low, high in pairwise(places):
+            middle = 0.5 * (low + high)
+            if high - low < 1e-3 * high or not plain.least < middle < plain.most:
+                continue
+            want = plain.region_of(middle, layers)
+            if want == "NONE" and recovery is not None and recovery[0] >= 0:
+                want = "RECOVERY"
+            assert [b.region for b in guided.bands if b.low <= middle <= b.high] == [want]
+        seen.append((len({b.region for b in guided.bands}), recovery))
+    return seen
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_bands_and_recovery_are_those_of_the_plain_rules(kind):
+    random = np.random.default_rng(217)
+    seen = compare(kind, VALUES, [drawn(random) for _ in range(COUNT)])
+    ways = [recovery for _, recovery in seen if recovery is not None]
+    assert any(time_s > 0 and shrinks > 0 for time_s, shrinks in ways)
+    assert any(math.isinf(time_s) and shrinks == 0 for time_s, shrinks in ways)
+    assert sum(regions > 2 for regions, _ in seen) > 3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_smaller_cylinders_the_search_ends_after_the_first(kind):
+    random = np.random.default_rng(31)
+    values = {**VALUES, "ca_bands": False, "min_horizontal_recovery": 1500.0}
+    seen = compare(kind, values, [drawn(random) for _ in range(12)])
+    assert {recovery[1] for _, recovery in seen if recovery is not None} == {0}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_search_ends_at_the_size_of_a_collision_and_before_the_last_second(kind):
+    """With a cylinder that is soon that small, and level-offs that end with the lookahead."""
+    random = np.random.default_rng(7)
+    values = {
+        **VALUES, "lookahead_time": 14.0, "step_alt": 21.0, "max_alt": 1300.0,
+        "min_horizontal_recovery": 460.0, "min_vertical_recovery": 60.0,
+    }  # fmt: skip
+    seen = compare(kind, values, [drawn(random, within_s=12.0) for _ in range(40)])
+    ways = {recovery for _, recovery in seen if recovery is not None}
+    assert any(shrinks > 0 and time_s > 0 for time_s, shrinks in ways)
+    assert (-math.inf, 3) in ways
