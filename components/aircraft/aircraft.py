@@ -21,6 +21,11 @@ class VisibleAreas(Parameters):
     front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
     side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
     horizontal_m2: float = Field(ge=0, description="Area of the horizontal plane, m².")
+    made_for: Literal["convex_hull"] | None = Field(
+        default=None,
+        description="Silhouette of a camera that shows what these areas were fitted to; `check` "
+        "warns where a camera has another. By default they are the thesis's, which are added.",
+    )
     silhouette_table: SilhouetteTableFile | None = Field(
         default=None,
         description="CSV with az_deg, el_deg and area_m2 of the observer's direction from the "

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.geometry.field_of_view import sector_width_rad
-from components.optical.area_of_cells import check_silhouette
+from components.optical.area_of_cells import check_silhouette, fitted_otherwise
 from components.optical.centroid_accuracy import centroid_variance
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -337,8 +337,11 @@ class Camera(Sensor):
         return float(min(self.detector.threshold, self.p.cued_threshold))
 
     def warnings(self) -> list[str]:
-        """Say which cues change nothing."""
-        return [*super().warnings(), *said_of_cues(self)]
+        """Say which cues change nothing, and whose areas were made for another silhouette."""
+        said = [*super().warnings(), *said_of_cues(self)]
+        for roster in known_targets(self.context) if self.areas else ():
+            said += fitted_otherwise(roster, self.areas, self.p.silhouette)
+        return said
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the angles to the target's centre in the picture."""
