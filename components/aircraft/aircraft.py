@@ -68,6 +68,10 @@ class Aircraft(Parameters):
     )
 
 
+# A target without areas is a point, of a centimetre.
+_LEAST_EXTENT_M = 0.01
+
+
 def _alike(one: Aircraft, other: Aircraft) -> bool:
     """Return whether two aircraft are the same to every sensor, wherever they fly."""
     return one is other or all(
@@ -130,6 +134,25 @@ class Roster:
     def rcs_m2(self) -> FloatArray:
         """Mean radar cross-section in m², shape (targets,)."""
         return np.array([10.0 ** (craft.rcs_dbsm / 10.0) for craft in self.aircraft])
+
+    @cached_property
+    def extents_m(self) -> FloatArray:
+        """Length, span and height of each target by its bodies as an EO camera sees them.
+
+        Returns
+        -------
+        (targets, 3) array, m
+            Those of the fuselage, a round body of the front's and the side's area, and of a wing
+            three times as wide as deep.
+        """
+        front, side, plane = (
+            self.column(f"eo.{body}_m2") for body in ("front", "side", "horizontal")
+        )
+        # No fuselage is more than twelve times as long as it is thick.
+        height = np.maximum(np.sqrt(4.0 * front / np.pi), np.sqrt(side / 12.0))
+        height = np.maximum(height, _LEAST_EXTENT_M)
+        span = np.maximum(np.sqrt(3.0 * plane), height)
+        return np.column_stack([side / height + height, span, height])
 
     @cached_property
     def engines(self) -> AnyArray:

@@ -31,6 +31,7 @@ from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
+from components.sensor.error_parameters import GlintParameters
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
@@ -40,7 +41,7 @@ from dsa_des.block.effect import Effect
 CellValues = Callable[[Cells], FloatArray]
 
 
-class CameraParameters(SensorParameters):
+class CameraParameters(GlintParameters, SensorParameters):
     """Parameters of a camera; the pixel grid follows from field of view and pixel counts."""
 
     azimuth_pixels: int = Field(gt=0, description="Pixels across the field of view.")
@@ -253,6 +254,11 @@ class Camera(Sensor):
         if self.detector.noise:
             return f"has a Pd below {FAINTEST_PD:g}, which counts as none,"
         return "cannot reach the threshold"
+
+    @property
+    def pixel_rad(self) -> tuple[float, float]:
+        """Width and height of a pixel."""
+        return self.pixel_azimuth_rad, self.pixel_elevation_rad
 
     @property
     def contrast_column(self) -> str:
