@@ -38,11 +38,8 @@ sign, swapped arguments or operands, a dropped term, condition, keyword, filter 
 off, `and` for `or`, swapped branches, minimum for maximum, sine for cosine, degrees for radians).
 Tests that execute the line run until one fails, the nearest first, within a budget of time.
 
-<!-- not run: takes an hour, and coverage.py to make the map of lines -->
-```
-python tests/mutation/coverage_map.py --workers 2
-python tests/mutation/random_faults.py --workers 2 --count 300 --page docs/mutation.md
-```
+`python tests/mutation/coverage_map.py --workers 2` makes the map of lines (it needs coverage.py),
+`python tests/mutation/random_faults.py --workers 2 --count 300 --page docs/mutation.md` this table.
 
 The share noticed is of those that are not marked equivalent (`tests/mutation/equivalent.json`, each
 with its reason); beside it stands its 95 % interval by Wilson. What is not seen: lines that no test
