@@ -21,6 +21,11 @@ class VisibleAreas(Parameters):
     front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
     side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
     horizontal_m2: float = Field(ge=0, description="Area of the horizontal plane, m².")
+    made_for: Literal["convex_hull"] | None = Field(
+        default=None,
+        description="Silhouette of a camera that shows what these areas were fitted to; `check` "
+        "warns where a camera has another. By default they are the thesis's, which are added.",
+    )
     silhouette_table: SilhouetteTableFile | None = Field(
         default=None,
         description="CSV with az_deg, el_deg and area_m2 of the observer's direction from the "
@@ -61,6 +66,10 @@ class Aircraft(Parameters):
     engine: Literal["propeller", "turbofan", "turbojet"] = Field(
         default="propeller", description="Propulsion type (Table 4.5)."
     )
+
+
+# A target without areas is a point, of a centimetre.
+_LEAST_EXTENT_M = 0.01
 
 
 def _alike(one: Aircraft, other: Aircraft) -> bool:
@@ -125,6 +134,25 @@ class Roster:
     def rcs_m2(self) -> FloatArray:
         """Mean radar cross-section in m², shape (targets,)."""
         return np.array([10.0 ** (craft.rcs_dbsm / 10.0) for craft in self.aircraft])
+
+    @cached_property
+    def extents_m(self) -> FloatArray:
+        """Length, span and height of each target by its bodies as an EO camera sees them.
+
+        Returns
+        -------
+        (targets, 3) array, m
+            Those of the fuselage, a round body of the front's and the side's area, and of a wing
+            three times as wide as deep.
+        """
+        front, side, plane = (
+            self.column(f"eo.{body}_m2") for body in ("front", "side", "horizontal")
+        )
+        # No fuselage is more than twelve times as long as it is thick.
+        height = np.maximum(np.sqrt(4.0 * front / np.pi), np.sqrt(side / 12.0))
+        height = np.maximum(height, _LEAST_EXTENT_M)
+        span = np.maximum(np.sqrt(3.0 * plane), height)
+        return np.column_stack([side / height + height, span, height])
 
     @cached_property
     def engines(self) -> AnyArray:

@@ -73,7 +73,8 @@ class Labels:
                 box = (left, bottom, left + width, bottom + height)
                 cost = sum(_overlap(box, other) for other in self._taken)
                 cost += 2 * (width * height - _overlap(box, (0.0, 0.0, right, top)))
-                cost += self._covered(box)
+                # A free place must not seem taken by the rounding of its corners.
+                cost = round(cost + self._covered(box), 6)
                 if best is None or cost < best[0]:
                     best = (cost, box)
             if best is not None and best[0] == 0:

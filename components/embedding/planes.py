@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from components.aircraft.aircraft import Aircraft
 from components.embedding.host_traffic import Plane
+from components.embedding.states import numbers_in
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.chosen_file import chosen_file
@@ -91,7 +92,7 @@ class FixedPath:
         for label, rows in (("position", position), ("orientation", attitude)):
             if len(rows) not in (1, count):
                 raise ValueError(f"{label} has {len(rows)} rows: it must have 1 or {count}")
-        times = np.zeros(1) if times_s is None else np.asarray(times_s, dtype=np.float64)
+        times = np.zeros(1) if times_s is None else numbers_in("times_s", times_s)
         if times.shape != (count,) and not (times_s is None and count == 1):
             shown = "missing" if times_s is None else f"of shape {times.shape}"
             raise ValueError(f"times_s is {shown}: it must give one time for each of {count} rows")
@@ -112,7 +113,7 @@ class FixedPath:
 
 
 def _rows(label: str, value: ArrayLike) -> FloatArray:
-    rows = np.atleast_2d(np.asarray(value, dtype=np.float64))
+    rows = np.atleast_2d(numbers_in(label, value))
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise ValueError(f"{label} has the shape {np.shape(value)}: it must be (3,) or (times, 3)")
     if not np.isfinite(rows).all():

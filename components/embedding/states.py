@@ -9,11 +9,20 @@ from components.aircraft.aircraft import Roster
 from components.arguments.checks import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTITUDE_M
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import shown_value
 
 _NAMES = ("latitude", "longitude", "altitude", "yaw", "pitch", "roll")
 # A latitude of 90° that came through radians may be a last place above pi/2.
 _LOW = np.array([-math.pi / 2, -LARGEST, LOWEST_ALTITUDE_M, -LARGEST, -LARGEST, -LARGEST])
 _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LARGEST])
+
+
+def numbers_in(label: str, value: object) -> FloatArray:
+    """Return what a host gave as an array of numbers; ValueError names it where it is none."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{label} is {shown_value(value)}: it must hold numbers") from error
 
 
 def checked_rows(
@@ -48,10 +57,7 @@ def checked_rows(
         (f"lla_{who}", lla, slice(0, 3)),
         (f"att_{who}", att, slice(3, 6)),
     ):
-        try:
-            array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{label} is {value!r}: it must hold numbers") from error
+        array = numbers_in(label, value)
         if array.shape != (count, 3) and not (array.shape == (3,) and count == 1):
             if array.size == 0 and count == 0:
                 continue

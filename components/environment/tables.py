@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from components.terrain.raster_files import RasterFile
 from dsa_des.block.component import Parameters
+from dsa_des.time.gauss_markov import LONGEST_S
 
 
 class Weather(Parameters):
@@ -110,14 +111,27 @@ class Navigation(Parameters):
     )
     position_noise_m: tuple[PositionNoise, PositionNoise, PositionNoise] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Standard deviation of the white noise north, east and down, m.",
+        description="Standard deviation of the noise north, east and down, m.",
+    )
+    position_correlation_time_s: float = Field(
+        default=60.0,
+        ge=0,
+        le=LONGEST_S,
+        description="Time after which the noise of position has forgotten all but 1/e, s; 0 for "
+        "one that is new at every instant.",
     )
     attitude_bias_deg: tuple[AttitudeError, AttitudeError, AttitudeError] = Field(
         default=(0.0, 0.0, 0.0), description="Constant error of yaw, pitch and roll, deg."
     )
     attitude_noise_deg: tuple[AttitudeNoise, AttitudeNoise, AttitudeNoise] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Standard deviation of the white noise of yaw, pitch and roll, deg.",
+        description="Standard deviation of the noise of yaw, pitch and roll, deg.",
+    )
+    attitude_correlation_time_s: float = Field(
+        default=60.0,
+        ge=0,
+        le=LONGEST_S,
+        description="As position_correlation_time_s, of the noise of attitude, s.",
     )
 
 

@@ -182,9 +182,11 @@ class Detections(Message):
         Measured rate of the slant range, positive when it opens; NaN where it is not measured.
     azimuth_variance_rad2, elevation_variance_rad2 : (entries,)
         Mean square of the error of the measured angles, in body axes, as the sensor states it: a
-        grid's is step²/12. The cut at the edge of the field of view is not in it.
+        grid's is step²/12. The cut at the edge of the field of view is not in it. Where the
+        ownship's navigation has noise, that of the pose they are turned by is.
     range_variance_m2, range_rate_variance_m2_s2 : (entries,)
-        The same of range and range rate; NaN where they are not measured.
+        The same of range and range rate; NaN where they are not measured. A range's has that of
+        the place it is counted from.
     confidence : (entries,)
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
     true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.attitude import body_angles, body_to_ned, unit_vector
+from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
 from components.geometry.wrapping import wrap_two_pi
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets, TrafficStates
@@ -23,11 +23,16 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.gauss_markov import GaussMarkov
 
 Belief = dict[str, FloatArray]
 Three = tuple[float, float, float]
 
 _SCAN_BITS = 48
+#: Whose processes they are.
+_OWNSHIP = np.uint64(0)
+#: Nearer to the vertical azimuths say nothing.
+_LEAST_COS = 1e-3
 
 
 def navigation_errs(context: Context) -> bool:
@@ -35,12 +40,26 @@ def navigation_errs(context: Context) -> bool:
     return bool(_errors_of(context))
 
 
+def navigation_noise(context: Context) -> tuple[Three, Three]:
+    """Return the standard deviations that the ownship's navigation states of itself.
+
+    Returns
+    -------
+    position_m, attitude_rad : three floats each
+        North, east and down; yaw, pitch and roll. A bias it does not know of.
+    """
+    navigation = context.sections.get("navigation")
+    if navigation is None:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return navigation.position_noise_m, _radians(navigation.attitude_noise_deg)
+
+
 def _errors_of(context: Context) -> list[str]:
     navigation = context.sections.get("navigation")
     return [
         f"{key} is {[float(value) for value in values]}"
         for key, values in (() if navigation is None else navigation)
-        if any(values)
+        if isinstance(values, tuple) and any(values)
     ]
 
 
@@ -58,7 +77,7 @@ class _Navigation(Effect):
 
 
 class NavigationErrors(_Navigation):
-    """What the ownship believes of its position and attitude: biases and white noise."""
+    """What the ownship believes of its position and attitude: biases, and noise that lasts."""
 
     acts_on = "ownship"
     lockstep = True
@@ -73,6 +92,15 @@ class NavigationErrors(_Navigation):
         stream = block.context.streams.stream("[navigation]", "errors")
         attitude_bias = _radians(navigation.attitude_bias_deg)
         attitude_noise = _radians(navigation.attitude_noise_deg)
+        lasting = [
+            GaussMarkov(block.context.streams.stream("[navigation]", f"lasting {name}"), lasts_s)
+            if lasts_s
+            else None
+            for name, lasts_s in (
+                ("position", navigation.position_correlation_time_s),
+                ("attitude", navigation.attitude_correlation_time_s),
+            )
+        ]
 
         def believed(states: TrafficStates) -> Belief:
             # An instant may take more bits than a scan number has: the rest goes to the target.
@@ -83,7 +111,12 @@ class NavigationErrors(_Navigation):
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
             drawn = stream.of_rows(replica)
-            draws = [drawn.normal(high, low, draw) for draw in range(6)]
+            draws = [
+                drawn.normal(high, low, draw)
+                if (process := lasting[draw // 3]) is None
+                else process(_OWNSHIP, instant, draw % 3, replica)
+                for draw in range(6)
+            ]
             lat, lon, alt = position_with_error(
                 states.own_lat_deg,
                 states.own_lon_deg,
@@ -115,8 +148,13 @@ class NavigationReport(_Navigation):
     lockstep = True
 
     def build(self, block: Any) -> Callable[[Detections, RelativeTargets, IntArray], Detections]:
-        """Return what adds the columns to a report."""
-        return in_the_horizons_axes
+        """Return what adds the columns to a report, and to its variances what navigation knows."""
+        noise = navigation_noise(block.context)
+
+        def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
+            return with_navigation_noise(in_the_horizons_axes(detections, targets, rows), *noise)
+
+        return report
 
 
 def in_the_horizons_axes(
@@ -150,6 +188,64 @@ def in_the_horizons_axes(
         "ned_elevation_rad": elevation,
     }
     return replace(detections, extras={**detections.extras, **added})
+
+
+def with_navigation_noise(
+    detections: Detections, position_m: Three, attitude_rad: Three
+) -> Detections:
+    """Add to a report's variances those of the pose that its measurements are turned by.
+
+    Parameters
+    ----------
+    detections : Detections
+        With the ownship's believed pose; without one nothing is added.
+    position_m : three floats
+        Standard deviations of the ownship's position north, east and down.
+    attitude_rad : three floats
+        Of its yaw, pitch and roll.
+
+    Returns
+    -------
+    Detections
+        Variances of azimuth and elevation in body axes hold those of the three angles to first
+        order, and where a range is measured those of the place it is counted from.
+    """
+    own = detections.pose_columns()
+    if not own or not (any(position_m) or any(attitude_rad)) or not len(detections.target):
+        return detections
+    yaw, pitch, roll = (own[f"own_{name}_rad"] for name in ("heading", "pitch", "roll"))
+    azimuth, elevation = detections.azimuth_rad, detections.elevation_rad
+    level = np.maximum(np.cos(elevation), _LEAST_COS)
+    along = np.stack(unit_vector(azimuth, elevation))
+    across = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)])
+    upward = np.cross(across, along, axis=0)
+    zero, one = np.zeros_like(azimuth), np.ones_like(azimuth)
+    # About what the ownship turns, in its body axes, when each of the three angles changes.
+    axes = (
+        np.stack(ned_to_body(zero, zero, one, yaw, pitch, roll)),
+        np.stack([zero, np.cos(roll), -np.sin(roll)]),
+        np.stack([one, zero, zero]),
+    )
+    added = [zero, zero, zero]
+    for sigma, axis in zip(attitude_rad, axes, strict=True):
+        turned = np.cross(along, axis, axis=0)
+        added[0] = added[0] + (sigma * (turned * across).sum(axis=0) / level) ** 2
+        added[1] = added[1] + (sigma * (turned * upward).sum(axis=0)) ** 2
+    if any(position_m) and np.isfinite(detections.range_m).any():
+        range_m = detections.range_m
+        north_east_down = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+        for sigma, (north, east, down) in zip(position_m, north_east_down, strict=True):
+            shift = sigma * np.stack(ned_to_body(north, east, down, yaw, pitch, roll))
+            side, rise, away = ((shift * part).sum(axis=0) for part in (across, upward, along))
+            added[0] = added[0] + np.where(np.isnan(range_m), 0.0, side / (range_m * level)) ** 2
+            added[1] = added[1] + np.where(np.isnan(range_m), 0.0, rise / range_m) ** 2
+            added[2] = added[2] + away**2
+    return replace(
+        detections,
+        azimuth_variance_rad2=detections.azimuth_variance_rad2 + added[0],
+        elevation_variance_rad2=detections.elevation_variance_rad2 + added[1],
+        range_variance_m2=detections.range_variance_m2 + added[2],
+    )
 
 
 def _radians(angles_deg: Three) -> Three:

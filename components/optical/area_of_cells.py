@@ -49,6 +49,31 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
                 )
 
 
+def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
+    """Say which targets a camera adds the bodies of, though they were fitted to show their union.
+
+    Parameters
+    ----------
+    roster : Roster
+    band, silhouette
+        As for `area_of_cells`.
+    """
+    if silhouette not in ("exact", "thesis"):
+        return []
+    names = [
+        name
+        for name, craft in zip(roster.names, roster.aircraft, strict=True)
+        if getattr(craft, band).made_for is not None
+    ]
+    if not names:
+        return []
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    return [
+        f"the areas of {names[0]!r}{more} were fitted for silhouette 'convex_hull' and silhouette "
+        f"is {silhouette!r}: from above and below they show too much"
+    ]
+
+
 def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
     """Return each cell's area.
 

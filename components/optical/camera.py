@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.geometry.field_of_view import sector_width_rad
-from components.optical.area_of_cells import check_silhouette
+from components.optical.area_of_cells import check_silhouette, fitted_otherwise
 from components.optical.centroid_accuracy import centroid_variance
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -31,6 +31,7 @@ from components.optical.frame_false_alarms import FrameFalseAlarms
 from components.optical.signature import pixels_of_cells
 from components.optical.weather_effects import Visibility
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
+from components.sensor.error_parameters import GlintParameters
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
@@ -40,7 +41,7 @@ from dsa_des.block.effect import Effect
 CellValues = Callable[[Cells], FloatArray]
 
 
-class CameraParameters(SensorParameters):
+class CameraParameters(GlintParameters, SensorParameters):
     """Parameters of a camera; the pixel grid follows from field of view and pixel counts."""
 
     azimuth_pixels: int = Field(gt=0, description="Pixels across the field of view.")
@@ -255,6 +256,11 @@ class Camera(Sensor):
         return "cannot reach the threshold"
 
     @property
+    def pixel_rad(self) -> tuple[float, float]:
+        """Width and height of a pixel."""
+        return self.pixel_azimuth_rad, self.pixel_elevation_rad
+
+    @property
     def contrast_column(self) -> str:
         """Column of the roster that holds the contrast it sees."""
         return self.contrasts
@@ -337,8 +343,11 @@ class Camera(Sensor):
         return float(min(self.detector.threshold, self.p.cued_threshold))
 
     def warnings(self) -> list[str]:
-        """Say which cues change nothing."""
-        return [*super().warnings(), *said_of_cues(self)]
+        """Say which cues change nothing, and whose areas were made for another silhouette."""
+        said = [*super().warnings(), *said_of_cues(self)]
+        for roster in known_targets(self.context) if self.areas else ():
+            said += fitted_otherwise(roster, self.areas, self.p.silhouette)
+        return said
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the angles to the target's centre in the picture."""

@@ -27,10 +27,11 @@ from dsa_des.block.message import per_row
 class BeamSweep(Effect):
     """A beam that sweeps once per scan lights each target at an instant of its own.
 
-    Everything about a target is then that of this instant, which is recorded as
-    ``illuminated_s``: whether it is in reach, its SNR, its measured and true position. A target
-    that the beam does not meet counts as outside the field of view. The ownship's pose is of that
-    instant too; the error of its navigation is that of the scan's start.
+    Everything about a target is then that of this instant: whether it is in reach, its SNR, its
+    measured and true position. A target that the beam does not meet counts as outside the field of
+    view. ``illuminated_s`` is what the radar knows of the instant: when its beam pointed to the
+    azimuth that was measured. The ownship's pose is of that instant too; the error of its
+    navigation is that of the scan's start.
     """
 
     name = "beam sweep"
@@ -176,16 +177,13 @@ class Sweep:
     ) -> Detections:
         """Add ``illuminated_s``, and the ownship's pose then, to what `lit` targets gave."""
         counts = np.diff(detections.offsets)
-        # A false alarm has no true direction: the beam was where it is reported.
-        false = detections.target < 0
-        azimuth, _ = self._block.axes(
-            detections.azimuth_rad[false], detections.elevation_rad[false]
-        )
-        offset_s = np.empty(len(detections.target))
-        offset_s[false] = illumination_offset_s(azimuth, **self._turn)
+        # The radar knows when its beam pointed where it measured, whatever was there.
+        azimuth, _ = self._block.axes.from_body(detections.azimuth_rad, detections.elevation_rad)
+        offset_s = illumination_offset_s(azimuth, **self._turn)
+        first = getattr(self._block.p, "cued_beam_first", False)
+        if first and "cued" in detections.extras:
+            offset_s = np.where(detections.extras["cued"], 0.0, offset_s)
         assert isinstance(targets, LitTargets)
-        column = np.searchsorted(targets.columns, detections.target[~false])
-        offset_s[~false] = targets.offset_s[np.repeat(rows, counts)[~false], column]
         scan_s = np.repeat(self._run_time_s(detections.tick), counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
         own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)

@@ -57,6 +57,8 @@ _PHASES = 64
 # For a threshold that has no largest value.
 _ANY_THRESHOLD = math.inf
 _SMALLEST_FALSE_ALARM_PROBABILITY = 1e-100
+# Of a threshold that noise never crosses.
+_LEAST = 1e-300
 
 
 def clutter_detection_probability(
@@ -68,6 +70,7 @@ def clutter_detection_probability(
     clutter: str = "fluctuating",
     diffuse_cnr: ArrayLike = 0.0,
     threshold: str = "noise",
+    noise_threshold: float | None = None,
 ) -> Any:
     """Return the probability that the cell of a target in clutter crosses the threshold.
 
@@ -91,6 +94,9 @@ def clutter_detection_probability(
         Whether the threshold stays where noise alone has it, or rises with the mean power of noise
         and clutter, V (1 + C + D). Then the false alarms of fluctuating clutter stay what they
         are, and those of a constant mean are fewer.
+    noise_threshold : float, optional
+        V itself, 0 or more, in place of the probability that noise crosses it, which a double may
+        not hold.
 
     Returns
     -------
@@ -124,17 +130,19 @@ def clutter_detection_probability(
         cnr=not_negative("cnr", cnr),
         diffuse_cnr=not_negative("diffuse_cnr", diffuse_cnr),
     )
+    level = -math.log(float(pfa)) if noise_threshold is None else float(noise_threshold)
     result = np.empty_like(target)
     cluttered = (mean > 0.0) | (diffuse > 0.0)
     clear = ~cluttered
+    clear_pfa = float(pfa) if noise_threshold is None else max(math.exp(-level), _LEAST)
     result[clear] = detection_probability(
-        target[clear], false_alarm_probability=float(pfa), model=name
+        target[clear], false_alarm_probability=clear_pfa, model=name
     )
     noise = 1.0 + diffuse[cluttered]
     # A threshold that is so many times higher sees all powers so many times lower.
     over = noise + mean[cluttered] if rises else np.ones_like(noise)
     powers = (target[cluttered] / over, mean[cluttered] / over, noise / over)
-    cell = (*powers, -math.log(float(pfa)), _ANY_THRESHOLD if rises else 0.0)
+    cell = (*powers, level, _ANY_THRESHOLD if rises else 0.0)
     with np.errstate(under="ignore"):  # vanishing probabilities are 0
         found = _fluctuating(name, *cell) if kind == "fluctuating" else _constant(name, *cell)
     result[cluttered] = np.minimum(np.maximum(found, 0.0), 1.0)

@@ -10,15 +10,20 @@ import numpy as np
 from components.geometry.attitude import body_to_ned, unit_vector
 from components.geometry.normals import Vector
 from components.messages.detections import Detections
-from components.messages.false_detections import add_false_detections, in_measured_order
+from components.messages.false_detections import in_measured_order
 from components.messages.targets import RelativeTargets
 from components.radar.clutter import clutter_detection_probability
 from components.radar.clutter_effects import RainClutter, beamwidths_rad, terrain_of
-from components.radar.false_alarm_effects import MOST_PER_SCAN
+from components.radar.false_alarm_effects import MOST_PER_SCAN, Alarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS
+from components.radar.measured_strength import FAINTEST
+from components.radar.threshold import Crossing
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+
+#: Keys of the ground's errors, beyond those of noise.
+_OF_GROUND = np.uint64(2**41)
 
 
 class ClutterAlarms(Effect):
@@ -86,7 +91,6 @@ class GroundReports:
         self._cells = cells = cells_of_radar(block)
         self._beam_rad = beamwidths_rad(block)
         self._draws = block.stream("clutter false alarms")
-        self._pfa = block.p.cell_pfa
         axes = (
             (cells.azimuth_rad, cells.azimuth),
             (cells.elevation_rad, cells.elevation),
@@ -102,6 +106,12 @@ class GroundReports:
         self._range_m = centres[2]
         azimuth, elevation = (grid.ravel() for grid in np.meshgrid(*centres[:2], indexing="ij"))
         self._beams = azimuth, elevation
+
+    @cached_property
+    def _crossing(self) -> Crossing:
+        """The threshold; known after setup."""
+        crossing: Crossing = self._block.crossing
+        return crossing
 
     @cached_property
     def _body(self) -> Vector:
@@ -132,22 +142,10 @@ class GroundReports:
         }  # fmt: skip
         # What lies beyond the threshold of an exponential power is exponential again.
         beyond = -np.log1p(-self._draws.uniform(key, scan, 4)) * (1.0 + cnr)
-        snr = np.maximum(beyond - math.log(self._pfa) - 1.0, 1e-6)
-        if self._block.p.measures_range_rate:
-            rate = self._block.noise_range_rate(self._draws.uniform(key, scan, 5))
-            where["range_rate"] = rate
-        azimuth, elevation, range_m, measured = self._block.report_noise(where, {"snr": snr})
-        snr_db = 10.0 * np.log10(snr)
-        joined = add_false_detections(
-            detections,
-            row,
-            azimuth_rad=azimuth,
-            elevation_rad=elevation,
-            range_m=range_m,
-            confidence=snr_db - self._block.false_alarm_zero_db(),
-            extras={"snr_db": snr_db},
-            measured=measured,
-        )
+        snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
+        rate = self._draws.uniform(key, scan, 5)
+        alarms = Alarms(row, key + _OF_GROUND, where, snr, rate)
+        joined = self._block.with_noise_reports(detections, targets, rows, alarms)
         # Without any here, the report is in that order already.
         return in_measured_order(joined)
 
@@ -170,7 +168,8 @@ class GroundReports:
             return np.empty(0, dtype=np.int64), np.empty(0)
         cell, pfa, cnr = (np.concatenate(each) for each in zip(*parts, strict=True))
         # Beyond noise, whose false alarms are reported anyway.
-        extra = (pfa - self._pfa) / (1.0 - self._pfa)
+        of_noise = self._crossing.false_alarm_probability
+        extra = (pfa - of_noise) / (1.0 - of_noise)
         if (most := float(extra.sum())) > MOST_PER_SCAN:
             raise ValueError(
                 f"clutter_threshold is 'noise': the ground makes {most:,.0f} false alarms in a "
@@ -215,7 +214,11 @@ class GroundReports:
             else:
                 mean = mean + cnr
         pfa = clutter_detection_probability(
-            0.0, mean, false_alarm_probability=self._pfa, diffuse_cnr=diffuse,
+            0.0,
+            mean,
+            false_alarm_probability=0.5,  # the threshold says more
+            diffuse_cnr=diffuse,
             clutter=self._block.context.sections["terrain"].clutter_mean,
-        )  # fmt: skip
+            noise_threshold=self._crossing.threshold,
+        )
         return pfa, mean + diffuse

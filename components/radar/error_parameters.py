@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from components.radar.resolution_parameters import ResolutionParameters
-from components.sensor.error_parameters import CorrelationTime, ErrorParameters
+from components.sensor.error_parameters import CorrelationTime, ErrorParameters, GlintParameters
 from dsa_des.errors import Disagreements
 
 
@@ -52,7 +52,7 @@ class RadarErrorParameters(ResolutionParameters):
         return self
 
 
-class SignalErrorParameters(RadarErrorParameters):
+class SignalErrorParameters(GlintParameters, RadarErrorParameters):
     """Errors that follow from the signal-to-noise ratio of each detection."""
 
     errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]

@@ -20,6 +20,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
+from components.radar.measured_snr import measured_snr
 from components.radar.resolution_cells import MOST_CELLS
 from components.radar.threshold import detection_threshold
 
@@ -74,72 +75,41 @@ def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability
     return unflatten(found.astype(np.int64), draws.shape)
 
 
-def false_alarm_snr(uniform: ArrayLike, *, false_alarm_probability: float, pulses: int = 1) -> Any:
+def false_alarm_snr(
+    uniform: ArrayLike,
+    *,
+    false_alarm_probability: float,
+    pulses: int = 1,
+    threshold: float | None = None,
+) -> Any:
     """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
 
     Parameters
     ----------
-    uniform, false_alarm_probability, pulses
-        As for `measured_snr`.
-
-    Returns
-    -------
-    array, linear power ratio per pulse
-    """
-    return measured_snr(
-        uniform, 0.0, false_alarm_probability=false_alarm_probability, pulses=pulses
-    )
-
-
-def measured_snr(
-    uniform: ArrayLike, snr: ArrayLike, *, false_alarm_probability: float, pulses: int = 1
-) -> Any:
-    """Return the SNR that a detection seems to have, given that it crosses the threshold.
-
-    Parameters
-    ----------
     uniform : array_like
-        In [0, 1), one per detection.
-    snr : array_like
-        The echo's mean SNR (linear, per pulse), 0 or more; 0 is noise alone.
+        In [0, 1), one per false alarm.
     false_alarm_probability : float
         Strictly between 0 and 1; it sets the threshold.
     pulses : int
         Pulses summed non-coherently.
+    threshold : float, optional
+        The threshold itself, where it is known.
 
     Returns
     -------
     array, linear power ratio per pulse
-        Detector output over its mean for noise, minus 1; never below 0.
+        Detector output over its mean, minus 1; never below 0.
 
     Raises
     ------
     ValueError
         If an argument is out of range.
-
-    Notes
-    -----
-    Beyond the threshold the output has the tail of Gamma(pulses, 1 + SNR), inverted: exact for
-    noise, and for an echo that fluctuates from pulse to pulse (Swerling 2, and 1 of one pulse);
-    one that fluctuates less is given that spread too. For one pulse it is the threshold plus an
-    exponential number.
     """
-    count = checked_pulses(pulses)
-    pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
     draws = _checked_uniform("uniform", uniform)
-    mean = as_numbers("snr", snr)
-    refuse("snr", mean, ~((mean >= 0.0) & np.isfinite(mean)), "be 0 or more")
-    flat = np.ascontiguousarray(draws).reshape(-1)
-    scale = 1.0 + np.broadcast_to(mean, draws.shape).reshape(-1)
-    threshold = float(detection_threshold(count, pfa))
-    if float(count) == 1.0:
-        output = threshold - scale * np.log1p(-flat)
-    else:
-        from scipy.special import gammaincc, gammainccinv
-
-        beyond = np.where(scale == 1.0, pfa, gammaincc(float(count), threshold / scale))
-        output = scale * gammainccinv(float(count), beyond * (1.0 - flat))
-    return unflatten(np.maximum(output / float(count) - 1.0, 0.0), draws.shape)
+    if threshold is None:
+        pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
+        threshold = float(detection_threshold(checked_pulses(pulses), pfa))
+    return measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses)
 
 
 def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:

@@ -1,34 +1,42 @@
-"""The strength that a radar measures of what it reports, as an effect of false alarms."""
+"""The strength that a radar measures of what it reports, as an effect."""
 
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from components.radar.false_alarm_effects import alarms_are_asked_for
-from components.radar.false_alarms import measured_snr
+from components.radar.measured_snr import measured_snr
 from components.sensor.look import Cells, Look
-from dsa_des.arrays.types import IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+
+#: Noise may barely cross a low threshold; -60 dB stands for nothing.
+FAINTEST = 1e-6
 
 
 class MeasuredStrength(Effect):
     """What a radar knows of a target's echo is what it knows of noise: how strong it came out.
 
-    SNR and confidence of a detection are those of the output that crossed the threshold, its
-    errors by signal follow from that output too, and the probability of detection, which only the
-    truth gives, is left out. ``looks`` has what decided.
+    SNR and confidence of a detection are those of the output that crossed the threshold, by the
+    target's own fluctuation and the noise of that look; errors by signal follow from that output
+    too. The probability of detection, which only the truth gives, is left out; ``looks`` has what
+    decided. Where the draw of a look decides, the same draw says how strong it came out.
     """
 
     lockstep = True
     name = "measured strength"
     acts_on = "strength"
     neutral = False
-    outside_the_proof = "without false alarms a report says what decided it"
+    outside_the_proof = "without errors and false alarms a report says what decided it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, and whether the radar is switched on."""
-        return alarms_are_asked_for(block.p)
+        """Ask for ``false_alarms`` and ``errors``, and whether the radar is switched on."""
+        p = block.p
+        if not p.enabled:
+            return Verdict(False, "enabled is false")
+        if p.false_alarms:
+            return Verdict(True, "false_alarms is true")
+        return Verdict(p.errors != "grid", f"errors is {p.errors!r}")
 
     def build(self, block: Any) -> "Strength":
         """Return what measures the strength of detections."""
@@ -36,7 +44,7 @@ class MeasuredStrength(Effect):
 
 
 class Strength:
-    """Draws the output that crossed the threshold, keyed by target and scan.
+    """Gives the output that crossed the threshold.
 
     Parameters
     ----------
@@ -57,21 +65,43 @@ class Strength:
             Those that are detected; of others nothing is measured.
         look : Look
         """
+        block = self._block
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
-        keys = cells.roster.keys_of(cells.target[found])
-        mean = 10.0 ** (0.1 * extras["snr_db"][found])
-        snr = measured_snr(
-            self._draws.uniform(keys, cells.scan[found]),
-            mean,
-            false_alarm_probability=self._block.p.cell_pfa,
-            pulses=self._block.p.pulses_summed,
-        )
+        if look.tail is None:
+            keys = cells.roster.keys_of(cells.target[found])
+            tail = 1.0 - self._draws.uniform(keys, cells.scan[found])
+        else:
+            tail = look.tail[found]
+        # Clutter is more noise to the output, as it is to the mean; a threshold that stays at the
+        # noise hears it as signal.
+        mean = look.signal["snr"][found]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            floor = np.where(mean > 0.0, 10.0 ** (0.1 * extras["snr_db"][found]) / mean, 1.0)
+        heard = floor if block.p.clutter_threshold == "noise" else np.ones(len(found))
+        snr = np.empty(len(found))
+        for crossing, part in block.crossings_of(cells, found):
+            for model, chosen in block.models_in_use(cells):
+                some = part[_within(found[part], chosen, len(cells))]
+                output = 1.0 + measured_snr(
+                    tail[some],
+                    mean[some],
+                    threshold=crossing.threshold / heard[some],
+                    pulses=crossing.pulses,
+                    model=f"swerling{model}",
+                )
+                snr[some] = np.maximum(output * heard[some] - 1.0, 0.0)
         snr_db, confidence = extras["snr_db"].copy(), look.confidence.copy()
-        snr_db[found] = 10.0 * np.log10(np.maximum(snr, 1e-6))
-        confidence[found] = snr_db[found] - self._block.false_alarm_zero_db()
-        # Clutter is more noise to the output, as it is to the mean.
-        signal = look.signal["snr"].copy()
-        signal[found] *= snr / mean
+        snr_db[found] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
+        confidence[found] = snr_db[found] - block.false_alarm_zero_db()
+        signal: FloatArray = look.signal["snr"].copy()
+        signal[found] = snr
         return replace(
             look, extras={**extras, "snr_db": snr_db}, confidence=confidence, signal={"snr": signal}
         )
+
+
+def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
+    """Return which of some cells are among the chosen ones."""
+    inside = np.zeros(count, dtype=bool)
+    inside[chosen] = True
+    return np.flatnonzero(inside[cells])

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from components.geometry.attitude import body_to_ned, unit_vector
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
 from components.radar.moving_target_filter import folded_range_rate
-from components.radar.own_velocity import OwnVelocity
+from components.radar.own_velocity import OwnVelocity, own_velocity
 from components.radar.range_rate import LASTS_S, RangeRate
 from components.radar.resolution_effects import Merging
 from components.sensor.look import Cells
@@ -22,8 +23,8 @@ from dsa_des.block.effect import Effect
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 CellFactor = Callable[[Cells], FloatArray]
-#: Of noise that looks like an aircraft: the range rate of two fast ones that meet.
-FASTEST_M_S = 500.0
+#: Over ground, of the fastest aircraft that a radar listens for: a jet's at cruise.
+FASTEST_M_S = 250.0
 
 
 class Radar(Sensor):
@@ -118,15 +119,45 @@ class Radar(Sensor):
             beside = {**beside, "range_rate_m_s": folded}
         return azimuth, elevation, range_m, beside
 
-    def noise_range_rate(self, uniform: FloatArray) -> FloatArray:
-        """Return range rates that noise alone gives: any that is unambiguous, m/s.
+    def noise_range_rate(
+        self,
+        uniform: FloatArray,
+        where: Mapping[str, FloatArray],
+        targets: RelativeTargets,
+        row: IntArray,
+    ) -> FloatArray:
+        """Return range rates that noise alone gives, m/s: any that the radar listens for.
+
+        One of one PRF listens for all that are unambiguous; another for those of aircraft up to
+        `FASTEST_M_S` over ground, by its own motion along the line of sight.
 
         Parameters
         ----------
         uniform : (n,) array
             In [0, 1).
+        where : mapping of (n,)
+            Directions in the sensor's axes.
+        targets : RelativeTargets
+        row : (n,) of int
+            Of the targets.
         """
-        return FASTEST_M_S * (2.0 * uniform - 1.0)
+        off = 2.0 * uniform - 1.0
+        if self.p.range_rate_folds:
+            assert self.wavelength_m is not None
+            return off * 0.25 * self.wavelength_m * self.p.prf_hz
+        each, place = np.unique(row, return_inverse=True)
+        tick = (targets.tick if targets.state_tick is None else targets.state_tick)[each]
+        if self.span_ticks:
+            tick = tick % self.span_ticks
+        velocity = own_velocity(targets, each, tick / self.context.ticks_per_s)
+        body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
+        attitude = targets.own_attitude
+        if attitude is None or not np.isfinite(velocity).all():
+            return off * FASTEST_M_S
+        turned = (attitude[f"{name}_rad"][row] for name in ("yaw", "pitch", "roll"))
+        towards = np.stack(body_to_ned(*body, *turned))
+        nearer_m_s: FloatArray = (towards * velocity[:, place]).sum(axis=0)
+        return off * FASTEST_M_S - nearer_m_s
 
     def seen(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None

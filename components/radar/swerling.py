@@ -17,6 +17,7 @@ from components.radar.plausible import noise_at_targets
 from components.radar.rcs_effects import ModelsOfCells, RcsFluctuation, models_of, steady
 from components.radar.sampled_rcs import scan_rcs
 from components.radar.signal_errors import heard
+from components.radar.threshold import Crossing
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather_effects import WEATHER_EFFECTS
 from components.sensor.look import Cells, Look
@@ -214,8 +215,9 @@ class SwerlingRadar(LinkBudgetRadar):
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
         noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
+        tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
-        return Look(echo & (draw < pd), confidence, extras, heard(snr, cnr), noise)
+        return Look(echo & (draw < pd), confidence, extras, heard(snr, cnr), noise, tail)
 
     def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.
@@ -330,6 +332,14 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.samples_rcs:
             return [(0, slice(None))]
         return self._models(cells)
+
+    def cued_crossing(self) -> Crossing | None:
+        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        p = self.p
+        if not (p.cued_pulses or p.cued_false_alarm_probability):
+            return None
+        pfa = p.cued_false_alarm_probability or p.cell_pfa
+        return Crossing.of(p.cued_pulses or p.pulses_summed, pfa)
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:

@@ -106,6 +106,39 @@ def _sum_from(pulses: int, mean: float) -> float:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """Hold the threshold of a look, and how often noise alone crosses it.
+
+    Parameters
+    ----------
+    pulses : int
+        Summed non-coherently.
+    false_alarm_probability : float
+        Per look and cell; 0 where a double cannot hold it.
+    threshold : float
+        That the sum of pulses crosses, in units of a pulse's mean noise.
+    """
+
+    pulses: int
+    false_alarm_probability: float
+    threshold: float
+
+    @classmethod
+    def of(cls, pulses: int, false_alarm_probability: float) -> Crossing:
+        """Return that of a threshold which noise crosses so often."""
+        threshold = float(detection_threshold(pulses, false_alarm_probability))
+        return cls(pulses, false_alarm_probability, threshold)
+
+    @classmethod
+    def at(cls, pulses: int, snr_db: float) -> Crossing:
+        """Return that of a threshold on the SNR of a pulse, as the output over noise less 1."""
+        from scipy.special import gammaincc
+
+        threshold = pulses * (1.0 + 10.0 ** (0.1 * snr_db))
+        return cls(pulses, float(gammaincc(float(pulses), threshold)), threshold)
+
+
+@dataclass(frozen=True)
 class NoiseTerms:
     """Hold what the detection series need to know of the noise and the threshold.
 

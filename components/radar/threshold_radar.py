@@ -10,6 +10,8 @@ from pydantic import Field
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
 from components.messages.detections import Detections
+from components.messages.false_detections import add_false_detections
+from components.messages.targets import RelativeTargets
 from components.radar.aspect_rcs import mean_rcs_m2
 from components.radar.beam_effects import BeamShape, BeamSweep
 from components.radar.cfar_effects import Averaging, CellAveraging
@@ -25,7 +27,7 @@ from components.radar.clutter_effects import (
 from components.radar.cued_parameters import dwell_factor
 from components.radar.detection import detection_probability
 from components.radar.doppler_effects import DopplerFilter
-from components.radar.false_alarm_effects import FalseAlarms
+from components.radar.false_alarm_effects import Alarms, FalseAlarms
 from components.radar.field_of_view import cells_of_radar
 from components.radar.ladder import DETECTION, RCS
 from components.radar.measured_strength import MeasuredStrength
@@ -45,13 +47,16 @@ from components.radar.rcs_effects import AspectRcs, constant_rcs_m2
 from components.radar.required_snr import required_snr
 from components.radar.resolution_effects import OneReportByCell
 from components.radar.signal_errors import heard, signal_variances
+from components.radar.threshold import Crossing
 from components.radar.time_effects import TimeBudget, time_report
 from components.radar.weather_effects import WEATHER_EFFECTS, gas_left_out, said_of_rain
 from components.sensor.cued_looks import CUED_INPUTS, CUED_LOOKS, said_of_cues
 from components.sensor.look import Cells, Look
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect
 from dsa_des.block.wake import Wake
+from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.timeline import split_scans
 
 
 class ThresholdParameters(LinkBudgetParameters):
@@ -188,9 +193,87 @@ class LinkBudgetRadar(Radar):
                 mean = mean + cnr
         return Clutter(mean, diffuse)
 
+    @property
+    def crossing(self) -> Crossing:
+        """How a look crosses the threshold: a target's output and noise alike."""
+        return Crossing.of(self.p.pulses_summed, self.p.cell_pfa)
+
+    def cued_crossing(self) -> Crossing | None:
+        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        return None
+
+    def crossings_of(self, cells: Cells, found: IntArray) -> list[tuple[Crossing, IntArray]]:
+        """Return the thresholds that some cells cross, each with which of them."""
+        cued = self.cued_crossing()
+        if cued is None or cells.cued is None:
+            return [(self.crossing, np.arange(len(found)))]
+        inside = cells.cued[found]
+        return [(cued, np.flatnonzero(inside)), (self.crossing, np.flatnonzero(~inside))]
+
+    def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
+        """Return each fluctuation model with its cells: one that decides by the mean is steady."""
+        return [(0, slice(None))]
+
     def false_alarm_zero_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
         raise TypeError(f"{type(self).__name__} does not say what its confidence is measured from")
+
+    def with_noise_reports(
+        self,
+        detections: Detections,
+        targets: RelativeTargets,
+        rows: IntArray,
+        alarms: Alarms,
+        *,
+        cued: bool | None = None,
+    ) -> Detections:
+        """Return a report with what is not there beside, reported as if it were.
+
+        Parameters
+        ----------
+        detections : Detections
+        targets : RelativeTargets
+        rows : (scans,) of int
+            As every report is given them.
+        alarms : Alarms
+        cued : bool, optional
+            Whether only those that are reported inside cue cones are kept, or those outside.
+        """
+        where, row = dict(alarms.where), alarms.row
+        if self.p.measures_range_rate:
+            where["range_rate"] = self.noise_range_rate(alarms.rate, where, targets, rows[row])
+        scan, tick = detections.scan[row], detections.tick[row]
+        replica = split_scans(scan)[0]
+        if self.span_ticks:
+            tick = tick % self.span_ticks
+        instant_ns = nanosecond_of(tick, self.context.ticks_per_s)
+        azimuth, elevation, range_m, measured = self.report_noise(
+            where, {"snr": alarms.snr}, (alarms.key, scan, instant_ns, replica)
+        )
+        snr_db = 10.0 * np.log10(alarms.snr)
+        extras = {"snr_db": snr_db}
+        kept: Any = slice(None)
+        if cones := self.built("cue"):
+            inside = cones[0].in_cones(row, azimuth, elevation)
+            extras["cued"] = inside
+            kept = slice(None) if cued is None else np.flatnonzero(inside == cued)
+        return add_false_detections(
+            detections,
+            row[kept],
+            azimuth_rad=azimuth[kept],
+            elevation_rad=elevation[kept],
+            range_m=range_m[kept],
+            confidence=(snr_db - self.false_alarm_zero_db())[kept],
+            extras={name: values[kept] for name, values in extras.items()},
+            measured={name: values[kept] for name, values in measured.items()},
+        )
+
+    def noise_key(self) -> str:
+        """Say which key sets how often noise crosses the threshold, and its value."""
+        p, key = self.p, "cell_false_alarm_probability"
+        if p.cell_false_alarm_probability is None:
+            key += " (not given: false_alarm_probability)"
+        return f"{key} is {p.cell_pfa:g}"
 
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any target, or None where Pd jumps."""
@@ -286,6 +369,27 @@ class ThresholdRadar(LinkBudgetRadar):
             self.cued_threshold_db = self.p.cued_threshold_db
             if self.cfar is not None:
                 self.cued_threshold_db += self.cfar.loss_db(*self._stated_for)
+
+    @property
+    def crossing(self) -> Crossing:
+        """How a look crosses the threshold: noise crosses the one that targets do."""
+        pulses, stated = self.p.pulses_summed, self.p.cell_false_alarm_probability
+        if stated is not None:
+            return Crossing.of(pulses, stated)
+        return Crossing.at(pulses, self.threshold_db)
+
+    def cued_crossing(self) -> Crossing | None:
+        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        if self.cued_threshold_db == self.threshold_db:
+            return None
+        return Crossing.at(self.p.pulses_summed, self.cued_threshold_db)
+
+    def noise_key(self) -> str:
+        """Say which key sets how often noise crosses the threshold, and its value."""
+        if self.p.cell_false_alarm_probability is not None:
+            return super().noise_key()
+        given = "" if self.p.threshold_db is not None else " (not given)"
+        return f"threshold_db{given} is {self.threshold_db:g}"
 
     def false_alarm_zero_db(self) -> float:
         """Return the threshold."""

@@ -117,20 +117,37 @@ class ConesAhead:
         false = np.flatnonzero(detections.target < 0)
         if self._cones is None or not len(false):
             return detections
-        scan, axis, least = self._cones
         row = np.repeat(np.arange(len(detections)), np.diff(detections.offsets))[false]
+        inside = self.in_cones(row, detections.azimuth_rad[false], detections.elevation_rad[false])
+        cued = detections.extras["cued"].copy()
+        cued[false[inside]] = True
+        return replace(detections, extras={**detections.extras, "cued": cued})
+
+    def in_cones(
+        self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
+    ) -> BoolArray:
+        """Return which directions in body axes lie in a cone of their scan.
+
+        Parameters
+        ----------
+        row : (n,) of int
+            Which of the scans of the last call.
+        azimuth_rad, elevation_rad : (n,)
+        """
+        inside = np.zeros(len(row), dtype=bool)
+        if self._cones is None:
+            return inside
+        scan, axis, least = self._cones
         first = np.searchsorted(scan, row, side="left")
         count = np.searchsorted(scan, row, side="right") - first
-        alarm = np.repeat(np.arange(len(false)), count)
-        cone = np.arange(len(alarm)) + np.repeat(first - np.cumsum(count) + count, count)
-        azimuth = detections.azimuth_rad[false][alarm]
-        elevation = detections.elevation_rad[false][alarm]
+        which = np.repeat(np.arange(len(row)), count)
+        cone = np.arange(len(which)) + np.repeat(first - np.cumsum(count) + count, count)
+        azimuth, elevation = azimuth_rad[which], elevation_rad[which]
         level = np.cos(elevation)
         along = axis[0][cone] * level * np.cos(azimuth) + axis[1][cone] * level * np.sin(azimuth)
         along -= axis[2][cone] * np.sin(elevation)
-        cued = detections.extras["cued"].copy()
-        cued[false[alarm[along >= least[cone]]]] = True
-        return replace(detections, extras={**detections.extras, "cued": cued})
+        inside[which[along >= least[cone]]] = True
+        return inside
 
 
 CUED_LOOKS = CuedLooks()

@@ -110,3 +110,30 @@ class ErrorParameters(ClockedParameters):
         """Return what the scene states of one of the `quantities`."""
         values = (getattr(self, key) for key in self._keys(name, self.quantities[name]))
         return StatedError(*values)
+
+
+class GlintParameters(ErrorParameters):
+    """How far the centre of a target that is seen wanders over it, beside errors by signal."""
+
+    glint_share: float = Field(
+        default=0.2,
+        ge=0,
+        le=1,
+        description="Standard deviation of where a target seems to be, as a share of its extent, "
+        "for errors = 'signal': glint of radars, the centroid's wander of cameras; 0.15 to 0.25 is "
+        "measured of aircraft.",
+    )
+    glint_correlation_time_s: CorrelationTime = Field(
+        default=0.2, description="Time after which that has forgotten all but 1/e, s."
+    )
+
+    def without_effect(self) -> list[str]:
+        """Say which keys belong to a wander that there is not."""
+        said = super().without_effect()
+        if self.errors != "signal":
+            return said + self.idle(
+                "glint_share", "glint_correlation_time_s", because=f"errors is '{self.errors}'"
+            )
+        if not self.glint_share:
+            said += self.idle("glint_correlation_time_s", because="glint_share is 0")
+        return said

@@ -28,6 +28,9 @@ class Look:
         What errors of measurement follow from, where it is not among the extras.
     noise : (cells,) of bool, optional
         Which detections noise made, where the sensor tells them from those that the target made.
+    tail : (cells,), optional
+        The share of such detections that come out stronger, (0, 1], where one draw says both
+        whether and how strong.
     """
 
     detected: BoolArray
@@ -35,6 +38,7 @@ class Look:
     extras: dict[str, AnyArray] = field(default_factory=dict)
     signal: dict[str, AnyArray] = field(default_factory=dict)
     noise: BoolArray | None = None
+    tail: FloatArray | None = None
 
     def check(self, cells: int) -> None:
         """Refuse arrays without one value for each cell, and detections that are no truth values.
@@ -195,6 +199,17 @@ class Cells:
     def of_row(self, name: str) -> AnyArray:
         """Return a field of the message that has one value per row, for each cell."""
         return getattr(self._targets, name).take(self._flat // self._width)
+
+    @cached_property
+    def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not told."""
+        told = self._targets.own_attitude
+        if told is None:
+            nothing = np.zeros(len(self))
+            return nothing, nothing, nothing
+        row = self._flat // self._width
+        yaw, pitch, roll = (told[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
+        return yaw, pitch, roll
 
     def of_target(self, column: FloatArray) -> AnyArray:
         """Return a column of the roster (shape (aircraft,)) for each cell."""

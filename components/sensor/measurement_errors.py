@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,59 +84,85 @@ class Erring:
         true : mapping of (n,)
             The truth by quantity, in the sensor's axes.
         """
-        of_signal = self._of_signal({name: all_[found] for name, all_ in look.signal.items()})
+        signal = {name: all_[found] for name, all_ in look.signal.items()}
+        of_signal = self._of_signal(signal)
         keys = cells.roster.keys_of(cells.target[found])
         when = cells.scan[found], cells.instant_ns[found], cells.replica[found]
         if look.noise is not None and self._signal:
-            true, drawn, of_signal = self._in_cells(
-                true, of_signal, look.noise[found], keys, when[0]
-            )
-        else:
-            drawn = of_signal
+            true = self._in_cells(true, look.noise[found], keys, when[0])
         values = {
-            name: true[name] + error(keys, *when, drawn.get(name))
+            name: true[name] + error(keys, *when, of_signal.get(name))
             for name, error in self._errors.items()
         }
-        return self._valid(values), self._columns(len(found), of_signal)
+        return self._stated(self._valid(values), of_signal, signal)
 
     def _in_cells(
-        self,
-        true: Mapping[str, FloatArray],
-        of_signal: Mapping[str, FloatArray],
-        noise: BoolArray,
-        keys: AnyArray,
-        scan: IntArray,
-    ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        self, true: Mapping[str, FloatArray], noise: BoolArray, keys: AnyArray, scan: IntArray
+    ) -> Mapping[str, FloatArray]:
         """Put what noise made anywhere in the target's cell, which says no more of the target.
 
-        Returns
-        -------
-        places, drawn, stated : mappings of (n,)
-            Values before errors, variances of the errors to be drawn, and variances of both: a
-            target anywhere in a cell and a report anywhere in it are width²/6 apart.
+        It errs from there, and states of itself, what any report as strong does: noise does not
+        say that it is noise.
         """
         if not noise.any():
-            return true, of_signal, of_signal
+            return true
         silent = {"snr": np.zeros(1)}
-        places, drawn, stated = dict(true), dict(of_signal), dict(of_signal)
+        places = dict(true)
         for number, (name, most) in enumerate(self._of_signal(silent).items()):
             width = math.sqrt(12.0 * float(most[0]))
             part = self._places.uniform(keys[noise], scan[noise], number)
-            cell = np.rint(true[name][noise] / width)
-            places[name], drawn[name], stated[name] = (
-                values.copy() for values in (true[name], of_signal[name], of_signal[name])
-            )
-            places[name][noise] = (cell + part - 0.5) * width
-            drawn[name][noise] = 0.0
-            stated[name][noise] = width**2 / 6.0
-        return places, drawn, stated
+            middle = np.rint(true[name][noise] / width) * width
+            low, high = self._fields.get(name, (-math.inf, math.inf))
+            first = np.maximum(middle - 0.5 * width, low)
+            last = np.minimum(middle + 0.5 * width, high)
+            places[name] = true[name].copy()
+            places[name][noise] = first + part * np.maximum(last - first, 0.0)
+        return places
+
+    @cached_property
+    def _fields(self) -> dict[str, tuple[float, float]]:
+        """Limits between which noise is looked for, by quantity; none where a field wraps."""
+        reach = self._block.reach
+        fields = {"elevation": reach.elevation_rad}
+        if self._block.measures_range:
+            fields["range"] = (0.0, reach.range_max_m)
+        low, high = reach.azimuth_rad
+        if -math.pi <= low < high <= math.pi and high - low < 2.0 * math.pi:
+            fields["azimuth"] = (low, high)
+        return fields
 
     def of_noise(
-        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
+        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray], drawn: Any
     ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-        """Return how something that is not there is reported: as what is there would be."""
-        columns = self._columns(len(where["azimuth"]), self._of_signal(signal))
-        return self._valid(where), columns
+        """Return how something that is not there is reported: as what is there would be.
+
+        Parameters
+        ----------
+        where, signal : mappings of (n,)
+        drawn : (keys, scan, instant_ns, replica) or None
+        """
+        of_signal = self._of_signal(signal)
+        if drawn is not None:
+            keys, scan, instant_ns, replica = drawn
+            where = {
+                name: where[name] + error(keys, scan, instant_ns, replica, of_signal.get(name))
+                for name, error in self._errors.items()
+            }
+        return self._stated(self._valid(where), of_signal, signal)
+
+    def _stated(
+        self,
+        values: dict[str, FloatArray],
+        of_signal: Mapping[str, FloatArray],
+        signal: Mapping[str, FloatArray],
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """Return what is measured, with its variances by column."""
+        columns = self._columns(len(values["azimuth"]), of_signal)
+        if self._block.wander is not None:
+            added = self._block.wander.variances(values, signal, self._block.pixel_rad)
+            for name, more in added.items():
+                columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + more
+        return values, columns
 
     def _of_signal(self, signal: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
         of_signal: Mapping[str, FloatArray] = {}

@@ -49,6 +49,17 @@ class Measuring(Component):
     def _erring(self) -> list[Any]:
         return self.built("measurement")
 
+    @cached_property
+    def wander(self) -> Any:
+        """Where targets seem to be on themselves (`components.sensor.glint`), or None."""
+        (wander,) = self.built("apparent place") or [None]
+        return wander
+
+    @property
+    def pixel_rad(self) -> tuple[float, float] | None:
+        """Width and height of a pixel, of a sensor that measures a target's size."""
+        return None
+
     def measure(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -96,6 +107,9 @@ class Measuring(Component):
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return what is measured of lines of sight in body axes, and columns beside."""
+        if self.wander is not None:
+            line = azimuth_rad, elevation_rad, range_m
+            azimuth_rad, elevation_rad, range_m = self.wander(cells, found, *line)
         azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
         true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
         if (rate := self.range_rate(cells, found)) is not None:
@@ -105,7 +119,10 @@ class Measuring(Component):
         return self._in_body(*self._on_grid(true))
 
     def report_noise(
-        self, where: Mapping[str, FloatArray], signal: Mapping[str, FloatArray]
+        self,
+        where: Mapping[str, FloatArray],
+        signal: Mapping[str, FloatArray],
+        drawn: Any = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return how something that is not there is reported, as if it were.
 
@@ -115,6 +132,9 @@ class Measuring(Component):
             By quantity, in the sensor's axes.
         signal : mapping of (n,)
             As in `Look.signal`.
+        drawn : (keys, scan, instant_ns, replica), optional
+            Arrays (n,) by which errors are drawn, as a target's are: without them a place by the
+            edge of the field of view would never be reported beyond it.
 
         Returns
         -------
@@ -124,7 +144,7 @@ class Measuring(Component):
             The other measured columns of `Detections`.
         """
         if self._erring:
-            return self._in_body(*self._erring[0].of_noise(where, signal))
+            return self._in_body(*self._erring[0].of_noise(where, signal, drawn))
         return self._in_body(*self._on_grid(where))
 
     def _on_grid(self, true: Mapping[str, FloatArray]) -> Measured:

@@ -30,6 +30,10 @@ class BodyAxes:
         """Return what the sensor reports in body axes of directions in its own axes."""
         return azimuth_rad, elevation_rad
 
+    def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Return directions in the sensor's own axes of what it reports in body axes."""
+        return azimuth_rad, elevation_rad
+
     def variances_in_body(
         self,
         azimuth_rad: FloatArray,
@@ -86,6 +90,11 @@ class MountedAxes(BodyAxes):
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Rotate back by the believed mounting."""
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
+
+    def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Rotate by the believed mounting: the way back of `to_body`."""
+        azimuth, elevation = sensor_angles(azimuth_rad, elevation_rad, *self.believed_rad)
+        return azimuth, elevation
 
     def variances_in_body(
         self,

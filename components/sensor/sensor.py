@@ -17,11 +17,12 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.every_look import EveryLook, looks_of
 from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.navigation.effects import NavigationReport
+from components.navigation.effects import NavigationReport, navigation_noise
 from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule
-from components.sensor.grid import AZIMUTH, ELEVATION
+from components.sensor.glint import Glint
+from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
 from components.sensor.look import Cells, Look
 from components.sensor.measurement_errors import (
     MeasurementErrors,
@@ -41,6 +42,7 @@ from dsa_des.block.wake import Wake
 #: Effects that every sensor has, after its own.
 SENSOR_EFFECTS: tuple[Effect, ...] = (
     Mounting(),
+    Glint(),
     MeasurementErrors(),
     DeclarationRule(),
     DeclarationByPlace(),
@@ -67,6 +69,7 @@ class Sensor(Measuring):
     hooks: ClassVar[Mapping[str, str]] = {
         "cue": "(targets, rows, wake) -> which targets lie in a cue cone at each scan",
         "axes": "the sensor's axes in the ownship's: (azimuth, elevation) of cells, and back",
+        "apparent place": "(cells, found, line of sight) -> where targets seem to be",
         "strength": "(cells, found, look) -> look: as strong as its detections came out",
         "measurement": "(cells, found, look, truth) -> what is measured, and its variances",
         "declaration": "(cells, look) -> look: which detections declare their target",
@@ -116,6 +119,8 @@ class Sensor(Measuring):
             if angles:
                 worst = max(angles, key=lambda one: one.step)
                 lasting |= {"azimuth": worst, "elevation": worst}
+        if any(any(sigmas) for sigmas in navigation_noise(self.context)):  # differs with the pose
+            constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
             lasting=lasting, clock=self.p.clock_spec(), **constant,

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from components.view.encounter_scenes import encounter_picture
 from components.view.page_text import page_text
 from components.view.run_scenes import run_picture
@@ -21,10 +23,23 @@ def make_view(run: str, out: str | None) -> None:
     """
     source = Path(run)
     if source.is_dir():
-        picture = run_picture(source)
+        try:
+            with np.errstate(invalid="ignore", over="ignore"):
+                page = page_text(run_picture(source))
+        except (
+            AttributeError,
+            IndexError,
+            KeyError,
+            OverflowError,
+            TypeError,
+            ValueError,
+        ) as error:
+            # Any of its files may be another program's: what they lack is met anywhere.
+            said = str(error)[:200]
+            raise UsageError(f"{run}: its tables are not those of a run ({said})") from error
         target = source.resolve().with_name(f"{source.resolve().name}.html")
     elif source.suffix == ".daa" and source.is_file():
-        picture = encounter_picture(source)
+        page = page_text(encounter_picture(source))
         target = source.with_suffix(".html")
     elif source.exists():
         raise UsageError(f"{run}: is neither a run's folder nor a .daa file")
@@ -34,7 +49,7 @@ def make_view(run: str, out: str | None) -> None:
         target = named(out)
     check_file(target)
     try:
-        write_file(target, page_text(picture).encode("utf-8"))
+        write_file(target, page.encode("utf-8"))
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
     say(f"wrote {target}")

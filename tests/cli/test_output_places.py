@@ -219,7 +219,7 @@ def test_pages_and_rows_are_checked_beforehand(
         "components.evidence.thesis.reproduce.make", lambda *a: pytest.fail("it ran")
     )
     monkeypatch.setattr(
-        "components.evidence.benchmark.command._fresh", lambda *a: pytest.fail("it ran")
+        "components.evidence.benchmark.command.fresh", lambda *a: pytest.fail("it ran")
     )
     before = everything_in(places)
     for name in ("run", "pipe", "loop", "no/x", "a" * 300, ""):

@@ -92,7 +92,7 @@ def test_the_same_however_the_rows_arrive(cut):
 
 
 def test_a_sensor_that_saw_nothing_is_there():
-    result = sensors_of([], sensors=("ir", "radar"))
+    result = sensors_of([], sensors=("radar", "ir"))
     assert list(result) == ["ir", "radar"]
     assert result["ir"] == {
         "scans": 0,

@@ -23,21 +23,25 @@ def told(tmp_path, *sets):
     return DrawnTracks.read(Simulation(scene), tmp_path / "run")
 
 
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    return told(tmp_path_factory.mktemp("shown"), EKF)
+
+
 @pytest.mark.parametrize("draw", [draw_tracks, draw_consistency])
-def test_confirmed_tracks_are_drawn_the_same_every_time(tmp_path, draw):
-    shown = told(tmp_path, EKF)
+def test_confirmed_tracks_are_drawn_the_same_every_time(tmp_path, draw, shown):
     paths = [draw(tmp_path / name, shown) for name in ("one.png", "two.png")]
     assert paths[0].read_bytes() == paths[1].read_bytes()
     assert paths[0].read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.mark.parametrize("sets", [(), (EKF, "blocks.tracker.confirm_m=60",
-                                       "blocks.tracker.confirm_n=62")])  # fmt: skip
+                                       "blocks.tracker.confirm_n=62", "duration_s=1")])  # fmt: skip
 def test_where_nothing_is_confirmed_there_is_no_figure(tmp_path, sets):
     assert told(tmp_path, *sets) is None
 
 
-def test_tracks_are_false_that_never_come_near_a_target(tmp_path):
+def test_tracks_are_false_that_never_come_near_a_target(tmp_path, shown):
     """A bias of 900 m puts every track beside its target."""
     stated = [
         f"blocks.radar.{key}"
@@ -54,8 +58,7 @@ def test_tracks_are_false_that_never_come_near_a_target(tmp_path):
     assert wrong.tracks and all(one.false for one in wrong.tracks)
     assert draw_consistency(tmp_path / "none.png", wrong) is None
     draw_tracks(tmp_path / "false.png", wrong)
-    right = told(tmp_path / "right", EKF)
-    assert right.tracks and not any(one.false for one in right.tracks)
+    assert shown.tracks and not any(one.false for one in shown.tracks)
 
 
 def one_track(rng):

@@ -56,16 +56,17 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sets", type=int, default=2000)
-    sets = parser.parse_args().sets
-    print("| weights | events | " + " | ".join(f"{m}: above, below" for m in METHODS) + " |")
-    print("|---" * (2 + len(METHODS)) + "|")
-    for shape in SHAPES:
+    parser.add_argument("--methods", default="gamma,delta", help=f"of {', '.join(METHODS)}")
+    parser.add_argument("--weights", default=";".join(SHAPES), help="with ; between them")
+    options = parser.parse_args()
+    methods, sets = options.methods.split(","), options.sets
+    print("| weights | events | " + " | ".join(f"{m}: above, below" for m in methods) + " |")
+    print("|---" * (2 + len(methods)) + "|")
+    for shape in options.weights.split(";"):
         for events in EVENTS:
             cells = []
-            for method in METHODS:
-                above, below, unmarked = 100.0 * misses(
-                    shape, events, sets if method != "bootstrap" else sets // 4, method
-                )
+            for method in methods:
+                above, below, unmarked = 100.0 * misses(shape, events, sets, method)
                 marked = "" if unmarked > 0.5 * below or method == "gamma" else " *"
                 cells.append(f"{above:.1f}, {below:.1f} %{marked}")
             print(f"| {shape} | {events} | " + " | ".join(cells) + " |", flush=True)

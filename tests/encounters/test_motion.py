@@ -57,13 +57,40 @@ def test_a_climb_is_reached_and_held() -> None:
     assert np.degrees(np.abs(pitching).max()) == pytest.approx(3.0, abs=1e-6)
 
 
-def test_limits_hold_whatever_is_commanded() -> None:
-    random = np.random.default_rng(1)
-    shape = 41, 50
-    flown = fly_point_mass(
-        np.full(50, 3000.0), np.full(50, 120.0), random.normal(0, 30, shape),
-        random.normal(0, 100, shape), random.normal(0, 0.6, shape),
-    )  # fmt: skip
-    assert np.isfinite(flown.up_ft).all()
-    assert np.degrees(np.abs(flown.bank_rad)).max() <= 75.0 + 1e-9
-    assert flown.speed_ft_s.min() >= 1.7 and flown.speed_ft_s.max() <= 1116.0
+def test_limits_are_reached_on_both_sides_and_never_passed() -> None:
+    """Two tracks, commanded as much to either side: rates of the first step, then the limits."""
+    a, climb, turn = commands(20, 0.0, 0.0, 0.0, 2)
+    start = np.full(2, 3000.0), np.full(2, 300.0)
+    side = np.array([1.0, -1.0])
+    turn[1:] = 3.0 * side
+    flown = fly_point_mass(*start, a, climb, turn)
+    assert np.diff(flown.bank_rad, axis=0)[10] == pytest.approx(0.0524 * side)
+    assert np.degrees(np.abs(flown.bank_rad)).max(axis=0) == pytest.approx([75.0, 75.0])
+    assert np.sign(flown.heading_rad[-1]).tolist() == side.tolist()
+    flown = fly_point_mass(*start, a, climb + 200.0 * side, turn * 0.0)
+    assert np.degrees(flown.pitch_rad[0]) == pytest.approx(np.degrees(np.arcsin(side * 2 / 3)))
+    climb[1:] = 200.0 * side
+    flown = fly_point_mass(*start, a, climb, turn * 0.0)
+    assert np.degrees(np.diff(flown.pitch_rad, axis=0)[10]) == pytest.approx(0.3 * side)
+    flown = fly_point_mass(*start, a + 100.0 * side, climb * 0.0, turn * 0.0)
+    assert flown.speed_ft_s[-1].tolist() == [1116.0, 1.7]
+    # What is commanded at time 0 is limited there too.
+    flown = fly_point_mass(*start, a, climb * 0.0 + 400.0 * side, turn * 0.0 + 3.0 * side)
+    assert np.sin(flown.pitch_rad[0]) == pytest.approx(0.999 * side)
+    assert np.degrees(flown.bank_rad[0]) == pytest.approx(75.0 * side)
+
+
+def test_a_coordinated_turn_has_its_bank_and_keeps_its_height() -> None:
+    """tan bank = v psi' / g, with g = 32.2 ft/s^2, at the start and after a minute."""
+    for rate_deg in (3.0, -2.0):
+        flown = fly_point_mass(
+            np.array([2e3]), np.array([250.0]), *commands(60, 0.0, 0.0, rate_deg)
+        )
+        bank = np.arctan(250.0 * np.radians(rate_deg) / 32.2)
+        assert flown.bank_rad[[0, -1], 0] == pytest.approx([bank, bank], abs=2e-4)
+        assert np.diff(flown.heading_rad[:, 0])[-1] == pytest.approx(
+            np.radians(rate_deg) / 10, rel=1e-3
+        )
+        euler = fly_euler(np.array([2e3]), np.array([250.0]), *commands(60, 0.0, 20.0, rate_deg))
+        assert euler.bank_rad[5, 0] == pytest.approx(bank)
+        assert np.sin(euler.pitch_rad[5, 0]) == pytest.approx(20.0 / 250.0)

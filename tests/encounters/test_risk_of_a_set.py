@@ -1,13 +1,16 @@
 """Risk ratios of a study over a set whose encounters differ in weight, family and class."""
 
 import math
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from click.testing import CliRunner
 
 import dsa_des
+from dsa_des.cli import main
 from dsa_des.studies.ratio import paired_ratio
 from tests.encounters.test_closed_loop_risk import SCENE
 
@@ -80,3 +83,73 @@ def test_weights_families_and_classes_count(tmp_path: Path) -> None:
     left = found["nmac_risk_ratio.crossing_from_the_left"]
     assert left["ratio"] == pytest.approx(7 / 13)
     assert (left["encounters"], left["clusters"]) == (4, 3)
+    the_report_says_what_the_tables_hold(tmp_path / "out")
+
+
+class _Tables(HTMLParser):
+    """Every table of a page, as rows of texts."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[list[list[str]]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        if tag == "table":
+            self.found.append([])
+        elif tag == "tr":
+            self.found[-1].append([])
+        elif tag in ("td", "th"):
+            self.found[-1][-1].append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.found and self.found[-1] and self.found[-1][-1] and data.strip():
+            self.found[-1][-1][-1] += data
+
+
+def the_report_says_what_the_tables_hold(folder: Path) -> None:
+    """Every printed ratio, interval and count, against the flags of the runs that it is of."""
+    assert CliRunner().invoke(main, ["study", "report", str(folder)]).exit_code == 0
+    tables = _Tables((folder / "report.html").read_text(encoding="utf-8")).found
+    runs = pq.read_table(folder / "parts").to_pylist()
+    (ratios,) = (t for t in tables if t[0][:3] == ["ratio of events", "unresolved", "induced"])
+    assert ratios[0][3:7] == ["gamma", "bootstrap", "effective size", "nominal, mitigated, induced"]
+    (results,) = (t for t in tables if t[0][:3] == ["result", "value", "interval"])
+    printed = {row[0]: row[1:] for row in results[1:]}
+    seen = 0
+    for name, unresolved, induced, gamma, bootstrap, size, counts, *_ in ratios[1:]:
+        event, _, kind = name.partition("_risk_ratio")
+        some = [r for r in runs if not kind
+                or r["encounter_geometry"].replace(" ", "_") == kind.lstrip(".")]  # fmt: skip
+        n, m, w = ([r[c] for r in some] for c in
+                   (f"{event}_nominal", f"{event}_mitigated", "encounter_weight"))  # fmt: skip
+        below = sum(a * c for a, c in zip(n, w, strict=True))
+        if below == 0.0:
+            assert "no encounter" in counts or "there is no" in counts
+            continue
+        seen += 1
+        stays = sum(min(a, b) * c for a, b, c in zip(n, m, w, strict=True)) / below
+        new = sum(max(b - a, 0.0) * c for a, b, c in zip(n, m, w, strict=True)) / below
+        assert (float(unresolved), float(induced)) == pytest.approx((stays, new), rel=1e-4)
+        assert float(printed[name][0]) == pytest.approx(stays + new, rel=1e-4)
+        told = [sum(x > 0 for x in n), sum(x > 0 for x in m),
+                sum(b > a for a, b in zip(n, m, strict=True))]  # fmt: skip
+        assert [int(c) for c in counts.split(", ")] == told
+        assert size.endswith(f" of {len(some)}")
+        low, high = (float(end) for end in gamma.split(" to "))
+        assert low <= stays + new <= high and low < high
+        assert printed[name][1] == gamma
+        if bootstrap:
+            ends = [float(end) for end in bootstrap.removesuffix(" *").split(" to ")]
+            assert ends == sorted(ends)
+    assert seen >= 4
+    flag = printed["nmac_nominal"]
+    assert float(flag[0]) == pytest.approx(
+        sum(r["nmac_nominal"] for r in runs) / len(runs), rel=1e-4
+    )
+    low, high = (float(end) for end in flag[1].removesuffix(" *").split(" to "))
+    # Wilson's ends solve (p - x)^2 n = z^2 x (1 - x); the spread of the units costs one of them.
+    share, z = sum(r["nmac_nominal"] for r in runs) / len(runs), 1.959963984540054
+    for end in (low, high):
+        half = (share - end) ** 2 * (len(runs) - 1)
+        assert half == pytest.approx(z * z * end * (1 - end), rel=2e-3)

@@ -3,19 +3,28 @@
 import io
 import json
 import math
+import shutil
 import xml.etree.ElementTree as ElementTree
+from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pymap3d
 import pytest
 from click.testing import CliRunner
 from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
 
 import dsa_des
 from components.export.command import export
+from components.export.globe import czml_text, kml_text
+from components.export.recorded import RecordedTables
+from components.export.traffic import daa_text
 from components.traffic.daa_file import read_daa
+from components.view.command import view
 from tests.view.test_page import SCENE
 
 NAME = "a<b&'c"
@@ -94,16 +103,142 @@ def test_kml_is_well_formed_and_in_place(run):
         assert math.hypot(east + 2500, north + 3500) < 700  # along 6 s of its flight
 
 
-def test_czml_has_the_same_places(run):
-    assert call(run, "--to", "czml").exit_code == 0
-    packets = json.loads(run.with_name("run.czml").read_text(encoding="utf-8"))
-    assert packets[0]["id"] == "document" and packets[0]["version"] == "1.0"
-    (other,) = (p for p in packets if p["id"] == "aircraft/a<b&c")
-    samples = np.array(other["position"]["cartographicDegrees"]).reshape(-1, 4)
-    lat, _, alt = flown(samples[:, 0])
-    assert samples[:, 2] == pytest.approx(lat, abs=3e-6)
-    assert samples[:, 3] == pytest.approx(alt, abs=0.5)
-    assert sum(p["id"].startswith("detection/") for p in packets) == 12
+def crafted():
+    """Climbing, turning flights and banked detections at odd times, as Arrow tables."""
+    random = np.random.default_rng(5)
+    count, start = 6, 0.1234567
+    time_s = np.repeat(start + 1.3 * np.arange(count), 2)
+    truth = {
+        "target": [None, "a"] * count, "time_s": time_s,
+        "lat_deg": -33.9 + 0.01 * random.random(2 * count),
+        "lon_deg": 18.4 + 0.01 * random.random(2 * count),
+        "alt_m": 900.0 + 50.0 * random.random(2 * count),
+        **{f"velocity_{axis}_m_s": random.normal(0.0, 40.0, 2 * count)
+           for axis in ("north", "east", "down")},
+        "heading_rad": random.uniform(-3.0, 6.0, 2 * count),
+        "pitch_rad": np.zeros(2 * count), "roll_rad": np.zeros(2 * count),
+    }  # fmt: skip
+    detections = {
+        "block": ["radar", "eo", "ir"], "target": ["a", None, "a"],
+        "time_s": [0.25, 1.0004, 61.999],
+        "azimuth_rad": [0.4, -1.0, 2.2], "elevation_rad": [0.1, -0.2, 0.3],
+        "range_m": [1500.0, 2500.0, 800.0],
+        "own_lat_deg": [-33.9] * 3, "own_lon_deg": [18.4] * 3, "own_alt_m": [950.0] * 3,
+        "own_heading_rad": [math.radians(217.0)] * 3, "own_pitch_rad": [0.1, -0.1, 0.05],
+        "own_roll_rad": [0.5, -0.4, 0.3],
+    }  # fmt: skip
+    tables = {"truth": pa.table(truth), "detections": pa.table(detections)}
+    return RecordedTables(Path("run"), tables), truth, detections
+
+
+def seconds(text):
+    """Seconds of a globe's time from its second 0, by what ISO 8601 says."""
+    return (datetime.fromisoformat(text) - datetime(2000, 1, 1, tzinfo=UTC)).total_seconds()
+
+
+def where_seen(d, k):
+    """Longitude, latitude and height of a detection, by SciPy's rotations and pymap3d."""
+    body = [math.cos(d["elevation_rad"][k]) * math.cos(d["azimuth_rad"][k]),
+            math.cos(d["elevation_rad"][k]) * math.sin(d["azimuth_rad"][k]),
+            -math.sin(d["elevation_rad"][k])]  # fmt: skip
+    angles = [d[f"own_{name}_rad"][k] for name in ("heading", "pitch", "roll")]
+    ned = Rotation.from_euler("ZYX", angles).apply(d["range_m"][k] * np.array(body))
+    place = [d[f"own_{name}"][k] for name in ("lat_deg", "lon_deg", "alt_m")]
+    lat, lon, alt = pymap3d.ned2geodetic(*ned, *place)
+    return lon, lat, alt
+
+
+def test_globes_hold_every_row_at_its_time():
+    run, truth, d = crafted()
+    packets = json.loads(czml_text(run))
+    assert packets[0]["clock"]["currentTime"] == "2000-01-01T00:00:00Z"
+    ends = [seconds(t) for t in packets[0]["clock"]["interval"].split("/")]
+    assert ends == pytest.approx([0.0, truth["time_s"][-1]], abs=2e-6)
+    space = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
+    marks = ElementTree.fromstring(kml_text(run)).findall(".//k:Placemark", space)
+    for place, (name, first) in enumerate((("ownship", 0), ("a", 1))):
+        rows = np.stack(
+            [truth[key][first::2] for key in ("time_s", "lon_deg", "lat_deg", "alt_m")], 1
+        )
+        position = packets[1 + place]["position"]
+        assert (packets[1 + place]["name"], seconds(position["epoch"])) == (name, 0.0)
+        assert np.reshape(position["cartographicDegrees"], (-1, 4)) == pytest.approx(rows, abs=1e-9)
+        track = marks[place].find("gx:Track", space)
+        times = [seconds(w.text) for w in track.findall("k:when", space)]
+        coordinates = [c.text.split() for c in track.findall("gx:coord", space)]
+        assert times == pytest.approx(rows[:, 0], abs=1e-6)
+        assert np.array(coordinates, dtype=float) == pytest.approx(rows[:, 1:], abs=1e-9)
+        assert track.findtext("k:altitudeMode", namespaces=space) == "absolute"
+    for k, who in enumerate(("radar a", "eo", "ir a")):
+        packet, mark = packets[3 + k], marks[2 + k]
+        assert packet["name"] == mark.findtext("k:name", namespaces=space) == who
+        shown = [seconds(t) for t in packet["availability"].split("/")]
+        assert shown == pytest.approx([d["time_s"][k], d["time_s"][k] + 4.0], abs=1e-6)
+        when = mark.findtext("k:TimeStamp/k:when", namespaces=space)
+        assert seconds(when) == pytest.approx(d["time_s"][k], abs=1e-6)
+        point = mark.findtext("k:Point/k:coordinates", namespaces=space).split(",")
+        for lon, lat, alt in (packet["position"]["cartographicDegrees"], map(float, point)):
+            expected = where_seen(d, k)
+            assert (lon, lat) == pytest.approx(expected[:2], abs=1e-8)
+            assert alt == pytest.approx(expected[2], abs=1e-3)
+
+
+def test_daa_holds_every_row_in_its_units():
+    run, truth, _ = crafted()
+    head, units, *rows = [line.split(", ") for line in daa_text(run).splitlines()]
+    assert dict(zip(head, units, strict=True)) == {
+        "NAME": "[]", "lat": "[deg]", "lon": "[deg]", "alt": "[m]", "trk": "[deg]", "gs": "[m/s]",
+        "vs": "[m/s]", "heading": "[deg]", "time": "[s]",
+    }  # fmt: skip
+    assert [row[0] for row in rows] == ["ownship", "a"] * 6
+    for k, row in enumerate(rows):
+        found = dict(zip(head[1:], map(float, row[1:]), strict=True))
+        north, east = (truth[f"velocity_{axis}_m_s"][k] for axis in ("north", "east"))
+        way = complex(north, east)
+        assert abs(way) * complex(
+            math.cos(math.radians(found["trk"])), math.sin(math.radians(found["trk"]))
+        ) == pytest.approx(way)
+        assert found["gs"] == pytest.approx(abs(way))
+        assert found["vs"] == -truth["velocity_down_m_s"][k]
+        assert found["heading"] == pytest.approx(math.degrees(truth["heading_rad"][k]) % 360.0)
+        for name, column in (
+            ("lat", "lat_deg"),
+            ("lon", "lon_deg"),
+            ("alt", "alt_m"),
+            ("time", "time_s"),
+        ):
+            assert found[name] == truth[column][k]
+
+
+@pytest.mark.parametrize(
+    ("to", "table", "column", "value", "said"),
+    [
+        ("czml", "truth", "alt_m", math.nan, "truth.parquet: alt_m in row 0 is nan"),
+        ("kml", "truth", "lat_deg", math.inf, "lat_deg in row 0 is inf"),
+        ("daa", "truth", "time_s", "x", "time_s holds no numbers"),
+        ("czml", "truth", "lon_deg", None, "there is no column 'lon_deg'"),
+        ("kml", "detections", "own_roll_rad", None, "there is no column 'own_roll_rad'"),
+        ("view", "truth", "lat_deg", None, "truth.parquet: there is no column 'lat_deg'"),
+        ("view", "detections", "azimuth_rad", "x", "its tables are not those of a run"),
+    ],
+)
+def test_damaged_run_folders_are_said(run, tmp_path, to, table, column, value, said):
+    folder = tmp_path / "damaged"
+    shutil.copytree(run, folder)
+    found = pq.read_table(folder / f"{table}.parquet")
+    place = found.column_names.index(column)
+    rest = found.drop_columns([column])
+    if value is not None:
+        values = (
+            [value, *found[column].to_pylist()[1:]]
+            if isinstance(value, float)
+            else ["x"] * len(found)
+        )
+        rest = rest.add_column(place, column, pa.array(values))
+    pq.write_table(rest, folder / f"{table}.parquet")
+    command, words = (view, []) if to == "view" else (export, ["--to", to])
+    done = CliRunner().invoke(command, [str(folder), *words, "--out", str(tmp_path / "o.html")])
+    assert done.exit_code == 2 and said in done.output and not (tmp_path / "o.html").exists()
 
 
 @pytest.mark.parametrize("to", ["csv", "kml", "czml", "daa", "mat"])

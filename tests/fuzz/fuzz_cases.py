@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-KINDS = ("scene", "file", "study", "override", "sweep")
+KINDS = ("scene", "file", "study", "override", "sweep", "reader")
 
 
 @dataclass
@@ -45,6 +45,7 @@ def make_case(kind: str, seed: int, number: int) -> Case:
     """Return one case; the same arguments always give the same one."""
     from fuzz_files import file_case
     from fuzz_overrides import override_case
+    from fuzz_readers import reader_case
     from fuzz_scenes import scene_case
     from fuzz_studies import study_case
     from fuzz_sweep import sweep_case
@@ -54,6 +55,7 @@ def make_case(kind: str, seed: int, number: int) -> Case:
         "file": file_case,
         "study": study_case,
         "override": override_case,
+        "reader": reader_case,
     }
     name = f"{kind}-{seed}-{number}"
     if kind == "sweep":

@@ -39,8 +39,10 @@ if {context!r} in os.environ:
         lines.stop()
         data = lines.get_data()
         found = {{file: data.lines(file) for file in data.measured_files()}}
-        with open(os.path.join({folder!r}, f"child.{{os.getpid()}}"), "w") as file:
+        place = os.path.join({folder!r}, "{{}}.%d" % os.getpid())
+        with open(place.format("part"), "w") as file:
             json.dump([os.environ.get({context!r}, ""), found], file)
+        os.replace(place.format("part"), place.format("child"))  # it may be killed meanwhile
     lines.start()
     atexit.register(tell)
     os.register_at_fork(after_in_child=anew)
@@ -58,6 +60,8 @@ class Map:
 
     def __init__(self, file: Path) -> None:
         self.seconds: dict[str, float] = {}
+        #: Processor time, with that of processes that ended within the test.
+        self.cpu_s: dict[str, float] = {}
         self._texts: dict[str, list[str]] = {}
         self._lines: dict[str, dict[str, list[int]]] = {}
         self._tests: list[str] = []
@@ -65,6 +69,7 @@ class Map:
             with gzip.open(file, "rt", encoding="utf-8") as stream:
                 kept = json.load(stream)
             self.seconds, self._texts = kept["seconds"], kept["texts"]
+            self.cpu_s = kept.get("cpu_s", {})
             self._lines, self._tests = kept["lines"], list(self.seconds)
 
     def executed(self, file: str, text: str) -> dict[int, list[str]]:
@@ -207,7 +212,7 @@ def _keep(file: Path, folder: Path) -> None:
     }
     kept = {
         "seconds": seconds,
-        "cpu": {test: round(row[1], 4) for test, row in told.items()},
+        "cpu_s": known.cpu_s | {test: round(row[1], 2) for test, row in told.items()},
         "texts": {path: text.splitlines() for path, text in texts.items()},
         "lines": lines,
     }

@@ -192,6 +192,8 @@ def _places(
             return
         case ast.Assign(targets=[ast.Name(id="__all__")]):
             return
+        case ast.keyword(arg="strict"):
+            return
         case ast.AnnAssign():
             parts = [node.value] if node.value is not None else []
         case ast.JoinedStr():

@@ -209,8 +209,15 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/navigation/effects.py", "wiring/test_navigation_keys.py",
-        ("bias-alone-is-no-error", "        if any(values)\n",
-         '        if any(values) and "bias" not in key\n'),
+        ("bias-alone-is-no-error", "isinstance(values, tuple) and any(values)",
+         'isinstance(values, tuple) and any(values) and "bias" not in key'),
+        ("noise-of-navigation-forgets", "if (process := lasting[draw // 3]) is None", "if True"),
+        ("pitch-about-the-nose", "np.stack([zero, np.cos(roll), -np.sin(roll)])",
+         "np.stack([zero, np.cos(roll), np.sin(roll)])"),
+        ("yaw-as-if-level", "np.stack(ned_to_body(zero, zero, one, yaw, pitch, roll))",
+         "np.stack([zero, zero, one])"),
+        ("place-noise-not-turned", "np.stack(ned_to_body(north, east, down, yaw, pitch, roll))",
+         "np.stack((north, east, down))"),
     ),
     *in_file(
         _GROUP, "components/radar/detection_rung.py",

@@ -51,12 +51,12 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/false_alarm_effects.py", _ALIKE,
-        ("alarms-of-radars-last", "in_measured_order(self._with_alarms(detections))",
-         "self._with_alarms(detections)"),
+        ("alarms-of-radars-last", "return in_measured_order(detections)",
+         "return detections"),
     ),
     *in_file(
         _GROUP, "components/radar/measured_strength.py", _ALIKE,
-        ("errors-by-the-mean-echo", "signal[found] *= snr / mean", "signal[found] *= 1.0"),
+        ("errors-by-the-mean-echo", "signal[found] = snr", "signal[found] *= 1.0"),
         ("confidence-of-the-mean-echo", "confidence[found] = snr_db[found] -",
          "confidence[found] = extras[\"snr_db\"][found] -"),
     ),
@@ -80,10 +80,9 @@ FAULTS = [
          "uniform(keys[noise], scan[noise], 0)"),
         ("cell-of-noise-by-its-edge", "np.rint(true[name][noise] / width)",
          "np.floor(true[name][noise] / width)"),
-        ("noise-in-its-cell-errs-too", "drawn[name][noise] = 0.0",
-         "drawn[name][noise] = drawn[name][noise]"),
-        ("false-alarms-off-the-grid", "return self._valid(where), columns",
-         "return dict(where), columns"),
+        ("false-alarms-off-the-grid",
+         "return self._stated(self._valid(where), of_signal, signal)",
+         "return self._stated(dict(where), of_signal, signal)"),
     ),
     *in_file(
         _GROUP, "components/sensor/measurement_errors.py",
@@ -109,7 +108,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/radar_block.py", _VARIANCES,
-        ("noise-only-recedes", "FASTEST_M_S * (2.0 * uniform - 1.0)", "FASTEST_M_S * uniform"),
+        ("noise-only-recedes", "off = 2.0 * uniform - 1.0", "off = uniform"),
+        ("noise-of-a-still-ownship", "off * FASTEST_M_S - nearer_m_s", "off * FASTEST_M_S"),
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py", _IN_CELL,
@@ -130,12 +130,13 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
-        ("ground-counted-with-its-noise", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
+        ("ground-counted-with-its-noise", "extra = (pfa - of_noise) / (1.0 - of_noise)",
          "extra = pfa"),
         ("cells-of-the-ground-mixed-up", "np.divmod(beam, self._cells.elevation)",
          "np.divmod(beam, self._cells.azimuth)"),
-        ("ground-below-the-threshold", "np.maximum(beyond - math.log(self._pfa) - 1.0, 1e-6)",
-         "np.maximum(beyond - 1.0, 1e-6)"),
+        ("ground-below-the-threshold",
+         "np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)",
+         "np.maximum(beyond - 1.0, FAINTEST)"),
         ("ground-as-strong-as-noise", "* (1.0 + cnr)\n        snr", "\n        snr"),
         ("ground-where-it-is-believed", "self._block.axes.pointing(*self._beams)",
          "self._block.axes.to_body(*self._beams)"),
@@ -148,7 +149,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/measured_strength.py", "wiring/test_false_alarms_of_radars.py",
-        ("strength-of-one-pulse", "pulses=self._block.p.pulses_summed", "pulses=1"),
+        ("strength-of-one-pulse", "pulses=crossing.pulses,", "pulses=1,"),
+        ("strength-of-another-model", 'model=f"swerling{model}"', 'model="swerling2"'),
         ("strength-by-half-its-decibels", '10.0 ** (0.1 * extras["snr_db"][found])',
          '10.0 ** (0.05 * extras["snr_db"][found])'),
     ),
@@ -321,10 +323,10 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/measured_strength.py", _NOISE_IS,
-        ("strength-beyond-the-look", "false_alarm_probability=self._block.p.cell_pfa",
-         "false_alarm_probability=self._block.p.false_alarm_probability"),
-        ("strength-of-another-target", "np.log10(np.maximum(snr, 1e-6))",
-         "np.log10(np.maximum(snr[::-1], 1e-6))"),
+        ("strength-beyond-nothing", "threshold=crossing.threshold / heard[some]",
+         "threshold=0.0 * heard[some]"),
+        ("strength-of-another-target", "np.log10(np.maximum(snr, FAINTEST))",
+         "np.log10(np.maximum(snr[::-1], FAINTEST))"),
     ),
     *in_file(
         _GROUP, "components/sensor/declaration_by_place.py", "sensor_effects/"
@@ -333,8 +335,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", _NOISE_IS,
-        ("ground-by-the-look-s-pfa", "self._pfa = block.p.cell_pfa",
-         "self._pfa = block.p.false_alarm_probability"),
+        ("ground-as-often-as-noise-again", "of_noise = self._crossing.false_alarm_probability",
+         "of_noise = 0.0"),
         ("ground-comes-last", "return in_measured_order(joined)", "return joined"),
     ),
 ]  # fmt: skip

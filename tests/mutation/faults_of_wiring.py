@@ -286,13 +286,19 @@ FAULTS = [
     *in_file(
         _GROUP, "components/radar/false_alarm_effects.py",
         ("wiring/test_false_alarms_of_radars.py", _RADAR),
-        ("alarms-at-the-look-s-rate", "self._pfa = block.p.cell_pfa",
-         "self._pfa = block.p.false_alarm_probability"),
-        ("alarms-of-one-pulse", "pulses=summed)", "pulses=1)"),
+        ("alarms-of-one-pulse", "pulses=crossing.pulses,", "pulses=1,"),
         ("alarm-azimuth-as-elevation", "_between(upwards, self._cells.elevation_rad)",
          "_between(across, self._cells.elevation_rad)"),
-        ("alarms-from-zero-snr", "confidence=snr_db - self._block.false_alarm_zero_db()",
-         "confidence=snr_db"),
+    ),
+    *in_file(
+        _GROUP, "components/radar/threshold_radar.py", (
+            "wiring/test_false_alarms_of_radars.py", "wiring/test_radar_detection_keys.py"),
+        ("alarms-at-the-look-s-rate", "Crossing.of(self.p.pulses_summed, self.p.cell_pfa)",
+         "Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)"),
+        ("alarms-that-know-no-threshold", "return Crossing.at(pulses, self.threshold_db)",
+         "return Crossing.of(pulses, self.p.false_alarm_probability)"),
+        ("alarms-from-zero-snr", "confidence=(snr_db - self.false_alarm_zero_db())[kept]",
+         "confidence=snr_db[kept]"),
     ),
     *in_file(
         _GROUP, "components/sensor/measuring.py", "wiring/test_false_alarms_of_radars.py",
@@ -373,7 +379,7 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/clutter_alarms.py", "wiring/test_clutter_false_alarms.py",
-        ("ground-and-noise-twice", "extra = (pfa - self._pfa) / (1.0 - self._pfa)",
+        ("ground-and-noise-twice", "extra = (pfa - of_noise) / (1.0 - of_noise)",
          "extra = pfa * 1.2"),
         ("ground-below-a-level-ownship", '("yaw", "pitch", "roll")\n        ]',
          '("yaw", "pitch", "yaw")\n        ]'),
@@ -389,9 +395,8 @@ FAULTS = [
     *in_file(
         _GROUP, "components/sensor/measurement_errors.py",
         "wiring/test_noise_lies_in_its_cell.py",
-        ("noise-about-the-target", "(cell + part - 0.5) * width",
-         "true[name][noise] + (part - 0.5) * width"),
-        ("noise-as-sure-as-a-target", "stated[name][noise] = width**2 / 6.0", "pass"),
+        ("noise-about-the-target", "np.rint(true[name][noise] / width) * width",
+         "true[name][noise]"),
     ),
     *in_file(
         _GROUP, "components/radar/clutter_effects.py", "wiring/test_ground_clutter_in_ned.py",
@@ -593,7 +598,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/radar/swerling.py", _CUES,
-        ("cued-by-the-usual-pulses", "p.cued_pulses or p.pulses_summed,", "p.pulses_summed,"),
+        ("cued-by-the-usual-pulses", "            p.cued_pulses or p.pulses_summed,\n",
+         "            p.pulses_summed,\n"),
         ("cued-whoever-it-is", "np.where(inside, self._pd(", "np.where(True, self._pd("),
     ),
     *in_file(

@@ -16,6 +16,7 @@ class Beam:
     """Declared."""
     width: float = 3.0
     def gain(self, a: int = 7, *, far=False) -> "1.0":
+        zip(a, far, strict=True)
         if a < LIMIT and not far:
             raise ValueError(f"{a + 1}")
         return f"{a - self.width:.1f}" + str(min(a, 4, key=abs)) if far else math.sin(-a)
@@ -33,6 +34,7 @@ Beam.gain::dropped not not far>far
 Beam.gain::arithmetic a - self.width>a + self.width
 Beam.gain::dropped term a - self.width>a
 Beam.gain::swapped operands a - self.width>self.width - a
+Beam.gain::dropped statement zip(a, far, strict=True)>pass
 Beam.gain::swapped arguments min(a, 4, key=abs)>min(4, a, key=abs)
 Beam.gain::dropped keyword min(a, 4, key=abs)>min(a, 4)
 Beam.gain::another function min(a, 4, key=abs)>max(a, 4, key=abs) math.sin(-a)>math.cos(-a)
@@ -46,6 +48,9 @@ def test_every_mistake_is_found_and_nothing_that_is_declared_or_said():
         change = fault.change.replace("  →  ", ">")
         kinds.setdefault(f"{fault.where}::{fault.operator}", []).append(change)
     assert len(kinds["Beam.gain::swapped branches"].pop().split(">")) == 2
+    assert (
+        kinds["Beam.gain::swapped arguments"].pop(0).startswith("zip(a, far, strict=True)>zip(far")
+    )
     said = {f"{kind} {' '.join(changes)}" for kind, changes in kinds.items()}
     assert said == set(FOUND.strip().splitlines())
 

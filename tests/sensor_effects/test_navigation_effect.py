@@ -16,7 +16,10 @@ POSE = [*(f"own_{name}" for name in ("lat_deg", "lon_deg", "alt_m")),
         *(f"own_{angle}_rad" for angle in ("heading", "pitch", "roll"))]  # fmt: skip
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000.0}
 BIASED = "[navigation]\nattitude_bias_deg = [1.5, 0, 0]\nposition_bias_m = [30, -20, 5]\n"
-NOISY = "[navigation]\nattitude_noise_deg = [0.5, 0.2, 0.3]\nposition_noise_m = [8, 8, 12]\n"
+NOISY = (
+    "[navigation]\nattitude_noise_deg = [0.5, 0.2, 0.3]\nposition_noise_m = [8, 8, 12]\n"
+    "position_correlation_time_s = 0\nattitude_correlation_time_s = 0\n"
+)
 
 
 def test_windows_do_not_change_a_bit(scene, runs):

@@ -31,6 +31,9 @@ MOVING = [
     *(("table-4.1", (f"aircraft/{file}.toml:rcs_dbsm",))
       for file in printed_numbers.PRINTED["table-4.1"]),
     ("table-4.2", ("thesis/table_4_2.csv:range_km",)),
+    ("table-4.2", ("flight_tests:SCANS_IN_A_ROW",)),
+    *(("fig-4.13", (f"aircraft/{name}_refined.toml:ir.{key}_m2",))
+      for name, key in map(str.split, printed_numbers.PRINTED["fig-4.13"])),
     ("table-4.4", ("eo_ranges:CLIMB_DEG", "aircraft/boeing_787.toml:contrast")),
     ("table-4.4", ("aircraft/king_air.toml:contrast", "aircraft/king_air.toml:eo.front_m2")),
     ("table-4.4", ("aircraft/boeing_787.toml:contrast",)),
@@ -155,6 +158,8 @@ def test_the_page_says_which_predictions_agree(results) -> None:
     assert {row.quantity for _, row in rows_of(results) if row.counts} == {
         "Pd of the medium class at 7.31 km",
         "share of IR detections fused with the radar's",
+        "simulated average, declared by 10 detections in 10 scans, medium",
+        "simulated average, declared by 10 detections in 10 scans, large",
     }
 
 

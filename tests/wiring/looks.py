@@ -52,10 +52,13 @@ RANGE_ERRORS = {
 }  # fmt: skip
 TIMES = {"azimuth_correlation_time_s": 0.5, "elevation_correlation_time_s": 0.05}
 RANGE_TIMES = {"range_correlation_time_s": 2.0, "range_rate_correlation_time_s": 0.2}
-_BEAM = {"azimuth_beamwidth_deg": 3.0, "elevation_beamwidth_deg": 5.0, "range_resolution_m": 40.0}
+_BEAM = {
+    "azimuth_beamwidth_deg": 3.0, "elevation_beamwidth_deg": 5.0, "range_resolution_m": 40.0,
+    "glint_share": 0.0,
+}  # fmt: skip
 SIGNAL_KEYS: dict[str, dict[str, Any]] = {
     **dict.fromkeys(LINK_BUDGETS, _BEAM),
-    **{kind: {"noise_equivalent_contrast": 0.02} for kind in CAMERAS},
+    **{kind: {"noise_equivalent_contrast": 0.02, "glint_share": 0.0} for kind in CAMERAS},
 }
 
 

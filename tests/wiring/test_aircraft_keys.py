@@ -12,7 +12,10 @@ import pytest
 from covering import covers
 from wired import Row, chain, rows, run, sensor
 
+import dsa_des
 from components.encounters.set_file import read_set
+from dsa_des.running.simulation import Simulation
+from dsa_des.running.warnings import warnings_of
 
 AREAS = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 50.0}
 WARM = {"front_m2": 3.0, "back_m2": 9.0, "side_m2": 8.0, "horizontal_m2": 30.0}
@@ -263,6 +266,23 @@ def test_areas_of_the_bodies(carrier, band, tmp_path):
                              ownship={**OWN, "speed_mps": 0.0, "climb_mps": 0.0})  # fmt: skip
         nose = aspect[0] / np.linalg.norm(aspect)
         assert shown["side_m2"] == pytest.approx(math.sqrt(1.0 - nose**2), rel=1e-6)
+
+
+@covers("eo.made_for", "ir.made_for", of=tuple(CARRIERS))
+@pytest.mark.parametrize("carrier", list(CARRIERS))
+def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of(carrier, tmp_path):
+    craft = {**BASE, "eo": {**AREAS, "made_for": "convex_hull"}}
+    both = {**craft, "ir": {**WARM, "made_for": "convex_hull"}}
+    for target, silhouette, told in (
+        (craft, "exact", {"eye"}), (both, "thesis", {"eye", "warm"}), (both, "convex_hull", set()),
+        (BASE, "exact", set()),
+    ):  # fmt: skip
+        scene = chain({"eye": sensor("optical.eo", silhouette=silhouette),
+                       "warm": sensor("optical.ir", silhouette=silhouette)})  # fmt: skip
+        scene["blocks"]["traffic"] = CARRIERS[carrier](target, tmp_path)
+        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+                if "were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
+        assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 
 
 @covers("eo.silhouette_table", "ir.silhouette_table", of=tuple(CARRIERS))

@@ -123,7 +123,7 @@ CRAFT_KEYS = [
     for key in (
         "rcs_dbsm", "rcs_table", "swerling", "contrast", "contrast_ir", "paint_reflectance",
         "engine", *(f"{band}.{key}" for band in ("eo", "ir") for key in AREAS), "ir.back_m2",
-        "eo.silhouette_table", "ir.silhouette_table",
+        "eo.silhouette_table", "ir.silhouette_table", "eo.made_for", "ir.made_for",
     )
 ]  # fmt: skip
 
@@ -140,7 +140,10 @@ def test_a_known_range_gives_noise_or_threshold(kind, aspect_deg, tmp_path):
     nodes = [(az, el) for az in range(0, 360, 30) for el in range(-90, 91, 30)]
     lines = [f"{az},{el},{33.0 if az < 100 else 44.0}" for az, el in nodes]
     path.write_text("\n".join(["az_deg,el_deg,area_m2", *lines]) + "\n", encoding="utf-8")
-    tables = {band: {**CRAFT[band], "silhouette_table": str(path)} for band in ("eo", "ir")}
+    tables = {
+        band: {**CRAFT[band], "silhouette_table": str(path), "made_for": "convex_hull"}
+        for band in ("eo", "ir")
+    }
     other = {**CRAFT, **tables, "rcs_dbsm": 40.0, "swerling": 3, "engine": "turbojet",
              "paint_reflectance": 0.9}  # fmt: skip
     size = abeam(kind, aspect_deg)

@@ -21,7 +21,7 @@ STILL = {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}
 RADAR = {
     "azimuth_deg": [-20, 20], "elevation_deg": [-24, 0], "range_km": 4.0, "minimum_range_m": 1000.0,
     "azimuth_resolution_deg": 4.0, "elevation_resolution_deg": 4.0, "range_resolution_m": 150.0,
-    "false_alarms": True, "false_alarm_probability": PFA, "scan_rate_hz": 50, "power_w": 0.1,
+    "false_alarms": True, "cell_false_alarm_probability": PFA, "scan_rate_hz": 50, "power_w": 0.1,
 }  # fmt: skip
 TERRAIN = {"height_m": GROUND_M, "clutter_gamma_db": GAMMA_DB}
 
@@ -84,12 +84,14 @@ def test_the_ground_is_reported_where_it_crosses_and_no_more_where_the_threshold
 #: Beams that are no multiple of the grid, unlike in the two axes, on a radar mounted askew.
 ASKEW = {
     "type": "radar.threshold", "scan_rate_hz": 100, "power_w": 0.2, "antenna_gain_db": 30.0,
-    "frequency_hz": 35e9, "bandwidth_hz": 1e5, "threshold_db": 0.0, "clutter_threshold": "noise",
+    "frequency_hz": 35e9, "bandwidth_hz": 1e5, "clutter_threshold": "noise",
+    # Noise is over it with a probability of 0.02.
+    "threshold_db": 10.0 * math.log10(-math.log(0.02) - 1.0),
     "azimuth_deg": [-10, 20], "elevation_deg": [-24, 0], "range_km": 3.0, "minimum_range_m": 1200.0,
     "azimuth_beamwidth_deg": 3.0, "elevation_beamwidth_deg": 6.0, "range_resolution_m": 300.0,
     "budget": "free", "errors": "stated", "quantised": False,
     "mount_azimuth_deg": 25.0, "mount_elevation_deg": -22.0, "mount_roll_deg": -15.0,
-    "misalignment_deg": [4.0, -3.0, 2.0], "false_alarms": True, "false_alarm_probability": 0.02,
+    "misalignment_deg": [4.0, -3.0, 2.0], "false_alarms": True,
 }  # fmt: skip
 COUNTS = (10, 4, 6)
 

@@ -17,7 +17,14 @@ VIEW = {
 }  # fmt: skip
 
 
+def crossing_db(pulses: int = 1, pfa: float = PFA) -> float:
+    """The SNR that the sum of so many pulses of noise exceeds with a probability."""
+    return 10.0 * math.log10(gammainccinv(pulses, pfa) / pulses - 1.0)
+
+
 def alarms(kind: str, **keys) -> dict[str, np.ndarray]:
+    if kind == "radar.threshold":
+        keys = {"threshold_db": crossing_db(keys.get("pulses", 1)), **keys}
     found = rows(alone(kind, **{**VIEW, **keys}), target=None)
     assert len(found) > 100
     return {name: np.array([row[name] for row in found]) for name in (
@@ -47,6 +54,18 @@ def test_noise_crosses_the_threshold_of_so_many_pulses(kind, pulses):
     assert np.mean(snr > tenth) == pytest.approx(0.1, abs=0.06)
 
 
+@pytest.mark.parametrize("pulses", [1, 10])
+def test_noise_knows_the_threshold_that_targets_do(pulses):
+    """As often, and as strong, as noise exceeds the SNR that is stated: none at 21 dB."""
+    high_db = crossing_db(pulses, 0.5 * PFA)
+    found = alarms("radar.threshold", threshold_db=high_db, pulses=pulses)
+    assert high_db - 1e-9 <= np.min(found["snr_db"]) < high_db + 0.3
+    expected = 50 * 10 * 30 * 0.5 * PFA * 20
+    assert len(found["snr_db"]) == pytest.approx(expected, abs=4.5 * math.sqrt(expected))
+    silent = alone("radar.threshold", **VIEW, threshold_db=21.0, pulses=pulses)
+    assert not rows(silent, target=None)
+
+
 def test_margins_are_from_the_threshold_or_from_the_snr_of_the_reference_pd():
     found = alarms("radar.threshold", threshold_db=3.5)
     np.testing.assert_allclose(found["snr_db"] - found["confidence"], 3.5, rtol=1e-9)
@@ -73,10 +92,13 @@ def test_a_radar_that_is_off_reports_no_noise():
 
 @pytest.mark.parametrize("pulses", [1, 10])
 @pytest.mark.parametrize("kind", LINK_BUDGETS)
-def test_echoes_are_as_strong_as_measured_and_spread_as_their_pulses_do(kind, pulses):
-    """A strong target's SNR plus the noise of 1: gamma of as many pulses, its mean the true one."""
-    keys = {"pulses": pulses, "power_w": 1e4, "swerling": 0, "scan_rate_hz": 500}
+def test_steady_echoes_are_as_strong_as_a_noncentral_sum(kind, pulses):
+    """SNR plus the noise of 1: twice the sum is chi-square, noncentral by twice the SNR of all."""
+    from scipy.stats import kstest, ncx2
+
+    keys = {"pulses": pulses, "power_w": 30.0, "swerling": 0, "scan_rate_hz": 500}
     if kind == "radar.threshold":
+        keys = {**keys, "threshold_db": -3.0}
         keys.pop("swerling")
     view = {**VIEW, "azimuth_deg": [-180, 180], "elevation_deg": [-90, 90], **keys,
             "cell_false_alarm_probability": 1e-9}  # fmt: skip
@@ -84,10 +106,39 @@ def test_echoes_are_as_strong_as_measured_and_spread_as_their_pulses_do(kind, pu
         {row["scan"]: row["snr_db"] for row in rows(alone(kind, **keys), target="rolling")}
         for keys in ({**view, "false_alarms": False}, view)
     )
-    assert len(seen) == 500 and min(true.values()) > 30.0
-    share = np.array([
-        (10.0 ** (0.1 * seen[scan]) + 1.0) / (10.0 ** (0.1 * true[scan]) + 1.0) for scan in seen
-    ])  # fmt: skip
-    spread = 1.0 / math.sqrt(pulses)
-    assert abs(share.mean() - 1.0) < 2.58 * spread / math.sqrt(500)
-    assert share.std() == pytest.approx(spread, rel=0.2)
+    assert len(seen) == 500 and min(true.values()) > 17.0
+    places = [
+        ncx2.cdf(
+            2.0 * pulses * (10.0 ** (0.1 * seen[scan]) + 1.0),
+            2.0 * pulses,
+            2.0 * pulses * 10.0 ** (0.1 * true[scan]),
+        )
+        for scan in seen
+    ]
+    assert kstest(places, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_false_alarms_change_nothing_of_what_is_measured_of_targets(kind):
+    """Errors by signal follow the strength that is measured, whether noise is reported or not."""
+    keys = {
+        "errors": "signal", "azimuth_beamwidth_deg": 4.0, "elevation_beamwidth_deg": 4.0,
+        "scan_rate_hz": 100, "power_w": 100.0, "azimuth_deg": [-180, 180],
+        "elevation_deg": [-90, 90],
+    }  # fmt: skip
+    if kind == "radar.threshold":
+        keys["threshold_db"] = 8.0
+    quiet, noisy = (
+        [
+            {name: value for name, value in row.items() if name != "declared"}
+            for row in sorted(
+                rows(alone(kind, **{**VIEW, **keys, "false_alarms": asked})),
+                key=lambda row: (row["scan"], row["target"] or ""),
+            )
+            if row["target"] is not None
+        ]
+        for asked in (False, True)
+    )
+    assert len(quiet) > 100 and quiet == noisy
+    # And each row states its own: no two strengths are alike.
+    assert len({row["snr_db"] for row in quiet}) == len(quiet)

@@ -159,9 +159,12 @@ def test_a_radar_of_one_s_own_measures_range_rates_too(monkeypatch):
 @pytest.mark.parametrize("kind", LINK_BUDGETS)
 def test_pulses_that_are_summed_make_errors_smaller(kind):
     keys = {**looks.SIGNAL_KEYS[kind], "errors": "signal", "quantised": False}
-    names = "range_variance_m2", "azimuth_variance_rad2"
-    one, ten = (np.array(columns(kind, *names, **keys, pulses=pulses)) for pulses in (1, 10))
-    np.testing.assert_allclose(one / ten, 10.0, rtol=1e-9)
+    names = "range_variance_m2", "azimuth_variance_rad2", "snr_db"
+    for pulses in (1, 10):
+        of_range, of_azimuth, snr_db = columns(kind, *names, **keys, pulses=pulses)
+        twice = 2.0 * pulses * 10.0 ** (0.1 * snr_db)
+        np.testing.assert_allclose(of_range, 40.0**2 / twice, rtol=1e-9)
+        np.testing.assert_allclose(of_azimuth, math.radians(3.0) ** 2 / twice / 2.56, rtol=1e-9)
 
 
 @covers("range_rate_resolution_m_s", of=RADARS)
@@ -270,16 +273,25 @@ def test_stated_errors_come_on_top_of_those_of_the_signal(kind):
 
 
 def test_errors_in_clutter_follow_the_ratio_to_noise_and_clutter():
-    """Confidence counts clutter as noise, the recorded SNR does not."""
-    keys = {**looks.SIGNAL_KEYS["radar.threshold"], "errors": "signal", "quantised": False}
+    """What is measured is over both; the mean SNR, by which the link budget knows it, is not."""
+    keys = {**looks.SIGNAL_KEYS["radar.threshold"], "quantised": False, "scan_rate_hz": 500}
     grid = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 9.0}
     terrain = {"height_m": 1850.0, "clutter_gamma_db": -45.0}
-    block = sensor("radar.threshold", **keys, **grid)
-    (row,) = rows(run(chain({"sensor": block}, terrain=terrain, targets=[crooked.DIVING])))
-    ratio_db = row["confidence"] - 250.0
-    assert 10.0 < ratio_db < row["snr_db"] - 1.0
-    expected = 40.0**2 / (2.0 * 10.0 ** (ratio_db / 10.0))
-    assert row["range_variance_m2"] == pytest.approx(expected, rel=1e-9)
+    still = {"targets": [{**crooked.DIVING, "speed_mps": 0.0, "climb_mps": 0.0}],
+             "ownship": {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}}  # fmt: skip
+    exact, seen = (
+        rows(run(chain({"sensor": sensor("radar.threshold", **keys, **grid, errors=errors)},
+                       terrain=terrain, **still)))
+        for errors in ("grid", "signal")
+    )  # fmt: skip
+    ratio_db = exact[0]["confidence"] - 250.0
+    assert 10.0 < ratio_db < exact[0]["snr_db"] - 1.0
+    measured = np.array([10.0 ** (0.1 * row["snr_db"]) for row in seen])
+    ratio = 10.0 ** (0.1 * ratio_db)
+    spread = math.sqrt((2.0 * ratio + 1.0) / len(seen))
+    assert abs(measured.mean() - ratio) < 2.58 * spread
+    found = [row["range_variance_m2"] for row in seen]
+    np.testing.assert_allclose(found, 40.0**2 / (2.0 * measured), rtol=1e-9)
 
 
 @covers("noise_equivalent_contrast", "blur_pixels", of=CAMERAS)
@@ -289,7 +301,7 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
     def spread(noise, blur):
         keys = {"errors": "signal", "quantised": False, "noise_equivalent_contrast": noise,
-                "blur_pixels": blur, "elevation_pixels": 9000}  # fmt: skip
+                "blur_pixels": blur, "elevation_pixels": 9000, "glint_share": 0.0}  # fmt: skip
         return columns(kind, "pixels", "azimuth_variance_rad2", "elevation_variance_rad2", **keys)
 
     pixel = math.radians(360.0) / 36000.0
@@ -304,7 +316,8 @@ def test_a_camera_s_errors_grow_with_noise_and_blur(kind):
 
 def test_a_camera_s_false_alarm_errs_like_a_target_of_its_signature():
     """Noise of signature E is E / 0.3 pixels of contrast 1, over a noise of 0.25."""
-    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 9.0}
+    keys = {"errors": "signal", "noise_equivalent_contrast": 0.25, "false_alarms_per_frame": 9.0,
+            "glint_share": 0.0}  # fmt: skip
     run_ = alone("optical.eo", threshold=None, quantised=False, scan_rate_hz=5, **keys)
     found = rows(run_, target=None)
     pixel = math.radians(0.01)

@@ -9,6 +9,8 @@ import pytest
 from covering import covers
 from wired import SENSORS, chain, rows, run, sensor
 
+#: New at every instant.
+WHITE = {"position_correlation_time_s": 0.0, "attitude_correlation_time_s": 0.0}
 OWN = crooked.geodetic(crooked.position(crooked.OWNSHIP))
 ATTITUDE = np.array([crooked.OWNSHIP[f"{name}_deg"] for name in ("yaw", "pitch", "roll")])
 
@@ -52,7 +54,7 @@ def test_the_noise_of_a_position_is_of_its_own_axis(axis):
     sigma = [0.0, 0.0, 0.0]
     sigma[axis] = 8.0
     off = []
-    for row in believed(rate=200, position_noise_m=sigma):
+    for row in believed(rate=200, position_noise_m=sigma, **WHITE):
         own = crooked.geodetic(crooked.position(crooked.OWNSHIP, row["time_s"]))
         place = row["own_lat_deg"], row["own_lon_deg"], row["own_alt_m"]
         off.append(pymap3d.geodetic2ned(*place, *own))
@@ -81,7 +83,7 @@ def test_the_noise_of_an_attitude_is_of_its_own_angle(axis):
     sigma = [0.0, 0.0, 0.0]
     sigma[axis] = 2.0
     by_scan: dict[int, list] = {}
-    for row in believed(rate=100, attitude_noise_deg=sigma):
+    for row in believed(rate=100, attitude_noise_deg=sigma, **WHITE):
         by_scan.setdefault(row["scan"], []).append(row)
     off = []
     for pair in by_scan.values():
@@ -104,7 +106,7 @@ def test_what_is_measured_does_not_depend_on_what_is_believed():
 def test_the_noises_of_position_and_attitude_have_nothing_to_do_with_each_other():
     """Six series of 150 draws: any two correlate by less than a third."""
     by_scan: dict[int, list] = {}
-    noise = {"position_noise_m": [8, 8, 8], "attitude_noise_deg": [2, 2, 2]}
+    noise = {"position_noise_m": [8, 8, 8], "attitude_noise_deg": [2, 2, 2], **WHITE}
     for row in believed(rate=150, **noise):
         by_scan.setdefault(row["scan"], []).append(row)
     errors = []
@@ -116,3 +118,54 @@ def test_the_noises_of_position_and_attitude_have_nothing_to_do_with_each_other(
         errors.append([*pymap3d.geodetic2ned(*place, *own), *wrong])
     correlation = np.corrcoef(np.array(errors).T) - np.eye(6)
     assert np.abs(correlation).max() < 0.33
+
+
+@covers("position_correlation_time_s", "attitude_correlation_time_s", of=("[navigation]",))
+def test_noise_lasts_as_long_as_the_scene_says():
+    """What is left of an error 1 s later is exp(-1 / correlation time) of it."""
+    lasts = {"position_correlation_time_s": 2.0, "attitude_correlation_time_s": 0.5}
+    noise = {"position_noise_m": [0, 0, 5.0], "attitude_noise_deg": [0, 0, 1.0], **lasts}
+    block = sensor("radar.range_boundary", scan_rate_hz=4)
+    still = {"climb_mps": 0.0, "speed_mps": 0.0}
+    scene = chain(
+        {"sensor": block}, navigation=noise, ownship={**crooked.OWNSHIP, **still},
+        targets=[{**crooked.ROLLING, **still}], duration_s=1200,
+    )  # fmt: skip
+    found = rows(run(scene))
+    alt = np.array([row["own_alt_m"] for row in found]) - OWN[2]
+    roll = np.degrees([row["own_roll_rad"] for row in found]) - ATTITUDE[2]
+    for wrong, sigma, lasts_s in ((alt, 5.0, 2.0), (roll, 1.0, 0.5)):
+        # As good as 300 independent numbers, at three deviations and more.
+        assert np.mean(wrong**2) / sigma**2 == pytest.approx(1.0, abs=0.3)
+        for later in (2, 4):
+            left = np.mean(wrong[later:] * wrong[:-later]) / np.mean(wrong**2)
+            assert left == pytest.approx(math.exp(-0.25 * later / lasts_s), abs=0.15)
+
+
+@pytest.mark.parametrize("mount", [{}, {"mount_azimuth_deg": 70.0, "mount_roll_deg": 25.0}])
+def test_variances_have_the_pose_that_navigation_knows(mount):
+    """By brute force: where a place in space lies in body axes for many poses as believed."""
+    noise = {"position_noise_m": [9.0, 4.0, 6.0], "attitude_noise_deg": [1.5, 0.6, 0.9]}
+    stated = {"errors": "stated", "azimuth_error_deg": 0.7, "range_error_m": 3.0,
+              "quantised": False, **mount}  # fmt: skip
+    plain, known = (
+        rows(run(chain({"sensor": sensor("radar.range_boundary", **stated)}, **sections)))
+        for sections in ({}, {"navigation": noise})
+    )
+    draws = np.random.default_rng(8).normal(size=(4000, 6))
+    for before, row in zip(plain, known, strict=True):
+        assert (before["azimuth_rad"], before["range_m"]) == (row["azimuth_rad"], row["range_m"])
+        pose = [row[f"own_{name}_rad"] for name in ("heading", "pitch", "roll")]
+        line = crooked.direction(row["azimuth_rad"], row["elevation_rad"]) * row["range_m"]
+        place = crooked.rotation(*np.degrees(pose)).T @ line
+        found = []
+        for draw in draws:
+            turned = crooked.rotation(*(np.degrees(pose) + draw[3:] * noise["attitude_noise_deg"]))
+            there = turned @ (place + draw[:3] * noise["position_noise_m"])
+            found.append([*crooked.angles(there), np.linalg.norm(there)])
+        spread = np.var(found, axis=0)
+        for name, more in zip(
+            ("azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2"), spread,
+            strict=True,
+        ):  # fmt: skip
+            assert row[name] - before[name] == pytest.approx(more, rel=0.12), name

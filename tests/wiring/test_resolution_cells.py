@@ -195,7 +195,7 @@ def test_noise_fills_the_beams_of_the_field_of_view():
     view = {**VIEW, "azimuth_beamwidth_deg": 5.0, "elevation_beamwidth_deg": 4.0,
             "azimuth_resolution_deg": 0.1}  # fmt: skip
     found = rows(alone("radar.threshold", **view, false_alarms=True, scan_rate_hz=50,
-                       false_alarm_probability=1e-3, duration_s=4), target=None)  # fmt: skip
+                       cell_false_alarm_probability=1e-3, duration_s=4), target=None)  # fmt: skip
     low, high = binom.interval(0.99, 20 * 10 * 30 * 200, 1e-3)
     assert low <= len(found) <= high
 

@@ -103,7 +103,7 @@ def _measured_pairs(
     for pair in pairs:
         console.print(f"{pair.name}: {pair.what} ...", style="dim")
         options = [f"--repeats={repeats or (2 if quick else 5)}", *(["--quick"] if quick else [])]
-        row = _fresh("pairs", [pair.name, *options])
+        row = fresh("pairs", [pair.name, *options])
         low, high = row["times_quartiles"]
         table.add_row(pair.name, f"{row['times']:.3f}", f"{low:.3f}-{high:.3f}", f"{pair.wanted:g}")
         rows.append(row)
@@ -125,7 +125,7 @@ def _measured_rates(
     for rate in rates:
         console.print(f"{rate.name}: {rate.what} ...", style="dim")
         options = [f"--repeats={repeats or (2 if quick else 5)}", *(["--quick"] if quick else [])]
-        row = _fresh("rates", [rate.name, *options])
+        row = fresh("rates", [rate.name, *options])
         table.add_row(rate.name, f"{row['per_s']:,.0f}", f"{rate.wanted:,.0f}")
         rows.append(row)
     console.print(table)
@@ -142,15 +142,15 @@ def _measured_rates(
 def _measured(case: BenchmarkCase, quick: bool, repeats: int) -> dict[str, Any]:
     """Measure times and memory in a fresh process."""
     options = [f"--repeats={repeats}", *(["--quick"] if quick else [])]
-    return _fresh("measure", [case.name, *options])
+    return fresh("measure", [case.name, *options])
 
 
 def _measured_calls(quick: bool, repeats: int) -> dict[str, Any]:
     """Measure calls of the embedding interface in a fresh process."""
-    return _fresh("embedded", [f"--repeats={repeats}", f"--calls={300 if quick else 1800}"])
+    return fresh("embedded", [f"--repeats={repeats}", f"--calls={300 if quick else 1800}"])
 
 
-def _fresh(module: str, arguments: list[str]) -> dict[str, Any]:
+def fresh(module: str, arguments: list[str]) -> dict[str, Any]:
     """Return what a measuring module prints in a process of its own."""
     # -P: no file of the working directory is imported.
     command = [sys.executable, "-P", "-m", f"components.evidence.benchmark.{module}", *arguments]

@@ -104,7 +104,7 @@ def replicas(count: int) -> Callable[[], object]:
 def replicas_all(count: int) -> Callable[[], object]:
     """Return what runs the same replicas with every column, and the truth, recorded to memory."""
     (case,) = chosen_cases(["monte_carlo"])
-    scenes = replicas_of(scene_of(case, quick=False), count)
+    scenes = replicas_of(scene_of(case, quick=False, sets=("record.truth=true",)), count)
 
     def do() -> None:
         for start in range(0, count, _ALL_AT_ONCE):  # what a study would hold at a time

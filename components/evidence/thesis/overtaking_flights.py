@@ -87,7 +87,7 @@ def spread(flights: list[Overtaking]) -> tuple[list[Row], Picture, Columns]:
 
 def _joins_km(file: str, left_m: int, above_m: int) -> float:
     intruder = "blocks.traffic.intruders.overtaking"
-    areas = aircraft(file).eo.model_dump(exclude={"silhouette_table"})
+    areas = aircraft(file).eo.model_dump(exclude={"silhouette_table", "made_for"})
     done = run(
         scene(
             "thesis/fig_4_14",

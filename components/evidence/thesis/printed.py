@@ -67,6 +67,19 @@ PRINTED: dict[str, dict[str, str]] = {
         "literature level head-on king air": "6.7",
         "literature level head-on convair": "7.7",
     },
+    # Table 4.6, square metres; the fighter's front and side are lost.
+    "fig-4.13": {
+        "general_aviation front": "4.6",
+        "general_aviation back": "4.6",
+        "general_aviation side": "6",
+        "general_aviation horizontal": "35.52",
+        "small_fighter back": "14",
+        "small_fighter horizontal": "37.16",
+        "commercial_transport front": "32.5",
+        "commercial_transport back": "65",
+        "commercial_transport side": "110",
+        "commercial_transport horizontal": "353",
+    },
     # §4.4: 5100 m.
     "fig-4.14": {"joins_km": "5.1"},
     # Half widths, Tables 2.2, 2.5 and 2.6.
@@ -85,6 +98,10 @@ PRINTED: dict[str, dict[str, str]] = {
         "alarms_high": "0.01",
         "first_small_nm": "5.5",
         "first_large_nm": "7.4",
+        "declared_small_nm": "3.9",
+        "declared_large_nm": "4.9",
+        "pd_near": "100",
+        "pd_far": "90",
         "runs": "100",
         "eo_km": "3",
         "power_line": "-20",

@@ -110,7 +110,7 @@ def _comparisons(file: str) -> list[RotationComparison]:
 
 
 def _silhouette(file: str, model: str) -> Silhouette:
-    areas = aircraft(file).eo.model_dump(exclude={"silhouette_table"})
+    areas = aircraft(file).eo.model_dump(exclude={"silhouette_table", "made_for"})
     return lambda *view: visible_area(*view, **areas, model=model)
 
 

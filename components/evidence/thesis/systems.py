@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from components.aircraft.rcs_table import dbsm_to_m2
-from components.evidence.thesis import tecvol
+from components.evidence.thesis import eo_ranges, tecvol
 from components.evidence.thesis.basis import Basis, configured, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREEN, GREY, ORANGE, SKY, panels
@@ -14,6 +14,7 @@ from components.evidence.thesis.project_files import radar, table
 from components.evidence.thesis.radar_range import NAUTICAL_MILE_KM
 from components.evidence.thesis.row import Row
 from components.evidence.thesis.scene_run import SceneRun, run, scene
+from components.optical.detection import detection_probability
 from components.radar.link_budget import detection_range
 
 #: Scene in ``configs/systems`` → the project and its sensor in Table 2.4.
@@ -44,6 +45,12 @@ def _shown(target: str) -> str:
     return made_by_name.get(target, target.replace("_", " "))
 
 
+_WITHOUT_ROW = (
+    "",
+    "Without a row: Table 2.1 (strengths and weaknesses in words) and the CDTI's pictures (Fig. "
+    "4.15 and 4.16) print no number; PaRCA's range errors (40 %, about 10 % after its manoeuvres) "
+    "need passive ranging, which the project does not have: its cameras measure no range.",
+)
 _COLOURS = (BLUE, ORANGE, GREEN, SKY, GREY, "#CC79A7")
 
 
@@ -92,7 +99,7 @@ def make() -> Made:
         rows,
         [Picture("table_2_4", caption, draw), errors],
         {"table_2_4": data, "table_2_4_tecvol": errors_data},
-        note="\n".join(lines),
+        note="\n".join([*lines, *_WITHOUT_ROW]),
     )
 
 
@@ -145,7 +152,47 @@ def _afrl(runs: dict[str, SceneRun], first: dict[str, float]) -> list[Row]:
         Row("AFRL, first detection of the large aircraft", first["convair"] / NAUTICAL_MILE_KM,
             "NM", f"Printed of the flight tests. {why}", printed("table-2.4", "first_large_nm"),
             None, contrast, seen),
+        *_declarations(runs["afrl"]),
     ]  # fmt: skip
+
+
+#: A Beech Bonanza from the nose: 10.0 m² in be35.csv of mit-ll/degas-surveillance-jwandrews.
+BONANZA_M2 = 10.0
+
+
+def _declarations(done: SceneRun) -> list[Row]:
+    """Return where the cameras' Pd is 0.9, and that of the earlier study's Bonanza at 3 NM."""
+    camera = done.simulation.components["centre"]
+    found = camera.detector
+    weight_m2 = camera.p.static_weight / (camera.pixel_azimuth_rad * camera.pixel_elevation_rad)
+    nine_of_ten = found.threshold + 1.2815515655446004 * found.noise
+    unsaid = "the thesis does not say what declares; this is where nine looks of ten detect"
+    rows = []
+    for cell, name, area_m2 in (
+        ("declared_small_nm", "small", eo_ranges.KING_AIR_M2["Level head-on"]),
+        ("declared_large_nm", "large", 90.0),
+    ):
+        reached_km = (weight_m2 * area_m2 / nine_of_ten) ** 0.5 / 1000.0
+        rows.append(
+            Row(f"AFRL, declaration of the {name} aircraft: Pd 0.9", reached_km / NAUTICAL_MILE_KM,
+                "NM", f"Head-on, {area_m2:.1f} m², P = 1.", printed("table-2.4", cell), None,
+                unsaid,
+                predicted("P = 1, and noise by 0.01 % of false alarms a frame",
+                          "systems/afrl.toml:blocks.centre.static_weight",
+                          "systems/afrl.toml:blocks.centre.false_alarms_per_frame"))
+        )  # fmt: skip
+    other = "another camera, on a helicopter, whose pixels are not printed; it saw motion, not size"
+    for cell, distance_nm in (("pd_near", 2.0), ("pd_far", 3.5)):
+        signature = weight_m2 * BONANZA_M2 / (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2
+        pd = detection_probability(signature, found.threshold, found.noise)
+        rows.append(
+            Row(f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd),
+                "%", "Printed of an earlier study: 100 % below 3 NM, 90 % beyond.",
+                printed("table-2.4", cell), None, other,
+                predicted("the flight tests' camera", "systems:BONANZA_M2",
+                          "systems/afrl.toml:blocks.centre.static_weight"))
+        )  # fmt: skip
+    return rows
 
 
 def _smart_uav() -> list[Row]:

@@ -1,0 +1,146 @@
+"""Glint and wander of the centroid as an effect: where a target seems to be on itself.
+
+An echo's or a picture's centre is not the aircraft's: it wanders over it, and beyond its edges now
+and then, as the phases of its scatterers or the light on it change with the aspect.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.known_targets import known_targets
+from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
+from components.sensor.look import Cells
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.gauss_markov import GaussMarkov
+
+Place = tuple[FloatArray, FloatArray, FloatArray]
+# Nearer to the vertical azimuths say nothing.
+_LEAST_COS = 1e-3
+
+
+class Glint(Effect):
+    """Targets seem to be where their centre of reflection is, which wanders over their extent.
+
+    Along each of a target's own axes the centre is off by a Gauss-Markov process whose standard
+    deviation is ``glint_share`` of the target's extent; so the error across the line of sight is
+    that share of the extent that the sensor sees, over the range, and along it a range's. A sensor
+    does not know whom it sees: what it states is that of the scene's aircraft on average, level
+    and from any side, at the range, or of the size, that it measures.
+    """
+
+    lockstep = True
+    name = "glint"
+    acts_on = "apparent place"
+    neutral = False
+    outside_the_proof = "every target has an extent"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``errors`` and ``glint_share``."""
+        share = getattr(block.p, "glint_share", None)
+        if share is None:
+            return Verdict(False, "its errors do not follow from signals")
+        if block.p.errors != "signal":
+            return Verdict(False, f"errors is {block.p.errors!r}")
+        return Verdict(share > 0.0, f"glint_share is {share:g}")
+
+    def build(self, block: Any) -> "Wander":
+        """Return what moves targets to where they seem to be."""
+        return Wander(block)
+
+
+class Wander:
+    """Moves lines of sight, and says by how much they are uncertain.
+
+    Parameters
+    ----------
+    block : Sensor
+    """
+
+    def __init__(self, block: Any) -> None:
+        self._share = block.p.glint_share
+        self._process = GaussMarkov(block.stream("glint"), block.p.glint_correlation_time_s)
+        rosters = known_targets(block.context) or [Roster.of([("", Aircraft())])]
+        length2, span2, height2 = np.mean(
+            np.concatenate([roster.extents_m for roster in rosters]) ** 2, axis=0
+        ).tolist()
+        #: Mean squares of the extent across and along a level line of sight, and upward, m².
+        self._level2, self._upward2 = 0.5 * (length2 + span2), height2
+
+    def __call__(
+        self,
+        cells: Cells,
+        found: IntArray,
+        azimuth_rad: FloatArray,
+        elevation_rad: FloatArray,
+        range_m: FloatArray,
+    ) -> Place:
+        """Return where some cells' targets seem to be, in body axes.
+
+        Parameters
+        ----------
+        cells : Cells
+        found : (n,) of int
+        azimuth_rad, elevation_rad, range_m : (n,)
+            Where they are.
+        """
+        keys = cells.roster.keys_of(cells.target[found])
+        when, replica = cells.instant_ns[found], cells.replica[found]
+        extent_m = cells.roster.extents_m[cells.craft[found]]
+        length_m, span_m, height_m = (
+            self._share * extent_m[:, axis] * self._process(keys, when, axis, replica)
+            for axis in range(3)
+        )
+        heading = cells.azimuth_rad[found] + cells.relative_heading_rad[found]
+        north_east_down = body_to_ned(
+            length_m,
+            span_m,
+            height_m,
+            heading,
+            cells.target_pitch_rad[found],
+            cells.target_roll_rad[found],
+        )
+        yaw, pitch, roll = (angle[found] for angle in cells.own_attitude)
+        off = ned_to_body(*north_east_down, yaw, pitch, roll)
+        along = unit_vector(azimuth_rad, elevation_rad)
+        x, y, z = (range_m * to + by for to, by in zip(along, off, strict=True))
+        azimuth, elevation = body_angles(x, y, z)
+        return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
+
+    def variances(
+        self,
+        values: Mapping[str, FloatArray],
+        signal: Mapping[str, FloatArray],
+        pixel_rad: tuple[float, float] | None,
+    ) -> dict[str, FloatArray]:
+        """Return what wander adds to the variances, by quantity, in the sensor's axes.
+
+        Parameters
+        ----------
+        values : mapping of (n,)
+            What is measured.
+        signal : mapping of (n,)
+            As in `Look.signal`.
+        pixel_rad : (width, height), or None
+            Of a sensor that measures a target's size instead of its range.
+        """
+        share2 = self._share**2
+        level = np.maximum(np.cos(values["elevation"]), _LEAST_COS)
+        if pixel_rad is None:
+            over2 = values["range"] ** 2
+            added = {
+                "azimuth": share2 * self._level2 / (over2 * level**2),
+                "elevation": share2 * self._upward2 / over2,
+                "range": np.full(len(over2), share2 * self._level2),
+            }
+            return added
+        # An ellipse of so many pixels, as wide and as high as an aircraft of the scene.
+        solid = 4.0 / np.pi * signal["pixels"] * pixel_rad[0] * pixel_rad[1]
+        shape = float(np.sqrt(self._level2 / self._upward2))
+        return {
+            "azimuth": share2 * solid * shape / level**2,
+            "elevation": share2 * solid / shape,
+        }
