@@ -5,8 +5,8 @@ elevation upward.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -116,8 +116,9 @@ class SensorOffer:
     lasting : mapping of LastingError, or None
         What of its errors lasts from look to look, by quantity (``azimuth``, ``elevation``,
         ``range``, ``range_rate``), those without are new at every look; None where it does not say.
-    clock : ClockSpec or None
-        When it looks.
+    clock : callable or None
+        Returns when it looks. Asked only where it matters, and no part of the word that replicas
+        compare: whoever reads clocks that differ cannot be shared by them.
     latest_s, jitter_s : Fraction
         How late its looks come at most to whom a fusion offers them, and how much of that is by
         chance; None where nobody says.
@@ -135,7 +136,7 @@ class SensorOffer:
     reach: Reach | None = None
     folds_range_rate: bool = False
     lasting: Mapping[str, LastingError] | None = None
-    clock: ClockSpec | None = None
+    clock: Callable[[], ClockSpec] | None = field(default=None, compare=False)
     latest_s: Fraction | None = None
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False

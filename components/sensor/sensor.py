@@ -123,7 +123,7 @@ class Sensor(Measuring):
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
-            lasting=lasting, clock=self.p.clock_spec(), **constant,
+            lasting=lasting, clock=self.p.clock_spec, **constant,
         )  # fmt: skip
 
     @cached_property

@@ -56,7 +56,7 @@ def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -
         come, or by which clock they look, are left out.
     """
     said = {
-        name: (o.clock, o.latest_s, o.jitter_s)
+        name: (o.clock(), o.latest_s, o.jitter_s)
         for name, o in sorted(offers.items())
         if isinstance(o, SensorOffer) and o.clock is not None and o.latest_s is not None
     }

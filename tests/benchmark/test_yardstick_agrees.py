@@ -37,3 +37,14 @@ def test_yardstick_finds_the_same(case):
     for key, (azimuth, elevation) in found.items():
         assert plain.detections[key][:2] == pytest.approx((azimuth, elevation), abs=1e-9)
     assert plain.fused == tables["fused"].num_rows
+
+
+def test_the_replicas_of_the_benchmark_run_together_and_share_their_blocks():
+    """With other phases of three clocks; no truth is recorded of so many."""
+    from components.evidence.benchmark.cases import chosen, replicas_of, scene_of
+    from dsa_des.replicas.lockstep import lock_step
+
+    (case,) = chosen(["monte_carlo"])
+    scene = scene_of(case, quick=False, duration_s="2")
+    simulation = lock_step(replicas_of(scene, 3))
+    assert not simulation.timeline.split

@@ -94,3 +94,30 @@ def test_a_coordinated_turn_has_its_bank_and_keeps_its_height() -> None:
         euler = fly_euler(np.array([2e3]), np.array([250.0]), *commands(60, 0.0, 20.0, rate_deg))
         assert euler.bank_rad[5, 0] == pytest.approx(bank)
         assert np.sin(euler.pitch_rad[5, 0]) == pytest.approx(20.0 / 250.0)
+
+
+def test_rates_are_those_of_a_coordinated_body_in_any_attitude() -> None:
+    """From the recorded angles back to body rates: r is gravity's, p and q keep their limits."""
+    random = np.random.default_rng(4)
+    climb = np.repeat(random.normal(0.0, 30.0, (5, 40)), 5, axis=0)
+    turn = np.repeat(random.normal(0.0, 0.06, (5, 40)), 5, axis=0)
+    own = np.radians(217.0)
+    flown = fly_point_mass(np.full(40, 5e3), np.full(40, 220.0), climb * 0.0, climb, turn, own)
+    v, theta, phi, psi = (
+        x[:-1] for x in (flown.speed_ft_s, flown.pitch_rad, flown.bank_rad, flown.heading_rad)
+    )
+    pitching, rolling, turning = (
+        np.diff(x, axis=0) / 0.1 for x in (flown.pitch_rad, flown.bank_rad, flown.heading_rad)
+    )
+    r = turning * np.cos(theta) * np.cos(phi) - pitching * np.sin(phi)
+    q = pitching * np.cos(phi) + turning * np.cos(theta) * np.sin(phi)
+    p = rolling - turning * np.sin(theta)
+    assert r == pytest.approx(32.2 * np.sin(phi) * np.cos(theta) / v, abs=1e-9)
+    assert np.degrees(np.abs(q)).max() == pytest.approx(3.0)
+    assert np.abs(p).max() == pytest.approx(0.524)
+    assert psi[0] == pytest.approx(own)
+    for place, way in ((flown.north_ft, np.cos(psi)), (flown.east_ft, np.sin(psi))):
+        assert np.diff(place, axis=0) == pytest.approx(0.1 * v * np.cos(theta) * way)
+    euler = fly_euler(np.full(40, 5e3), np.full(40, 220.0), climb * 0.0, climb, turn, own)
+    assert euler.north_ft[1] == pytest.approx(220.0 * np.cos(own))
+    assert euler.east_ft[1] == pytest.approx(220.0 * np.sin(own))

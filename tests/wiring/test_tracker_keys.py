@@ -213,7 +213,8 @@ def test_models_are_those_that_are_named():
 def test_a_model_that_is_never_entered_fades_away():
     never = turning(transition_rates_per_s=[[0.0, 0.0], [5.0, 0.0]])[-1]
     often = turning(transition_rates_per_s=[[0.0, 5.0], [0.0, 0.0]])[-1]
-    assert never["probability_turn"] < 0.01 < 0.99 < often["probability_turn"]
+    # Looks on a grid tell less: what is never entered fades more slowly.
+    assert never["probability_turn"] < 0.03 < 0.97 < often["probability_turn"]
 
 
 @covers("start_turn_deg_s", "turn_rate_intensity_deg2_s3", "turn_acceleration_intensity_m2_s3",
