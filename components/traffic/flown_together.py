@@ -19,7 +19,7 @@ from components.messages.targets import TrafficStates
 from components.traffic.near_intervals import NearIntervals, near_intervals
 from components.traffic.own_flights import OwnFlights
 from components.traffic.row_flights import AskedFlights, RowFlights
-from components.traffic.steered_culling import closing_speeds_mps, epochs_of
+from components.traffic.steered_culling import closing_speeds_mps, epochs_of, within_of
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -111,6 +111,10 @@ class FlownTogether:
             own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m,
             validate=False,
         )[2]  # fmt: skip
+
+    def fastest_by(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return the largest speed that ownships (n,) were told to fly by times (n,), or 0."""
+        return self._own.fastest_by(ownship, time_s)
 
     def run(self, wake: Wake) -> TrafficStates:
         """Return the state of all aircraft of each row's replica."""
@@ -223,11 +227,12 @@ class _Epochs:
     def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
         self._flights, self._width = flights, width
         replicas = len(flown.own_speed_mps)
-        speeds = flown.target_speed_mps.reshape(replicas, width)
-        closing = closing_speeds_mps(speeds, flown.own_speed_mps[:, np.newaxis])
-        self._epoch_s, self._within_m = epochs_of(closing, reach_m)
+        self._speeds_mps = flown.target_speed_mps.reshape(replicas, width)
+        self._own_mps, self._reach_m = flown.own_speed_mps, reach_m
+        closing = closing_speeds_mps(self._speeds_mps, flown.own_speed_mps[:, np.newaxis])
+        self._epoch_s = epochs_of(closing, reach_m)
         self._last: IntArray = np.full(replicas, -1, dtype=np.int64)
-        self._near: BoolArray = np.zeros((replicas, width), dtype=bool)
+        self._range_m: FloatArray = np.zeros((replicas, width))
 
     def forget(self, ownship: IntArray) -> None:
         """Take note that ownships fly on otherwise than was known."""
@@ -236,17 +241,20 @@ class _Epochs:
     def near(self, replica: IntArray, time_s: FloatArray) -> BoolArray:
         """Return which targets may be in reach at each row, (rows, width)."""
         epoch = np.floor(time_s / self._epoch_s[replica]).astype(np.int64)
+        fastest = np.maximum(self._flights.fastest_by(replica, time_s), self._own_mps[replica])
         begins = np.ones(len(replica), dtype=bool)
         begins[1:] = (replica[1:] != replica[:-1]) | (epoch[1:] != epoch[:-1])
+        begins[1:] |= fastest[1:] != fastest[:-1]
         first = np.flatnonzero(begins)
         of, number = replica[first], epoch[first]
-        found = self._near[of]
+        found = self._range_m[of]
         new = np.flatnonzero(self._last[of] != number)
         if len(new):
             ownship = np.repeat(of[new], self._width)
             target = (of[new][:, np.newaxis] * self._width + np.arange(self._width)).reshape(-1)
             start_s = np.repeat(number[new] * self._epoch_s[of[new]], self._width)
-            range_m = self._flights.range_m(ownship, target, start_s).reshape(len(new), -1)
-            found[new] = range_m <= self._within_m[of[new]]
-        self._last[of], self._near[of] = number, found
-        return found[np.cumsum(begins) - 1]
+            found[new] = self._flights.range_m(ownship, target, start_s).reshape(len(new), -1)
+        self._last[of], self._range_m[of] = number, found
+        closing = closing_speeds_mps(self._speeds_mps[of], fastest[first][:, np.newaxis])
+        near = found <= within_of(closing, self._reach_m, self._epoch_s[of][:, np.newaxis])
+        return np.asarray(near[np.cumsum(begins) - 1])

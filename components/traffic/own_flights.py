@@ -103,6 +103,14 @@ class OwnFlights:
             columns.append(column)
         return TrajectoryState(*columns)
 
+    def fastest_by(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
+        if not self._flown:
+            return np.zeros(len(ownship))
+        speeds = np.array([part.max_speed_mps for part in self._flown])[self._part[ownship]]
+        begun = self._start_s[ownship] <= time_s[:, np.newaxis]
+        return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
+
     def steer(self, ownship: IntArray, time_s: FloatArray, told: Sequence[Manoeuvre]) -> None:
         """Let ownships fly manoeuvres from times on.
 

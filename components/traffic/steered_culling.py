@@ -18,7 +18,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 # An epoch lasts until the fastest target can have come nearer by this part of the reach.
 _DRIFT_SHARE = 0.25
 SHORTEST_EPOCH_S = 1.0
-# Steering keeps the speed to 1e-4; what the ownship flies may be this much faster at most.
+# Steering keeps the speed to 1e-4 unless another one is told.
 _OWN_SPEED_MARGIN = 1.05
 _SPEED_MARGIN = 1.001
 # Targets are placed for so many epochs at once that it takes about this many cells.
@@ -32,22 +32,15 @@ def closing_speeds_mps(targets_mps: FloatArray, own_mps: Any) -> FloatArray:
     return closing
 
 
-def epochs_of(closing_mps: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return how long an epoch lasts around each ownship, and how near counts at its start.
-
-    Parameters
-    ----------
-    closing_mps : (ownships, targets)
-    reach_m : float
-
-    Returns
-    -------
-    epoch_s : (ownships,)
-    within_m : (ownships, targets)
-    """
+def epochs_of(closing_mps: FloatArray, reach_m: float) -> FloatArray:
+    """Return how long an epoch lasts around each ownship, of closing speeds (ownships, targets)."""
     fastest = np.maximum(closing_mps.max(axis=1, initial=0.0), 1e-3)
-    epoch_s = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
-    return epoch_s, reach_m + closing_mps * epoch_s[:, np.newaxis] + _RANGE_MARGIN_M
+    return np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
+
+
+def within_of(closing_mps: FloatArray, reach_m: float, epoch_s: Any) -> FloatArray:
+    """Return how near at the start of an epoch counts for who closes in so fast."""
+    return np.asarray(reach_m + closing_mps * epoch_s + _RANGE_MARGIN_M)
 
 
 class SteeredCulling:
@@ -56,7 +49,7 @@ class SteeredCulling:
     Parameters
     ----------
     own_speed_mps : float
-        Largest speed of the ownship.
+        Largest speed of the ownship before it is steered.
     targets : sequence of objects with `max_speed_mps`
     fleet : object with `at(time_s)` and `subset(columns)`
         All targets.
@@ -68,11 +61,11 @@ class SteeredCulling:
         self, own_speed_mps: float, targets: Sequence[Any], fleet: Any, reach_m: float
     ) -> None:
         self.reach_m, self._fleet = reach_m, fleet
-        closing = closing_speeds_mps(max_speeds_mps(targets), own_speed_mps)
-        epoch_s, within_m = epochs_of(closing[np.newaxis], reach_m)
-        self.epoch_s, self._within_m = float(epoch_s[0]), within_m[0]
-        #: By number of the epoch, for one path of the ownship.
-        self._near: dict[int, BoolArray] = {}
+        self._speeds_mps, self._own_mps = max_speeds_mps(targets), own_speed_mps
+        closing = closing_speeds_mps(self._speeds_mps, own_speed_mps)
+        self.epoch_s = float(epochs_of(closing[np.newaxis], reach_m)[0])
+        #: Ranges at the start of an epoch by its number, for one path of the ownship.
+        self._range_m: dict[int, FloatArray] = {}
         self._own: Any = None
         #: Where all targets are at the starts of some epochs, from the first of them on.
         self._placed: tuple[int, Any] | None = None
@@ -84,7 +77,7 @@ class SteeredCulling:
 
         Parameters
         ----------
-        own : object with `at(time_s)`
+        own : SteeredFlight
             The path of the ownship as it is now; another object after every manoeuvre.
         time_s : (rows,)
 
@@ -100,17 +93,23 @@ class SteeredCulling:
             At which times they may be.
         """
         if own is not self._own:
-            self._own, self._near = own, {}
-        epochs, of_row = np.unique(np.floor(time_s / self.epoch_s), return_inverse=True)
-        numbers = epochs.astype(np.int64).tolist()
-        new = [number for number in numbers if number not in self._near]
+            self._own, self._range_m = own, {}
+        # By a row's own instant the ownship may have been told to fly faster.
+        fastest = np.maximum(own.fastest_by(time_s), self._own_mps)
+        of_rows = np.stack([np.floor(time_s / self.epoch_s), fastest])
+        pairs, of_row = np.unique(of_rows, axis=1, return_inverse=True)
+        of_row = of_row.reshape(-1)
+        numbers = pairs[0].astype(np.int64).tolist()
+        new = sorted({number for number in numbers if number not in self._range_m})
         # One call for the rows and the epochs: a steered flight has many parts to go through.
         both = own.at(np.concatenate([time_s, np.array(new) * self.epoch_s]))
         rows = len(time_s)
         state = TrajectoryState(*(values[:rows] for values in both.arrays()))
         here = [both.lat_deg[rows:], both.lon_deg[rows:], both.alt_m[rows:]]
         self._learn(np.array(new, dtype=np.int64), here)
-        near = np.array([self._near[number] for number in numbers])
+        closing = closing_speeds_mps(self._speeds_mps, pairs[1][:, np.newaxis])
+        within_m = within_of(closing, self.reach_m, self.epoch_s)
+        near = np.array([self._range_m[number] for number in numbers]) <= within_m
         columns = np.flatnonzero(near.any(axis=0))
         if not np.array_equal(columns, self._last[0]):
             self._last = columns, self._fleet.subset(columns)
@@ -132,5 +131,5 @@ class SteeredCulling:
                 others.lat_deg[row], others.lon_deg[row], others.alt_m[row],
                 validate=False,
             )  # fmt: skip
-            self._near.update(zip(epochs[:known].tolist(), range_m <= self._within_m, strict=True))
+            self._range_m.update(zip(epochs[:known].tolist(), range_m, strict=True))
             epochs, here = epochs[known:], [values[known:] for values in here]

@@ -66,6 +66,12 @@ class SteeredFlight:
         """Largest speed along the path as it is now."""
         return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
 
+    def fastest_by(self, time_s: FloatArray) -> FloatArray:
+        """Return the largest speed of any manoeuvre that has begun by each of some times, or 0."""
+        speeds = [0.0, *(flight.max_speed_mps for _, flight in self.parts)]
+        part = np.searchsorted([start for start, _ in self.parts], time_s, side="right")
+        return np.asarray(np.maximum.accumulate(speeds)[part])
+
     def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
         """Return the flight that does as it is told from a time on, beside what it still does.
 

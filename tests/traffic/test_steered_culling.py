@@ -94,3 +94,30 @@ def test_leaving_out_changes_nothing_but_the_counts():
     for tables in (planned, whole):
         total = sum(np.array(tables["scans"][c]) for c in [*counts, "evaluated"])
         assert (total == 100).all()
+
+
+def test_whoever_comes_in_reach_of_an_ownship_that_was_told_to_fly_faster_is_near():
+    """Four times as fast as it was: 40 of some 1,900 were left out by its speed at the start."""
+    left_out = in_reach = 0
+    for seed in range(6):
+        draw = np.random.default_rng(seed)
+        targets = [
+            flight(f"t{i}", 52 + draw.uniform(-0.4, 0.4), 4 + draw.uniform(-0.6, 0.6),
+                   draw.uniform(0, 360), draw.uniform(0, 60))
+            for i in range(200)
+        ]  # fmt: skip
+        fleet, own = ScriptedFleet(targets), SteeredFlight(flight("own", 52.0, 4.0, 20.0, 40.0))
+        culling = SteeredCulling(own.max_speed_mps, targets, fleet, 3000.0)
+        own = own.steered(5.0, Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0))
+        times = np.arange(6.0, 200.0, 0.5)
+        _, columns, _, near = culling.cut(own, times)
+        here, there = own.at(times), fleet.at(times)
+        _, _, range_m = line_of_sight(
+            here.lat_deg[:, None], here.lon_deg[:, None], here.alt_m[:, None],
+            there.lat_deg, there.lon_deg, there.alt_m,
+        )  # fmt: skip
+        whole = np.zeros(range_m.shape, dtype=bool)
+        whole[:, columns] = near
+        left_out += (~whole & (range_m <= 3000.0)).sum()
+        in_reach += (range_m <= 3000.0).sum()
+    assert in_reach > 1000 and left_out == 0
