@@ -36,7 +36,10 @@ class Listener(Recorder):
 
 
 def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, float]) -> Path:
-    """Write a random scene with a 1° radar: any latitude, own manoeuvres, one to five targets."""
+    """Write a random scene with a 1° radar: any latitude, own manoeuvres, one to five targets.
+
+    Cameras have no noise: for their Pd no bound is proven, so a budget of Pd keeps the reference.
+    """
     draw = Random(seed)
     turn = f'legs = [{{ kind = "turn", rate_deg_s = {draw.choice([-3.0, -0.5, 1.0, 2.5])} }}]'
     lat = draw.uniform(-75, 75) if draw.random() < 0.9 else draw.choice([-89.95, 88.0, 85.0, 90.0])
@@ -55,8 +58,10 @@ def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, flo
         f"swerling = {draw.choice([0, 1, 3])}",
         "[blocks.eo]",
         f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
+        "noise_equivalent_contrast = 0",
         "[blocks.ir]",
         f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
+        "noise_equivalent_contrast = 0",
         "[blocks.traffic]",
         'type = "traffic.scripted"',
         f"ownship = {{ lat_deg = {lat}, lon_deg = {draw.uniform(-180, 180)}, alt_m = {alt}, "
