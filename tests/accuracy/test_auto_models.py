@@ -163,8 +163,14 @@ def test_a_named_cheap_model_stays(configs: Path) -> None:
         (["blocks.eo.dynamic_weight=0.1"], "eo weighs the line of sight's rate"),
         (["blocks.radar.measures_range_rate=true"], "radar measures range rates"),
         (["accuracy.detection_probability=0.1"], "no bound is proven for the Pd of eo"),
-        (["accuracy.detection_probability=1e-9", "blocks.eo.noise_equivalent_contrast=0",
-          "blocks.ir.noise_equivalent_contrast=0"], "could change a Pd by more than [accuracy]"),
+        (
+            [
+                "accuracy.detection_probability=1e-9",
+                "blocks.eo.noise_equivalent_contrast=0",
+                "blocks.ir.noise_equivalent_contrast=0",
+            ],
+            "could change a Pd by more than [accuracy]",
+        ),
     ],
 )
 def test_what_keeps_the_exact_model(configs: Path, sets: list[str], because: str) -> None:
