@@ -38,7 +38,7 @@ class Listener(Recorder):
 def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, float]) -> Path:
     """Write a random scene with a 1° radar: any latitude, own manoeuvres, one to five targets.
 
-    Cameras have no noise: for their Pd no bound is proven, so a budget of Pd keeps the reference.
+    Its cameras have no noise: no bound is proven for the Pd of others.
     """
     draw = Random(seed)
     turn = f'legs = [{{ kind = "turn", rate_deg_s = {draw.choice([-3.0, -0.5, 1.0, 2.5])} }}]'
@@ -57,11 +57,11 @@ def write_scene(folder: Path, seed: int, transform: str, accuracy: dict[str, flo
         f"range_km = {draw.uniform(3, 20)}",
         f"swerling = {draw.choice([0, 1, 3])}",
         "[blocks.eo]",
-        f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
         "noise_equivalent_contrast = 0",
+        f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
         "[blocks.ir]",
-        f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
         "noise_equivalent_contrast = 0",
+        f"scan_rate_hz = 0.5\nenabled = {str(draw.random() < 0.5).lower()}",
         "[blocks.traffic]",
         'type = "traffic.scripted"',
         f"ownship = {{ lat_deg = {lat}, lon_deg = {draw.uniform(-180, 180)}, alt_m = {alt}, "
