@@ -11,7 +11,7 @@ import threading
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import Server, ServerConnection, serve
@@ -188,7 +188,7 @@ class DisplayServer:
                 compression=None,
                 server_header=None,
                 logger=quiet,
-                create_connection=limit.connection,
+                create_connection=cast(type[ServerConnection], limit.connection),
                 ping_interval=10,
                 ping_timeout=20,
                 close_timeout=1,

@@ -124,6 +124,7 @@ def explained(configs: Path, *sets: str) -> list[str]:
 
 
 AUTO = "blocks.transform.model=auto"
+NO_NOISE = [f"blocks.{camera}.noise_equivalent_contrast=0" for camera in ("eo", "ir")]
 
 
 def test_without_accuracy_nothing_approximate_is_used(configs: Path) -> None:
@@ -162,7 +163,11 @@ def test_a_named_cheap_model_stays(configs: Path) -> None:
     [
         (["blocks.eo.dynamic_weight=0.1"], "eo weighs the line of sight's rate"),
         (["blocks.radar.measures_range_rate=true"], "radar measures range rates"),
-        (["accuracy.detection_probability=1e-9"], "could change a Pd by more than [accuracy]"),
+        (["accuracy.detection_probability=0.1"], "no bound is proven for the Pd of eo"),
+        (
+            ["accuracy.detection_probability=1e-9", *NO_NOISE],
+            "could change a Pd by more than [accuracy]",
+        ),
     ],
 )
 def test_what_keeps_the_exact_model(configs: Path, sets: list[str], because: str) -> None:
@@ -202,7 +207,7 @@ def test_auto_pd_says_why_and_contradicts_a_named_method(configs: Path) -> None:
 def test_auto_camera_stays_and_says_so(configs: Path) -> None:
     scene = load_scene(configs / "first_light.toml", sets=["blocks.eo.model=auto"])
     said = Simulation(scene).components["eo"].left_out()
-    assert said[-1].startswith("silhouette: exact, as the scene says: for no other model")
+    assert said[-1].startswith("silhouette: convex_hull, as the scene says: for no other")
 
 
 def test_the_command_explains(configs: Path) -> None:

@@ -10,6 +10,8 @@ from wired import SENSORS, chain
 
 import dsa_des
 from dsa_des.embed import Simulator
+from dsa_des.running.simulation import Simulation
+from dsa_des.running.warnings import warnings_of
 
 AREAS = {"front_m2": 4.0, "side_m2": 0.0, "horizontal_m2": 0.0}
 WARM = {**AREAS, "back_m2": 4.0}
@@ -89,6 +91,25 @@ def test_bodies_engines_and_paint_by_the_attitude_that_the_host_gives():
     assert grown["warm"] == 1.0
     painted = changed(paint_reflectance=0.0)
     assert painted["lit"] > 1.0 and painted["eye"] == 1.0
+
+
+@covers("eo.made_for", "ir.made_for", of=("traffic.host.planes",))
+def test_areas_that_were_fitted_for_another_silhouette_are_spoken_of():
+    fitted = {"eo": {**AREAS, "made_for": "convex_hull"}, "ir": {**WARM, "made_for": "convex_hull"}}
+    cameras = {name: CLOCKED[name] for name in ("eye", "warm")}
+    for keys, silhouettes, told in (
+        (fitted, ("exact", "convex_hull"), {"eye"}), (fitted, ("convex_hull", "exact"), {"warm"}),
+        ({"eo": fitted["eo"]}, ("thesis", "thesis"), {"eye"}), ({}, ("exact", "exact"), set()),
+    ):  # fmt: skip
+        sensors = {
+            name: {**camera, "silhouette": silhouette}
+            for (name, camera), silhouette in zip(cameras.items(), silhouettes, strict=True)
+        }
+        scene = chain(sensors, fusion={"type": "fusion.pick_best"})
+        scene["blocks"]["traffic"] = {"type": "traffic.host", "planes": [{**BASE, **keys}]}
+        said = [line for line in warnings_of(Simulation(dsa_des.load_scene(scene)))
+                if "'one' were fitted for silhouette 'convex_hull'" in line]  # fmt: skip
+        assert {line.split(":")[0].removeprefix("blocks.") for line in said} == told
 
 
 @covers("rcs_table", "eo.silhouette_table", "ir.silhouette_table", of=("traffic.host.planes",))

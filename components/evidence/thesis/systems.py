@@ -1,6 +1,7 @@
 """Table 2.4: the systems of the literature as scenes, and what each detects first, and where."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -162,7 +163,7 @@ BONANZA_M2 = 10.0
 
 def _declarations(done: SceneRun) -> list[Row]:
     """Return where the cameras' Pd is 0.9, and that of the earlier study's Bonanza at 3 NM."""
-    camera = done.simulation.components["centre"]
+    camera: Any = done.simulation.components["centre"]
     found = camera.detector
     weight_m2 = camera.p.static_weight / (camera.pixel_azimuth_rad * camera.pixel_elevation_rad)
     nine_of_ten = found.threshold + 1.2815515655446004 * found.noise
