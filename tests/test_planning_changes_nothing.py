@@ -119,7 +119,7 @@ def test_simulating_everything_for_many_aircraft_gives_the_same_bytes(
         ["blocks.radar.latency_s=0.3", "blocks.radar.beam_sweep=true"],
         [
             "blocks.radar.false_alarms=true",
-            "blocks.radar.cell_false_alarm_probability=1e-6",
+            "blocks.radar.false_alarm_probability=1e-6",
             "navigation.attitude_bias_deg=[1, 2, 3]",
         ],
     ],

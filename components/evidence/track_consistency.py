@@ -259,7 +259,8 @@ def drawn_flights(path: Path, model: Motion, number: int) -> None:
     state[:2] = 5000.0 * np.stack([np.cos(around), np.sin(around)])
     state[2] = -rng.uniform(100.0, 500.0, _FLIGHTS)
     state[3:5] = 60.0 * np.stack([np.cos(heading), np.sin(heading)])
-    state[6] = 3.0 * _DEGREE * rng.choice([-1.0, 1.0], _FLIGHTS)
+    if model.size > 6:
+        state[6] = 3.0 * _DEGREE * rng.choice([-1.0, 1.0], _FLIGHTS)
     step = np.full(_FLIGHTS, step_s)
     root = np.linalg.cholesky(model.noise(step)[:, :, 0] + 1e-20 * np.eye(model.size))
     rows = ["time_s,id,lat_deg,lon_deg,alt_m,yaw_deg,pitch_deg,roll_deg"]

@@ -207,8 +207,9 @@ class AltitudeConflicts:
         if not self._altitudes.instantaneous:
             end_s = np.minimum(self._after(horizon_s, self._held_s), self._held_until_s)
             met |= meets(self._held, np.maximum(from_s, self._held_s), end_s)
+        last_s = horizon_s if self._from_now else np.inf
         for instants in self._seconds:
-            met |= instants.inside & (instants.time_s >= from_s)
+            met |= instants.inside & (instants.time_s >= from_s) & (instants.time_s <= last_s)
         return self._altitudes.of_all(met & np.asarray(from_s <= horizon_s))
 
     def _after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:

@@ -36,6 +36,7 @@ class StepConflicts:
         from_now: bool = False,
     ) -> None:
         self._after_s = np.zeros((1, 1)) if from_now else steps.time_s
+        self._from_now = from_now
         self._steps = steps
         self._lookahead_s = lookahead_s
         self._count = np.abs(steps.number)
@@ -84,7 +85,9 @@ class StepConflicts:
         if not self._takes_time:
             return self._while_flown
         first = np.ceil(from_s / self._steps.step_time_s)
-        last = np.floor(self._lookahead_s / self._steps.step_time_s)
+        # Where horizons count from now, what is flown after them is not looked at either.
+        last_s = np.minimum(self._lookahead_s, horizon_s) if self._from_now else self._lookahead_s
+        last = np.floor(last_s / self._steps.step_time_s)
         due = (self._count >= first) & (self._count <= last)
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
         return self._beyond(self._while_flown & due)

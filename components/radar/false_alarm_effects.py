@@ -94,7 +94,8 @@ class NoiseReports:
     Raises
     ------
     ValueError
-        If the resolution cells are not known, or more than 1e5 false alarms are expected by scan.
+        If the resolution cells are not known, or, by `refuse_too_many`, more than 1e5 false alarms
+        are expected by scan.
     """
 
     def __init__(self, block: Any) -> None:
@@ -108,8 +109,12 @@ class NoiseReports:
         """Thresholds elsewhere and, where it is another, within cue cones; known after setup."""
         block = self._block
         cued = block.cued_crossing() if block.built("cue") else None
-        crossings = [block.crossing] + ([] if cued is None else [cued])
-        for crossing in crossings:
+        return [block.crossing] + ([] if cued is None else [cued])
+
+    def refuse_too_many(self) -> None:
+        """Refuse a threshold that noise crosses too often, once it is known."""
+        block = self._block
+        for crossing in self._crossings:
             expected = self._cells.count * crossing.false_alarm_probability
             if expected > MOST_PER_SCAN:
                 raise ValueError(
@@ -118,7 +123,6 @@ class NoiseReports:
                     f"most {MOST_PER_SCAN:,.0f} are allowed; noise may cross the threshold with a "
                     f"probability of at most {MOST_PER_SCAN / self._cells.count:.3g}"
                 )
-        return crossings
 
     def __call__(
         self, detections: Detections, targets: RelativeTargets, rows: IntArray

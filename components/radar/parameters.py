@@ -71,6 +71,10 @@ class LinkBudgetParameters(
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
 
     as_written_with = {("calibrate", "false_alarm_probability"): "false_alarm_probability"}
+    former = {
+        "cell_false_alarm_probability": "false alarms cross the one threshold that targets cross: "
+        "use false_alarm_probability, of radar.threshold threshold_db"
+    }
 
     power_w: float = Field(gt=0, description="Transmitted power, W.")
     antenna_gain_db: float = Field(description="Gain of the antenna, both ways the same, dB.")
@@ -97,13 +101,6 @@ class LinkBudgetParameters(
     )
     false_alarms: bool = Field(
         default=False, description="Whether noise is reported too, in any resolution cell."
-    )
-    cell_false_alarm_probability: float | None = Field(
-        default=None,
-        gt=0,
-        lt=1,
-        description="Probability of false alarm per scan and resolution cell, for false_alarms; "
-        "by default false_alarm_probability.",
     )
     aspect_rcs: bool = Field(
         default=True, description="Whether an aircraft's rcs_table is used; else its rcs_dbsm."
@@ -133,13 +130,6 @@ class LinkBudgetParameters(
             raise ValueError("cued_beam_first is true and beam_sweep is false: no beam sweeps")
         return self
 
-    def without_effect(self) -> list[str]:
-        """Say which keys belong to false alarms that there are not."""
-        said = super().without_effect()
-        if not self.false_alarms:
-            said += self.idle("cell_false_alarm_probability", because="false_alarms is false")
-        return said
-
     @property
     def pulses_summed(self) -> int:
         """Pulses of a look that are summed non-coherently."""
@@ -159,13 +149,6 @@ class LinkBudgetParameters(
         if self.budget == "dwell" and self.integration == "noncoherent":
             return self.stated_pulses or 1
         return self.pulses
-
-    @property
-    def cell_pfa(self) -> float:
-        """Probability of false alarm per scan and resolution cell."""
-        if self.cell_false_alarm_probability is None:
-            return self.false_alarm_probability
-        return self.cell_false_alarm_probability
 
     def link_budget(self) -> LinkBudget:
         """Return the link budget of a look, its bandwidth calibrated where the scene asks for it.

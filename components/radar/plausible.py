@@ -16,6 +16,8 @@ _RANGES = {
 }
 #: Noise above the threshold in one look of a hundred is more than any radar's operator bears.
 HIGH_FALSE_ALARM_PROBABILITY = 0.01
+#: A false alarm in a million scans is none in any run.
+NO_FALSE_ALARMS_PER_SCAN = 1e-6
 #: Gain times beamwidths in square degrees.
 GAIN_TIMES_BEAM = 30_000.0
 MOST_GAIN_DISAGREEMENT_DB = 3.0
@@ -138,28 +140,35 @@ def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
     ]
 
 
-def many_false_alarms(parameters: Any, cells: int) -> list[str]:
-    """Say how many false alarms a scan has where a probability meant for one look makes many.
+def unlikely_false_alarms(noise_key: str, pfa: float, cells: int, by_default: bool) -> list[str]:
+    """Say how many false alarms a scan has where there are many, or practically none.
 
     Parameters
     ----------
-    parameters : LinkBudgetParameters
+    noise_key : str
+        The key that sets how often noise crosses the threshold, and its value.
+    pfa : float
+        By look and cell, as the threshold has it.
     cells : int
         Resolution cells of a scan.
+    by_default : bool
+        Whether the key has the value that it has where nobody gives one.
     """
-    pfa = parameters.cell_pfa
-    if pfa < HIGH_FALSE_ALARM_PROBABILITY:
-        return []
-    key = "cell_false_alarm_probability"
-    if getattr(parameters, key) is None:
-        key = "false_alarm_probability"
-    by_default = key not in parameters.model_fields_set
-    whose = " (the thesis's, as the scene gives none)" if by_default else ""
-    return [
-        f"false_alarms is true and {key} is {pfa:g}{whose}: with {cells:,} resolution cells that "
-        f"makes {cells * pfa:,.3g} false alarms per scan, {pfa:.3g} in every cell; radars have "
-        "1e-6 per cell or less"
-    ]
+    comes_to = (
+        f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"
+    )
+    if pfa >= HIGH_FALSE_ALARM_PROBABILITY:
+        whose = " (the thesis's, as the scene gives none)" if by_default else ""
+        return [
+            f"false_alarms is true and {noise_key}{whose}: {comes_to}, {pfa:.3g} in every cell; "
+            "radars have 1e-6 per cell or less"
+        ]
+    if cells * pfa < NO_FALSE_ALARMS_PER_SCAN:
+        return [
+            f"false_alarms is true and {noise_key}: {comes_to}, practically none; targets and "
+            "noise cross one threshold, and a lower one has both come more often"
+        ]
+    return []
 
 
 def noise_at_targets(parameters: Any) -> list[str]:
@@ -176,20 +185,4 @@ def noise_at_targets(parameters: Any) -> list[str]:
     return [
         f"noise that is taken for a target: {exact[0]} is 0, so it is reported exactly where the "
         "target is (thesis); a grid has the cell's place, errors = 'signal' any place in the cell"
-    ]
-
-
-def two_thresholds(parameters: Any) -> list[str]:
-    """Say that false alarms and detections are counted at two thresholds, where they are.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    """
-    cell, look = parameters.cell_false_alarm_probability, parameters.false_alarm_probability
-    if cell is None or cell == look:
-        return []
-    return [
-        f"cell_false_alarm_probability is {cell:g} and false_alarm_probability is {look:g}: false "
-        "alarms cross another threshold than targets do; leave the first out for one threshold"
     ]

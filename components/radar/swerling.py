@@ -338,7 +338,7 @@ class SwerlingRadar(LinkBudgetRadar):
         p = self.p
         if not (p.cued_pulses or p.cued_false_alarm_probability):
             return None
-        pfa = p.cued_false_alarm_probability or p.cell_pfa
+        pfa = p.cued_false_alarm_probability or p.false_alarm_probability
         return Crossing.of(p.cued_pulses or p.pulses_summed, pfa)
 
     def _reference(self, model: int) -> float:

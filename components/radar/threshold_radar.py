@@ -37,9 +37,8 @@ from components.radar.plausible import (
     clutter_as_signal,
     high_false_alarms,
     implausible,
-    many_false_alarms,
     moved_threshold,
-    two_thresholds,
+    unlikely_false_alarms,
 )
 from components.radar.radar_block import Radar
 from components.radar.range_effects import BlindRange
@@ -129,6 +128,12 @@ class LinkBudgetRadar(Radar):
         (self.cfar,) = self.built("threshold from reference cells") or [None]
         if self.built("cue") and self.p.cued_dwell_factor is not None:
             self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
+        self._set_threshold()
+        if noise := self.context.effects.get(FalseAlarms.name):
+            noise.refuse_too_many()
+
+    def _set_threshold(self) -> None:
+        """Take the threshold that the scene's effects leave, where that is not known before."""
 
     def _without_blind_range(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
@@ -196,7 +201,7 @@ class LinkBudgetRadar(Radar):
     @property
     def crossing(self) -> Crossing:
         """How a look crosses the threshold: a target's output and noise alike."""
-        return Crossing.of(self.p.pulses_summed, self.p.cell_pfa)
+        return Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
@@ -270,10 +275,7 @@ class LinkBudgetRadar(Radar):
 
     def noise_key(self) -> str:
         """Say which key sets how often noise crosses the threshold, and its value."""
-        p, key = self.p, "cell_false_alarm_probability"
-        if p.cell_false_alarm_probability is None:
-            key += " (not given: false_alarm_probability)"
-        return f"{key} is {p.cell_pfa:g}"
+        return f"false_alarm_probability is {self.p.false_alarm_probability:g}"
 
     def steepest_pd(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any target, or None where Pd jumps."""
@@ -325,7 +327,11 @@ class LinkBudgetRadar(Radar):
     def _said_of_false_alarms(self) -> list[str]:
         if not (self.p.false_alarms and self.p.enabled):
             return []
-        return [*many_false_alarms(self.p, cells_of_radar(self).count), *two_thresholds(self.p)]
+        pfa, cells = self.crossing.false_alarm_probability, cells_of_radar(self).count
+        key = self.noise_key()
+        own = "false_alarm_probability"
+        by_default = key.startswith(own) and own not in self.p.model_fields_set
+        return unlikely_false_alarms(key, pfa, cells, by_default)
 
     def report(self) -> dict[str, Any]:
         """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
@@ -359,9 +365,8 @@ class ThresholdRadar(LinkBudgetRadar):
         else:
             self.threshold_db = self.required_snr_db(*self._stated_for)
 
-    def setup(self) -> None:
-        """Take the scene's effects; a threshold from reference cells is higher by its loss."""
-        super().setup()
+    def _set_threshold(self) -> None:
+        """Raise a threshold from reference cells by its loss."""
         if self.cfar is not None:
             self.threshold_db += self.cfar.loss_db(*self._stated_for)
         self.cued_threshold_db = self.threshold_db
@@ -373,10 +378,7 @@ class ThresholdRadar(LinkBudgetRadar):
     @property
     def crossing(self) -> Crossing:
         """How a look crosses the threshold: noise crosses the one that targets do."""
-        pulses, stated = self.p.pulses_summed, self.p.cell_false_alarm_probability
-        if stated is not None:
-            return Crossing.of(pulses, stated)
-        return Crossing.at(pulses, self.threshold_db)
+        return Crossing.at(self.p.pulses_summed, self.threshold_db)
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
@@ -386,8 +388,6 @@ class ThresholdRadar(LinkBudgetRadar):
 
     def noise_key(self) -> str:
         """Say which key sets how often noise crosses the threshold, and its value."""
-        if self.p.cell_false_alarm_probability is not None:
-            return super().noise_key()
         given = "" if self.p.threshold_db is not None else " (not given)"
         return f"threshold_db{given} is {self.threshold_db:g}"
 

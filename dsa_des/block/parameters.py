@@ -85,6 +85,9 @@ class Parameters(BaseModel):
     #: wrote the table first, whatever it is overridden by later: (table, its key) → that other key.
     as_written_with: ClassVar[Mapping[tuple[str, str], str]] = {}
 
+    #: Keys that there were, each with what says the same now.
+    former: ClassVar[Mapping[str, str]] = {}
+
     @field_validator("*", mode="after")
     @classmethod
     def _computable(cls, value: Any, info: ValidationInfo) -> Any:

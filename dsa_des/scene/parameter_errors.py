@@ -38,8 +38,10 @@ def explain(
         refused.update(_names_meant(model, item))
         at = _existing_path(scene_file, key, item["loc"])
         if item["type"] == "extra_forbidden":
+            *inside, name = map(str, item["loc"])
+            instead = None if inside else getattr(model, "former", {}).get(name)
             allowed = _sibling_names(model, item["loc"])
-            hint = did_you_mean(str(item["loc"][-1]), allowed)
+            hint = f"; {instead}" if instead else did_you_mean(name, allowed)
             problems.append(scene_file.problem(at, f"unknown parameter of {what}{hint}"))
         elif length := _list_length(model, item):
             given = _at(scene_file, at)

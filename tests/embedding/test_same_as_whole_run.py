@@ -56,7 +56,7 @@ def _assert_same(results, tables, table):
         (
             "blocks.radar.fluctuation='sampled'",
             "blocks.radar.false_alarms=true",
-            "blocks.radar.cell_false_alarm_probability=1e-7",
+            "blocks.radar.false_alarm_probability=1e-7",
             "blocks.eo.false_alarms_per_frame=0.1",
         ),
     ],

@@ -75,6 +75,8 @@ class Plain:
     def __init__(self, kind, values, own):
         self.kind, self.values, self.own = kind, values, np.array(own, dtype=float)
         self.ahead = values["lookahead_time"]
+        # Whether horizons count from now, not from the end of a manoeuvre.
+        self.from_now = values["bands_add_time_to_maneuver"]
         speed, track = math.hypot(own[3], own[4]), math.atan2(own[3], own[4])
         self.now = {"hdir": track % (2 * math.pi), "hs": speed, "vs": own[5], "alt": own[2]}[kind]
         self.step = values[f"step_{kind}"]
@@ -122,6 +124,10 @@ class Plain:
         end[:3] -= end[3:] * time_s
         return time_s, end
 
+    def end(self, horizon, time_s):
+        """Return until when the flight after a manoeuvre of so long is looked at."""
+        return min(self.ahead, horizon if self.from_now else horizon + time_s)
+
     def red(self, volume, other, begin, horizon, keep=None):
         """Tell which steps meet a volume from `begin` on, or another one until then."""
         if self.kind == "alt":
@@ -132,13 +138,17 @@ class Plain:
             lost = False
             for k in range(most + 1):
                 time_s, own = self.tangent(side * k)
-                asked = math.ceil(begin / step_s) <= k <= math.floor(ahead / step_s)
+                last_s = min(ahead, horizon) if self.from_now else ahead
+                asked = math.ceil(begin / step_s) <= k <= math.floor(last_s / step_s)
                 if asked and time_s < ahead:
                     lost |= conflict(volume, own, other, time_s, time_s + step_s)
                 if keep and k <= math.floor(until / step_s):
                     lost |= conflict(keep, own, other, time_s, time_s + step_s)
-                bad = conflict(volume, own, other, max(begin, time_s), min(ahead, horizon + time_s))
-                bad |= keep is not None and conflict(keep, own, other, time_s, until)
+                bad = conflict(volume, own, other, max(begin, time_s), self.end(horizon, time_s))
+                if keep and self.from_now and time_s > horizon:
+                    bad |= conflict(keep, own, other, 0.0, horizon)
+                elif keep:
+                    bad |= conflict(keep, own, other, time_s, until)
                 found[side * k] = found.get(side * k, False) or lost or bad
         return [found[k] for k in self.numbers]
 
@@ -179,15 +189,20 @@ class Plain:
 
         seconds = [*range(math.floor(t1) + 1), *range(math.ceil(t2), math.floor(t3 + 1) + 1)]
         for time_s in (float(n) for n in seconds if n < ahead):
-            if time_s >= begin and inside(volume, time_s):
+            due = time_s <= horizon or not self.from_now
+            if due and time_s >= begin and inside(volume, time_s):
                 return True
             if keep and time_s <= begin and inside(keep, time_s):
                 return True
         for start_s, end_s in ((t1, t2), (t3 + 1, math.inf)):
+            own, last = flight(start_s), min(end_s, ahead)
+            late = self.from_now and start_s == t3 + 1 > horizon
+            if keep and late and conflict(keep, own, other, 0.0, horizon):
+                return True
             if start_s >= ahead:
                 continue
-            own, last = flight(start_s), min(end_s, ahead)
-            if conflict(volume, own, other, max(begin, start_s), min(horizon + start_s, last)):
+            end_s = min(self.end(horizon, start_s), last)
+            if conflict(volume, own, other, max(begin, start_s), end_s):
                 return True
             if keep and conflict(keep, own, other, start_s, min(begin, last)):
                 return True
@@ -280,7 +295,7 @@ class Plain:
         found = []
         for k in self.numbers:
             time_s, own = self.tangent(k)
-            found.append(conflict(volume, own, other, time_s, min(self.ahead, horizon + time_s)))
+            found.append(conflict(volume, own, other, time_s, self.end(horizon, time_s)))
         return found
 
     def recovery(self, layers, level, others, early, number):

@@ -119,3 +119,17 @@ def test_the_search_ends_at_the_size_of_a_collision_and_before_the_last_second(k
     ways = {recovery for _, recovery in seen if recovery is not None}
     assert any(shrinks > 0 and time_s > 0 for time_s, shrinks in ways)
     assert (-math.inf, 3) in ways
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_horizons_may_count_from_now(kind):
+    """Manoeuvres that end after them are judged, in recovery, by the cylinder all the time."""
+    random, ahead_s = np.random.default_rng(101), 21.0 if kind == "alt" else 39.0
+    values = {
+        **VALUES, "lookahead_time": ahead_s, "max_alt": 1300.0, "horizontal_accel": 1.9,
+        "vertical_accel": 0.43, "min_horizontal_recovery": 460.0,
+    }  # fmt: skip
+    draws = [drawn(random, within_s=ahead_s - 2.0) for _ in range(16)]
+    for from_now in (True, False):
+        seen = compare(kind, {**values, "bands_add_time_to_maneuver": from_now}, draws)
+        assert any(recovery and recovery[0] > 0 for _, recovery in seen)

@@ -178,8 +178,6 @@ FAULTS = [
         ("minimum-range-forgotten", "minimum_range_m=self.minimum_range_m,",
          "minimum_range_m=None,"),
         ("bandwidth-forgotten", "bandwidth_hz=self.bandwidth_hz or 1.0,", "bandwidth_hz=1.0,"),
-        ("cells-alarm-as-looks", "return self.cell_false_alarm_probability\n",
-         "return self.false_alarm_probability\n"),
     ),
     *in_file(
         _GROUP, "components/radar/parameters.py", "wiring/test_calibrated_radars.py",
@@ -293,10 +291,12 @@ FAULTS = [
     *in_file(
         _GROUP, "components/radar/threshold_radar.py", (
             "wiring/test_false_alarms_of_radars.py", "wiring/test_radar_detection_keys.py"),
-        ("alarms-at-the-look-s-rate", "Crossing.of(self.p.pulses_summed, self.p.cell_pfa)",
-         "Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)"),
-        ("alarms-that-know-no-threshold", "return Crossing.at(pulses, self.threshold_db)",
-         "return Crossing.of(pulses, self.p.false_alarm_probability)"),
+        ("alarms-of-one-pulse-s-threshold",
+         "Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)",
+         "Crossing.of(1, self.p.false_alarm_probability)"),
+        ("alarms-that-know-no-threshold",
+         "return Crossing.at(self.p.pulses_summed, self.threshold_db)",
+         "return Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)"),
         ("alarms-from-zero-snr", "confidence=(snr_db - self.false_alarm_zero_db())[kept]",
          "confidence=snr_db[kept]"),
     ),

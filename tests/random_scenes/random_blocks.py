@@ -114,7 +114,7 @@ def radar(dice: Dice, table: dict[str, Any], steered: bool) -> None:
             "false_alarms": True, "range_km": dice.pick(2, 5), "range_resolution_m": 500,
             "azimuth_resolution_deg": 10, "elevation_resolution_deg": 10,
             "azimuth_deg": [-60, 60], "elevation_deg": [-10, 10],
-            "cell_false_alarm_probability": dice.pick(0.001, 0.01),
+            "false_alarm_probability": dice.pick(0.001, 0.01),
         }  # fmt: skip
     if dice.chance(0.2, "errors by the signal"):
         table |= {

@@ -22,7 +22,7 @@ KINDS = {
 NEARER = [
     "blocks.traffic.intruders.0.north_m=4000", "blocks.traffic.intruders.1.north_m=3500",
     "blocks.traffic.intruders.1.east_m=3000", "blocks.radar.false_alarms=true",
-    "blocks.radar.cell_false_alarm_probability=1e-6",
+    "blocks.radar.false_alarm_probability=1e-6",
     "blocks.eo.false_alarms_per_frame=0.3",
     "blocks.eo.latency_s=0.13",
 ]  # fmt: skip

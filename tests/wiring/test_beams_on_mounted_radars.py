@@ -5,7 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
-from wired import alone, chain, rows, run, sensor
+from wired import alone, chain, noise_crosses, rows, run, sensor
 
 MOUNT = (-35.0, 21.0, -75.0)
 KEYS = dict(zip(("mount_azimuth_deg", "mount_elevation_deg", "mount_roll_deg"), MOUNT, strict=True))
@@ -69,7 +69,7 @@ def test_false_alarms_lie_in_the_field_of_view_of_the_mounted_sensor(kind):
     view = {"azimuth_deg": [10, 40], "elevation_deg": [-30, 10], "scan_rate_hz": 100}
     if kind.startswith("radar"):
         noisy = {
-            "false_alarms": True, "cell_false_alarm_probability": 3e-4, "range_km": 3.0,
+            **noise_crosses(kind, 3e-4), "range_km": 3.0,
             "azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 4.0,
             "range_resolution_m": 300.0,
         }  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from covering import LINK_BUDGETS
 from scipy.stats import binom, chi2, kstest, ncx2, norm
-from wired import alone, chain, rows, run, sensor
+from wired import alone, chain, noise_crosses, rows, run, sensor
 
 import dsa_des
 from dsa_des.record.recording import MemorySink, Recorder
@@ -21,8 +21,9 @@ STILL = {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}
 RADAR = {
     "azimuth_deg": [-20, 20], "elevation_deg": [-24, 0], "range_km": 4.0, "minimum_range_m": 1000.0,
     "azimuth_resolution_deg": 4.0, "elevation_resolution_deg": 4.0, "range_resolution_m": 150.0,
-    "false_alarms": True, "cell_false_alarm_probability": PFA, "scan_rate_hz": 50, "power_w": 0.1,
+    "scan_rate_hz": 50, "power_w": 0.1,
 }  # fmt: skip
+OFTEN = noise_crosses("radar.threshold", PFA)
 TERRAIN = {"height_m": GROUND_M, "clutter_gamma_db": GAMMA_DB}
 
 
@@ -62,8 +63,9 @@ def test_the_ground_is_reported_where_it_crosses_and_no_more_where_the_threshold
     scans, expected = 100, expected_cells()
     scene = {"ownship": STILL, "targets": [{**crooked.ROLLING, "north_m": 90_000.0}],
              "terrain": TERRAIN, "duration_s": scans / 50}  # fmt: skip
+    often = {**RADAR, **noise_crosses(kind, PFA)}
     found = {
-        mode: rows(run(chain({"r": sensor(kind, **RADAR, clutter_threshold=mode)}, **scene)))
+        mode: rows(run(chain({"r": sensor(kind, **often, clutter_threshold=mode)}, **scene)))
         for mode in ("noise", "adaptive")
     }
     low, high = binom.interval(0.99, len(expected) * scans, PFA)
@@ -157,8 +159,8 @@ def test_a_wrong_belief_moves_no_ground():
     found = {}
     for bias_deg in (0.0, 9.0):
         done = run(chain(
-            {"r": sensor("radar.threshold", **RADAR, clutter_threshold="noise")}, ownship=STILL,
-            terrain=TERRAIN, duration_s=0.2,
+            {"r": sensor("radar.threshold", **RADAR, **OFTEN, clutter_threshold="noise")},
+            ownship=STILL, terrain=TERRAIN, duration_s=0.2,
             navigation={"attitude_bias_deg": [3.0, bias_deg, -bias_deg]},
         ))  # fmt: skip
         found[bias_deg] = done["detections"].select(["scan", "azimuth_rad", "range_m", "snr_db"])
@@ -166,11 +168,11 @@ def test_a_wrong_belief_moves_no_ground():
 
 
 def test_windows_change_nothing():
-    radar = sensor("radar.threshold", **RADAR, clutter_threshold="noise")
+    radar = sensor("radar.threshold", **RADAR, **OFTEN, clutter_threshold="noise")
     scene = chain({"r": radar}, terrain=TERRAIN, duration_s=0.5)
     whole = run(scene)["detections"]
     memory = MemorySink()
     Simulation(dsa_des.load_scene(scene), recorder=Recorder([memory]), window=1).run()
     assert memory.tables()["detections"].equals(whole)
     assert whole.num_rows > 30
-    assert not rows(alone("radar.threshold", **{**RADAR, "enabled": False}))
+    assert not rows(alone("radar.threshold", **{**RADAR, **OFTEN, "enabled": False}))

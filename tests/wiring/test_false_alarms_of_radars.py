@@ -101,7 +101,7 @@ def test_steady_echoes_are_as_strong_as_a_noncentral_sum(kind, pulses):
         keys = {**keys, "threshold_db": -3.0}
         keys.pop("swerling")
     view = {**VIEW, "azimuth_deg": [-180, 180], "elevation_deg": [-90, 90], **keys,
-            "cell_false_alarm_probability": 1e-9}  # fmt: skip
+            "false_alarm_probability": 1e-6}  # fmt: skip
     true, seen = (
         {row["scan"]: row["snr_db"] for row in rows(alone(kind, **keys), target="rolling")}
         for keys in ({**view, "false_alarms": False}, view)

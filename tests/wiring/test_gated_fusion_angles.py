@@ -4,7 +4,7 @@ import math
 
 import crooked
 import pytest
-from wired import HEARS_ALL, SEES_ALL, chain, rows, run
+from wired import HEARS_ALL, SEES_ALL, chain, noise_crosses, rows, run
 
 LEVEL = {"lat_deg": -41.3, "lon_deg": -179.9997, "alt_m": 2400, "heading_deg": 217}
 
@@ -115,7 +115,7 @@ def test_the_latest_in_the_gate_belongs_together():
 def test_false_alarms_pass_through_as_they_were_reported(kind):
     """Each with its own sensor's name, a range from the radar only; no track is made of them."""
     radar = {
-        **HEARS_ALL, "false_alarms": True, "cell_false_alarm_probability": 3e-4, "range_km": 3.0,
+        **HEARS_ALL, **noise_crosses("radar.threshold", 3e-4), "range_km": 3.0,
         "azimuth_resolution_deg": 9.0, "elevation_resolution_deg": 9.0,
         "range_resolution_m": 300.0, "scan_rate_hz": 10,
     }  # fmt: skip

@@ -46,8 +46,6 @@ def eye(**keys):
          "filter_pulses is 8", "moving_target_filter is 'double_canceller'"),
         (radar(clutter_lock=False), {}, "clutter_lock is false", "moving_target_filter is 'none'"),
         (radar(angle_measurement="scan"), {}, "angle_measurement is 'scan'", "errors is 'grid'"),
-        (radar(cell_false_alarm_probability=1e-5), {}, "cell_false_alarm_probability is 1e-05",
-         "false_alarms is false"),
         (radar(integration="noncoherent"), {}, "integration is 'noncoherent'",
          "budget is not given"),
         (radar(beam_spacing=0.8), {}, "beam_spacing is 0.8", "azimuth_beamwidth_deg is not given"),

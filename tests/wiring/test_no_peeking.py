@@ -5,7 +5,7 @@ from dataclasses import replace
 import crooked
 import numpy as np
 import pytest
-from wired import HEARS_ALL, SEES_ALL, chain, rows, run
+from wired import HEARS_ALL, SEES_ALL, chain, noise_crosses, rows, run
 
 import dsa_des
 from components.fusion.gated import Gated
@@ -13,7 +13,7 @@ from components.fusion.gated import Gated
 NOT_MEASURED = ("target", "true_azimuth_rad", "true_elevation_rad", "true_range_m")
 GRID = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 3.0}
 NOISY = {**HEARS_ALL, **GRID, "range_resolution_m": 150, "range_km": 6, "scan_rate_hz": 2,
-         "false_alarms": True, "cell_false_alarm_probability": 3e-4}  # fmt: skip
+         **noise_crosses("radar.threshold", 3e-4)}  # fmt: skip
 #: Close together, so that gates have to choose, in cells of a coarse grid, so that some are alike.
 CLOSE = [
     {**crooked.ROLLING, "name": f"t{i}", "east_m": -2349.0 + 60.0 * i, "up_m": 420.0 + 25.0 * i}
@@ -91,7 +91,8 @@ def test_association_goes_with_the_turn_of_the_ownship():
 
 @pytest.mark.parametrize(("noise_deg", "together"), [(0.0, True), (20.0, False)])
 def test_an_attitude_that_is_believed_wrongly_parts_what_belongs_together(noise_deg, together):
-    noise = {"attitude_noise_deg": [noise_deg, 0.0, 0.0]}
+    # Forgotten between the two looks, as noise that lasts errs alike in both.
+    noise = {"attitude_noise_deg": [noise_deg, 0.0, 0.0], "attitude_correlation_time_s": 0.01}
     found = run({**in_a_turn(navigation=noise), "seed": 2})
     last = rows(found, "fused")[-1]
     assert last["sensors"] == ("radar+eye" if together else "eye")

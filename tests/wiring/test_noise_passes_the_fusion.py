@@ -3,16 +3,16 @@
 from collections import Counter
 
 import pytest
-from wired import chain, rows, run, sensor
+from wired import chain, noise_crosses, rows, run, sensor
 
 NOISY = {
     "azimuth_deg": [-40, 60], "elevation_deg": [-30, 10], "range_km": 3.0, "minimum_range_m": 1.0,
     "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 4.0, "range_resolution_m": 100.0,
-    "false_alarms": True, "cell_false_alarm_probability": 3e-4,
 }  # fmt: skip
 SENSORS = {
-    "first": sensor("radar.threshold", **NOISY, scan_rate_hz=4),
-    "second": sensor("radar.swerling", **NOISY, scan_rate_hz=5),
+    name: sensor(kind, **NOISY, **noise_crosses(kind, 3e-4), scan_rate_hz=rate_hz)
+    for name, kind, rate_hz in (("first", "radar.threshold", 4), ("second", "radar.swerling", 5))
+} | {
     "eye": sensor("optical.eo", false_alarms_per_frame=0.6, scan_rate_hz=10),
 }
 TRUTH = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")

@@ -5,7 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
-from wired import HEARS_ALL, SENSORS, chain, rows, run, sensor
+from wired import HEARS_ALL, SENSORS, chain, noise_crosses, rows, run, sensor
 
 ATTITUDE = [math.radians(crooked.OWNSHIP[f"{name}_deg"]) for name in ("yaw", "pitch", "roll")]
 ANGLES = ("own_heading_rad", "own_pitch_rad", "own_roll_rad")
@@ -55,8 +55,8 @@ def test_a_sweeping_beam_tells_the_pose_of_when_it_passed(errors):
 
 def test_false_alarms_tell_the_pose_like_detections():
     noisy = {**HEARS_ALL, "azimuth_resolution_deg": 2, "elevation_resolution_deg": 2,
-             "range_resolution_m": 150, "range_km": 3, "false_alarms": True,
-             "cell_false_alarm_probability": 1e-5}  # fmt: skip
+             "range_resolution_m": 150, "range_km": 3,
+             **noise_crosses("radar.threshold", 1e-5)}  # fmt: skip
     for extra in ({}, {"beam_sweep": True}):
         found = rows(run(chain({"radar": {**noisy, **extra}}, duration_s=2)))
         assert {row["target"] for row in found} == {None, "rolling", "diving"}

@@ -8,7 +8,7 @@ import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from scipy.optimize import brentq
 from scipy.special import chndtr, gammaincc
-from wired import Row, alone, chain, rows, run, sensor
+from wired import Row, alone, chain, noise_crosses, rows, run, sensor
 
 PFA = 1e-4
 
@@ -164,17 +164,13 @@ VIEW = {
 }  # fmt: skip
 
 
-@covers("false_alarms", "cell_false_alarm_probability", of=LINK_BUDGETS)
+@covers("false_alarms", of=LINK_BUDGETS)
 @pytest.mark.parametrize("kind", LINK_BUDGETS)
-@pytest.mark.parametrize(("cell_pfa", "pfa"), [(None, 1e-3), (1e-3, 1e-6)])
-def test_false_alarms_fill_the_field_of_view_at_the_rate_of_their_cells(kind, cell_pfa, pfa):
+def test_false_alarms_fill_the_field_of_view_at_the_rate_of_their_cells(kind):
     """50 by 10 by 30 cells from the minimum range of 0 m on, and 20 scans."""
-    keys = {} if cell_pfa is None else {"cell_false_alarm_probability": cell_pfa}
-    if kind == "radar.threshold" and cell_pfa is None:  # noise is over it that often
-        keys["threshold_db"] = 10.0 * math.log10(-math.log(pfa) - 1.0)
-    noisy = {"false_alarms": True, "false_alarm_probability": pfa, "scan_rate_hz": 20}
-    assert not rows(alone(kind, **VIEW, false_alarm_probability=pfa), target=None)
-    found = rows(alone(kind, **VIEW, **noisy, **keys, minimum_range_m=1.0), target=None)
+    noisy = {**noise_crosses(kind, 1e-3), "scan_rate_hz": 20}
+    assert not rows(alone(kind, **{**VIEW, **noisy, "false_alarms": False}), target=None)
+    found = rows(alone(kind, **VIEW, **noisy, minimum_range_m=1.0), target=None)
     expected = 50 * 10 * 30 * 1e-3 * 20
     assert len(found) == pytest.approx(expected, abs=5 * math.sqrt(expected))
     azimuth, elevation, range_m = (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import gammaincc
-from wired import alone, chain, first_look, rows, run, sensor
+from wired import alone, chain, first_look, noise_crosses, rows, run, sensor
 
 STILL = {"speed_mps": 0.0, "climb_mps": 0.0}
 OWN = {**crooked.OWNSHIP, **STILL}
@@ -29,11 +29,10 @@ def swerling_2(snr: float, pulses: int, pfa: float) -> float:
 @pytest.mark.parametrize("pulses", [1, 6])
 @pytest.mark.parametrize("pfa", [1e-6, 1e-3])
 def test_a_calibration_is_of_the_radar_s_own_pulses_and_false_alarms(pulses, pfa):
-    """False alarms per cell are another matter: they move no threshold."""
     calibrate = {"rcs_dbsm": 3.01, "range_km": 2.6, "pd": 0.7, "swerling": 2}
     radar = sensor(
         "radar.swerling", calibrate=calibrate, pulses=pulses, false_alarm_probability=pfa,
-        cell_false_alarm_probability=1e-8, swerling=2, scan_rate_hz=20,
+        swerling=2, scan_rate_hz=20,
     )  # fmt: skip
     del radar["bandwidth_hz"]
     row = rows(run(chain({"radar": radar}, targets=[crooked.ROLLING])))[0]
@@ -60,10 +59,10 @@ def test_a_sampled_rcs_from_pulse_to_pulse_is_steadier_the_more_there_are(model,
     assert np.var(power) / np.mean(power) ** 2 == pytest.approx(variance, rel=0.35)
 
 
-@pytest.mark.parametrize("weather", [{"rain_rate_mm_h": 20.0, "rain_top_m": 9000.0},
+@pytest.mark.parametrize("weather", [{"gas": True},
                                      {"fog_water_g_m3": 1.0, "fog_top_m": 9000.0}])  # fmt: skip
 def test_the_air_takes_from_the_ground_what_it_takes_from_the_target(weather):
-    """Clutter over signal is the same in any weather."""
+    """Clutter over signal is the same in any weather that has no echo of its own."""
     radar = sensor("radar.threshold", **CELL)
 
     def ratio(**sections) -> dict[str, float]:
@@ -82,11 +81,11 @@ def test_the_air_takes_from_the_ground_what_it_takes_from_the_target(weather):
 @pytest.mark.parametrize("threshold", ["noise", "adaptive"])
 @pytest.mark.parametrize("model", [1, 3])
 def test_a_fluctuating_target_in_clutter(model, threshold):
-    """As noise raised by the clutter; another Pfa per cell has no part in it."""
+    """As noise raised by the clutter."""
     pfa = 1e-2
     radar = sensor(
         "radar.swerling", **CELL, swerling=model, false_alarm_probability=pfa, power_w=0.4,
-        cell_false_alarm_probability=1e-7, reference_pd=0.5, scan_rate_hz=20,
+        reference_pd=0.5, scan_rate_hz=20,
         clutter_threshold=threshold,
     )  # fmt: skip
     plain = sensor("radar.threshold", **CELL, power_w=0.4)
@@ -118,7 +117,7 @@ def test_a_fluctuating_target_in_clutter(model, threshold):
 def test_noise_that_crosses_the_threshold_is_as_strong_as_that_takes(kind, pulses, pfa):
     """The sum over the pulses starts at the threshold of the cell: its SNR per pulse follows."""
     keys = {
-        "false_alarms": True, "cell_false_alarm_probability": pfa, "pulses": pulses,
+        **noise_crosses(kind, pfa, pulses), "pulses": pulses,
         "range_km": 3.0, "range_resolution_m": 30.0, "azimuth_resolution_deg": 2.0,
         "elevation_resolution_deg": 2.0, "azimuth_deg": [-40, 40], "elevation_deg": [-10, 10],
         "scan_rate_hz": 3 if pfa == 1e-3 else 30,

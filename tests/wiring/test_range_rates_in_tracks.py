@@ -113,8 +113,8 @@ def test_no_byte_changes_by_window_or_company(sweep):
     radar = {
         "type": "radar.swerling", "swerling": 1, "scan_rate_hz": 2, "power_w": 1e5,
         "antenna_gain_db": 30.0, "frequency_hz": 35e9, "bandwidth_hz": 1e6,
-        "false_alarm_probability": 1e-3, "range_km": 6.0, "beam_sweep": sweep, "false_alarms": True,
-        "cell_false_alarm_probability": 1e-7, "azimuth_resolution_deg": 1.0,
+        "false_alarm_probability": 1e-7, "range_km": 6.0, "beam_sweep": sweep, "false_alarms": True,
+        "azimuth_resolution_deg": 1.0,
         "elevation_resolution_deg": 1.0, "range_resolution_m": 30.0,
         "measures_range_rate": True, "range_rate_resolution_m_s": 2.0,
     }  # fmt: skip

@@ -211,10 +211,11 @@ def test_models_are_those_that_are_named():
 
 @covers("transition_rates_per_s", of=("tracking.imm",))
 def test_a_model_that_is_never_entered_fades_away():
-    never = turning(transition_rates_per_s=[[0.0, 0.0], [5.0, 0.0]])[-1]
-    often = turning(transition_rates_per_s=[[0.0, 5.0], [0.0, 0.0]])[-1]
-    # Looks on a grid tell less: what is never entered fades more slowly.
-    assert never["probability_turn"] < 0.03 < 0.97 < often["probability_turn"]
+    # Before a look at most exp(-rate x 1 s) of it is left, 5e-5; at 5 per second 0.007, which
+    # one look that favours turns by three makes 0.02.
+    never = turning(transition_rates_per_s=[[0.0, 0.0], [10.0, 0.0]])[-1]
+    often = turning(transition_rates_per_s=[[0.0, 10.0], [0.0, 0.0]])[-1]
+    assert never["probability_turn"] < 0.01 < 0.99 < often["probability_turn"]
 
 
 @covers("start_turn_deg_s", "turn_rate_intensity_deg2_s3", "turn_acceleration_intensity_m2_s3",
@@ -299,10 +300,11 @@ def test_who_follows_is_one_track_on_both_sides_of_astern(kind):
 
 
 def test_jpda_lives_with_looks_whose_detections_fall_just_beside_every_gate():
-    """Attitude that errs beyond the stated variances: near enough to be compared, and too far."""
+    """A gate that nine of ten miss: near enough to be compared, and too far."""
     scene = chain(
         {"radar": RADAR}, targets=[crooked.ROLLING], duration_s=6, fusion=PASS,
-        tracker={"type": "tracking.ekf", "association": "jpda"},
+        tracker={"type": "tracking.ekf", "association": "jpda", "gate_probability": 0.1,
+                 "start_gate_probability": 0.1},
         navigation={"attitude_noise_deg": [1.5, 1.5, 1.5]},
     )  # fmt: skip
     found = rows(run(scene), "state_tracks")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from covering import RADARS, SENSORS
 from scipy.stats import kstest
-from wired import alone, rows
+from wired import alone, noise_crosses, rows
 
 STEPS = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 1.0}
 MOUNT = {"mount_azimuth_deg": -35.0, "mount_elevation_deg": 21.0, "mount_roll_deg": -75.0}
@@ -54,7 +54,7 @@ def test_variances_of_a_mounted_sensor_are_turned_into_body_axes(kind, off_deg):
 
 def test_false_alarms_have_the_variances_of_their_sensor():
     grid = {"azimuth_resolution_deg": 30.0, "elevation_resolution_deg": 30.0, "range_km": 5.0}
-    noise = {"false_alarms": True, "cell_false_alarm_probability": 0.2}
+    noise = noise_crosses("radar.threshold", 0.2)
     found = rows(
         alone("radar.threshold", **grid, **noise, range_resolution_m=600.0),
         block="sensor",
@@ -73,7 +73,7 @@ def test_false_alarms_have_the_variances_of_their_sensor():
 
 def test_false_alarms_err_like_what_is_there():
     """On the grid where that is kept, with the stated errors in their variances."""
-    noise = {"false_alarms": True, "cell_false_alarm_probability": 0.02, "range_km": 5.0}
+    noise = {**noise_crosses("radar.threshold", 0.02), "range_km": 5.0}
     keys = {
         **noise, "errors": "stated", "azimuth_error_deg": 2.0, "range_error_m": 70.0,
         "azimuth_resolution_deg": 6.0, "elevation_resolution_deg": 5.0, "range_resolution_m": 400.0,

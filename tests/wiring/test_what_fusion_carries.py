@@ -2,7 +2,7 @@
 
 import crooked
 import pytest
-from wired import chain, rows, run, sensor
+from wired import chain, noise_crosses, rows, run, sensor
 
 RANGING = {"measures_range_rate": True}
 
@@ -69,8 +69,7 @@ def test_a_row_bears_the_target_of_the_sensor_that_gives_its_angles():
 def test_false_alarms_keep_their_instants_and_poses_on_a_slow_wire(kind):
     noise = {
         "azimuth_resolution_deg": 5.0, "elevation_resolution_deg": 5.0, "range_resolution_m": 500.0,
-        "range_km": 4.0, "false_alarms": True, "cell_false_alarm_probability": 1e-3,
-        "scan_rate_hz": 5,
+        "range_km": 4.0, "scan_rate_hz": 5, **noise_crosses("radar.threshold", 1e-3),
     }  # fmt: skip
     turning = {name: value for name, value in crooked.OWNSHIP.items()
                if name not in ("yaw_deg", "pitch_deg", "roll_deg", "climb_mps")}  # fmt: skip

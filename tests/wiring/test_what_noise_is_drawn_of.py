@@ -6,7 +6,7 @@ import crooked
 import numpy as np
 import pytest
 from test_false_alarms_look_like_targets import CROWD, noisy
-from wired import SEES_ALL, chain, rows, run, sensor
+from wired import SEES_ALL, chain, noise_crosses, rows, run, sensor
 
 from components.sensor import declaration_by_place
 from components.sensor.declaration_by_place import SeenPlaces, scans_with_company
@@ -44,11 +44,12 @@ def test_detections_of_one_pixel_stand_by_their_confidence():
 
 @pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling"])
 def test_echoes_have_crossed_the_threshold_of_a_cell(kind):
-    """Pfa of a cell is a hundredth of that of a look: what is as faint as noise is as strong."""
-    keys = {"power_w": 1e-9, "false_alarm_probability": 0.05, "scan_rate_hz": 20}
+    """What is as faint as noise is as strong."""
+    keys = {"scan_rate_hz": 20, **noise_crosses(kind, 0.05)}
+    if kind == "radar.threshold":  # which detects what is stronger on average
+        keys["threshold_db"] = -300.0
     found = rows(run(chain(
-        {"radar": noisy(kind, "grid", cell_false_alarm_probability=5e-4, **keys,
-                        **({"threshold_db": -200.0} if kind == "radar.threshold" else {}))},
+        {"radar": noisy(kind, "grid", power_w=1e-9, **keys)},
         targets=CROWD, duration_s=4,
     )))  # fmt: skip
     strengths = [[row["snr_db"] for row in found if (row["target"] is None) == false]
@@ -135,11 +136,10 @@ def test_places_of_a_scene_are_as_wrong_as_their_detections(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling"])
 def test_ground_stands_among_the_rest_and_has_crossed_the_threshold_of_a_cell(kind):
-    """Output over noise less 1: at least -ln(Pfa) - 1 of the cell's Pfa, not of the look's."""
+    """Output over noise less 1: at least -ln(Pfa) - 1."""
     from test_clutter_false_alarms import RADAR, STILL, TERRAIN
 
-    keys = {**RADAR, "clutter_threshold": "noise", "false_alarm_probability": 0.05,
-            "cell_false_alarm_probability": 1e-3}  # fmt: skip
+    keys = {**RADAR, "clutter_threshold": "noise", **noise_crosses(kind, 1e-3)}  # fmt: skip
     scene = chain({"r": sensor(kind, **keys)}, ownship=STILL, terrain=TERRAIN, duration_s=1,
                   targets=[{**crooked.ROLLING, "north_m": 90_000.0}])  # fmt: skip
     found = rows(run(scene))

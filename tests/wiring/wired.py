@@ -1,10 +1,12 @@
 """Small scenes as tables, run in memory, and their recorded rows."""
 
+import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from typing import Any
 
 import crooked
+from scipy.special import gammainccinv
 
 import dsa_des
 
@@ -97,6 +99,15 @@ SENSORS: dict[str, dict[str, Any]] = {
 def sensor(kind: str, **keys: Any) -> dict[str, Any]:
     """Return a table of a sensor that detects everything, with some keys changed; None: without."""
     return {key: value for key, value in {**SENSORS[kind], **keys}.items() if value is not None}
+
+
+def noise_crosses(kind: str, pfa: float, pulses: int = 1) -> dict[str, Any]:
+    """Return the keys of a radar of which noise is reported, with the one threshold that it has."""
+    keys = {"false_alarms": True, "false_alarm_probability": pfa}
+    if kind != "radar.threshold":
+        return keys
+    least = float(gammainccinv(pulses, pfa)) / pulses - 1.0
+    return {**keys, "threshold_db": 10.0 * math.log10(least)}
 
 
 def alone(kind: str, *, duration_s: float = 1, targets: Any = crooked.TARGETS, **keys: Any) -> Any:

@@ -69,15 +69,15 @@ def _scene(targets: int) -> dict[str, Any]:
         }
         for k, a in enumerate(around)
     ]  # fmt: skip
-    # White errors, as the plain loop and Stone Soup's tracker take them: a grid's errors last.
+    # Errors that are new at every look: what other trackers take them for.
+    new = {"errors": "stated", "quantised": False}
     camera = {
-        "type": "optical.range_boundary", "range_km": 20.0, "errors": "stated",
-        "quantised": False, "azimuth_error_deg": 0.015, "elevation_error_deg": 0.015,
+        "type": "optical.range_boundary", "range_km": 20.0, "azimuth_error_deg": 0.015,
+        "elevation_error_deg": 0.015, **new,
     }  # fmt: skip
     radar = {
-        "type": "radar.range_boundary", "range_km": 20.0, "scan_rate_hz": 5, "errors": "stated",
-        "quantised": False, "azimuth_error_deg": 0.15, "elevation_error_deg": 0.15,
-        "range_error_m": 3.0,
+        "type": "radar.range_boundary", "range_km": 20.0, "scan_rate_hz": 5,
+        "azimuth_error_deg": 0.15, "elevation_error_deg": 0.15, "range_error_m": 3.0, **new,
     }  # fmt: skip
     own = {"lat_deg": 52.0, "lon_deg": 4.0, "alt_m": 1000.0, "heading_deg": 0, "speed_mps": 50.0}
     return {

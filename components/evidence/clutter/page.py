@@ -52,7 +52,8 @@ that states it, or at `calibrate.false_alarm_probability`. Who lowers `false_ala
 scene, with `--set` or in a study raises the threshold; the hardware stays, Pd at that range falls,
 and `check` says to what.
 
-`cell_false_alarm_probability` counts false alarms at a threshold of its own, and a warning says so.
+A `radar.threshold` has the false alarms of its `threshold_db`, whatever `false_alarm_probability`
+says; where that leaves practically none, `check` says so.
 
 A target far below the noise is reported with the probability of false alarm. Such a report lies in
 the target's resolution cell and says no more: on a grid it has the grid point of the cell; with

@@ -98,7 +98,7 @@ def _declared(runs: list[Recording], flown: Mapping[str, FloatArray]) -> list[Ro
     of, radar = "flight_tests:SCANS_IN_A_ROW", "thesis/table_4_2.toml:blocks.radar.calibrate"
     rows = [
         Row(f"simulated average, {said}, small", averages["small"], "km",
-            "Of all rules up to 12 scans the nearest; a scan is 0.15 km of closing.",
+            "Of all rules up to 12 scans the nearest; allowed is a scan, 0.15 km of closing.",
             printed("table-4.2", "small"), 0.15, "no rule of whole scans gives it more nearly",
             calibrated("the rule", of))
     ]  # fmt: skip
@@ -106,7 +106,7 @@ def _declared(runs: list[Recording], flown: Mapping[str, FloatArray]) -> list[Ro
         error_km = float(flown[name].std(ddof=1)) / len(flown[name]) ** 0.5
         rows.append(
             Row(f"simulated average, {said}, {name}", averages[name], "km",
-                f"Allowed for: the standard error of the {len(flown[name])} flights' average, "
+                f"The allowance is the standard error of {len(flown[name])} flights' average, "
                 f"{error_km:.2f} km.",
                 printed("table-4.2", name), error_km, "the rule is not the flight tests'",
                 predicted("the rule that gives the small class", of, radar))
