@@ -25,7 +25,8 @@ def main() -> None:
     print(result)
     # `summary` is an Arrow table. Pandas comes with: pip install "dsa-des[pandas]"
     if find_spec("pandas") is not None:
-        print(result.summary.to_pandas())
+        columns = ["radar.scan_rate_hz", "result", "value"]
+        print(result.summary.to_pandas()[columns].to_string(index=False))
         return
     for row in result.summary.to_pylist():
         print(f"{row['radar.scan_rate_hz']:4} Hz  {row['result']}: {row['value']}")

@@ -180,10 +180,14 @@ def not_from_here() -> Iterator[None]:
 
 
 def _own_last(path: list[str]) -> list[str]:
-    """Return a module path without the working directory, and a script's folder last."""
+    """Return a module path without the working directory, and a script's folder last.
+
+    The folder that we were imported from stays, whichever it is.
+    """
     if sys.flags.safe_path or path[:1] == [_HOME]:
         return path
-    return [place for place in [*path[1:], *path[:1]] if place not in ("", os.getcwd())]
+    theirs = {"", os.getcwd()} - {_HOME}
+    return [place for place in [*path[1:], *path[:1]] if place not in theirs]
 
 
 def _new_pool(study: Study) -> ProcessPoolExecutor:

@@ -48,8 +48,9 @@ def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():
         ],
     )  # fmt: skip
     approach = page.approach_of(page.study_scene())
-    # Independent of the page: SNR for Pd 0.9114 of 1.76 dBsm at 6.91 km, for -15 dBsm at 1 m.
-    known = (math.log(1e-6) / math.log(0.9114) - 1.0) * 10 ** (-1.676) * 6910.0**4
+    # Independent of the page: SNR for Pd 0.9114 of 1.76 dBsm at 6.91 km, for -15 dBsm at 1 m, with
+    # the Pfa of 0.05 that the sensor flew with: whatever a study sets later, the hardware stays.
+    known = (math.log(0.05) / math.log(0.9114) - 1.0) * 10 ** (-1.676) * 6910.0**4
     assert approach.snr_at_1_m == pytest.approx(known, rel=1e-12)
     assert (approach.pulses, approach.closing_m_s) == (5, 110.0)
     found = page.simulated(result)
@@ -68,9 +69,13 @@ def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():
         # No declaration is where the encounter began.
         assert np.max(there) < 0.8 * approach.from_m
     slow, middle, fast = (certain["dwell", rate] for rate in rates.values())
-    assert middle > 1.25 * slow and middle > 1.25 * fast
+    assert middle > max(slow, fast)
     assert certain["free", 5.0] > certain["free", 0.5]
     # A longer look gains less where pulses are summed in power: the best rate is higher.
-    amplitude, _ = page.best_rate(approach, mean_range_m)
+    amplitude, farthest_m = page.best_rate(approach, mean_range_m)
+    # Another program's optima for the same radar: 0.29 Hz and 3.18 km, 0.73 Hz and 2.27 km.
+    assert (amplitude, farthest_m) == pytest.approx((0.29, 3180.0), rel=0.02)
+    surest = page.best_rate(approach, lambda *of: certain_range_m(*of, 0.95))
+    assert surest == pytest.approx((0.73, 2270.0), rel=0.03)
     power, _ = page.best_rate(approach, mean_range_m, "noncoherent")
     assert 0.1 < amplitude < 0.5 * power < 2.0
