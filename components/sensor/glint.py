@@ -63,7 +63,8 @@ class Wander:
     def __init__(self, block: Any) -> None:
         self._share = block.p.glint_share
         self._process = GaussMarkov(block.stream("glint"), block.p.glint_correlation_time_s)
-        rosters = known_targets(block.context) or [Roster.of([("", Aircraft())])]
+        rosters = [one for one in known_targets(block.context) if len(one.extents_m)]
+        rosters = rosters or [Roster.of([("", Aircraft())])]
         length2, span2, height2 = np.mean(
             np.concatenate([roster.extents_m for roster in rosters]) ** 2, axis=0
         ).tolist()

@@ -87,6 +87,13 @@ def closest_m(run):
     )  # fmt: skip
 
 
+def above_own_m(run, track, time_s):
+    """How far a track was above the ownship, by its last row before an instant."""
+    rows = pq.read_table(run / "state_tracks.parquet").to_pylist()
+    known = [row for row in rows if row["track"] == track - TRACKS and row["time_s"] <= time_s]
+    return known[-1]["own_down_m"] - known[-1]["down_m"]
+
+
 @pytest.mark.parametrize(
     ("key", "judged", "arrow", "by_deg", "kept"),
     [("v", "verified", "ArrowRight", 60, True), ("x", "rejected", "ArrowLeft", -10, False)],
@@ -106,8 +113,9 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     alert = seen["alerts"][0]
     track, name = alert["target"], f"track {alert['target'] - TRACKS}"
     (symbol,) = [one for one in seen["symbols"] if one["number"] == track]
+    seen_s = seen["t"]
     shape, word = {2: ("circle", "CORRECTIVE"), 3: ("square", "WARNING")}[alert["level"]]
-    assert (symbol["shape"], symbol["tag"]) == (shape, "+01") and seen["sounds"] == 1
+    assert symbol["shape"] == shape and seen["sounds"] == 1
     assert page.locator("#banner").inner_text().startswith(f"{word} {name}: separation is lost")
     assert page.locator("#contacts li").first.inner_text().startswith(f"{word}, {name}, 2 o'clock")
     page.keyboard.press(key)
@@ -130,6 +138,9 @@ def test_a_session_is_decided_by_its_operator_and_replays(
     assert math.degrees(rows[2]["turn_rad"]) == pytest.approx(by_deg) == turn["value"]
     assert rows[0]["response_s"] < rows[1]["response_s"] <= rows[2]["response_s"]
     assert (closest_m(session.out) > KEPT_M) == kept
+    # When the page saw the alert is chance: what it wrote there is the track's height of then.
+    above_ft = above_own_m(session.out, track, seen_s) / 0.3048
+    assert 100 * int(symbol["tag"]) == pytest.approx(above_ft, abs=50 + 10)
     dsa_des.run(dsa_des.load_scene(session.out / "scene.toml"), out=tmp_path / "again")
     for table in session.out.glob("*.parquet"):
         assert (tmp_path / "again" / table.name).read_bytes() == table.read_bytes(), table.name
