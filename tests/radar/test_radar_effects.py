@@ -289,12 +289,12 @@ def test_targets_that_are_not_offered(scene, monkeypatch):
 
 
 def test_all_effects_together_in_any_window(scene):
-    """A turned radar over ground, in rain, with noise and a sweeping beam."""
+    """A turned radar over ground, in drizzle, with noise and a sweeping beam."""
     radar = (
         CELLS + 'beam_sweep = true\nfluctuation = "sampled"\nminimum_range_m = 500\n'
         "mount_azimuth_deg = 20\nmount_roll_deg = 5\n"
     )
-    path = scene(radar, "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 2\ngas = true\n")
+    path = scene(radar, "[terrain]\nheight_m = 960\n[weather]\nrain_rate_mm_h = 0.2\ngas = true\n")
     _, whole = simulate(path)
     rows = radar_rows(whole)
     assert {row["target"] for row in rows} >= {"a", None}

@@ -75,7 +75,6 @@ def test_a_key_that_changes_nothing_is_warned_of(table, sections, key, because):
         ("tracking.ekf", {"jpda_exact_detections": 4}, "jpda_exact_detections is 4"),
         ("tracking.ekf", {"false_confirmation": 1e-3}, "false_confirmation is 0.001"),
         ("tracking.imm", {"initiation": "likelihood_ratio", "confirm_m": 2}, "confirm_m is 2"),
-        ("tracking.ukf", {"lag_s": 2.5}, "lag_s is 2.5"),
     ],
 )
 def test_keys_of_trackers_that_change_nothing_are_warned_of(kind, keys, key):
