@@ -1,5 +1,6 @@
 """A small scene for studies, and blocks that break on purpose."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,8 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "fragile.py").write_text(FRAGILE)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    # An earlier test's module would be taken for this folder's: its path is part of a study.
+    monkeypatch.delitem(sys.modules, "fragile", raising=False)
     return tmp_path
 
 
