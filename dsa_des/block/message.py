@@ -350,6 +350,9 @@ def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> N
         raise TypeError(f"{said}: an array of {count} {what} is needed")
     if value.ndim == 0 or len(value) != count:
         raise ValueError(f"{said} where the message has {count} {what}")
+    # Whole numbers of any size, such as sets of more than 63 sensors, are objects.
+    if value.dtype.kind == "O" and all(isinstance(one, int) for one in value.flat):
+        return
     if value.dtype.kind not in _NUMBERS:
         raise TypeError(f"{said}: numbers are needed")
 
