@@ -38,7 +38,8 @@ def test_every_update_of_three_models_agrees_with_40_digits():
         variance = np.array(VECTORS["variances"][: kind.size])[:, None]
         before = bank.predict(states, covariances, weights, np.array([time_s - last_s]))
         last_s = time_s
-        pairs = bank.measure(bank.moments(kind, *before[:2], place), one, measured, variance)
+        moments = bank.moments(kind, *before[:2], place)
+        pairs = bank.measure(moments, one, measured, variance, None, before[2])
         states, covariances, weights = bank.update(*before, one, pairs, one)
         np.testing.assert_allclose(weights[:, 0], known["probabilities"], rtol=1e-9)
         for m in range(3):
