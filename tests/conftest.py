@@ -60,15 +60,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what tests/slow.txt lists."""
-    slow, known = set(listed("slow.txt")), set(listed("known_failures.txt"))
+    slow = set(listed("slow.txt"))
     for item in items:
         file, _, rest = item.nodeid.partition("::")
         if file in slow or f"{file}::{rest.split('[')[0]}" in slow:
             item.add_marker(pytest.mark.slow)
-        if f"{file}::{rest.split('[')[0]}" in known:
-            # Not strict, as some of their cases hold; the one that fills the memory is not run.
-            crashes = file.endswith("test_false_alarms_by_scan.py")
-            item.add_marker(pytest.mark.xfail(reason="tests/known_failures.txt", run=not crashes))
 
 
 def pytest_collection_finish() -> None:

@@ -108,6 +108,8 @@ class SessionCrew:
             self._gone_at = None
         self._operators = count
         self._pacer.wake()
+        # A run that pauses now comes to no other instant, and the other pages are to know of it.
+        self._server.show()
 
     def welcome(self, role: str) -> dict[str, Any]:
         """Return what a new page is told of the scene."""

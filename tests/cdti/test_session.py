@@ -187,11 +187,16 @@ def test_the_run_goes_on_or_pauses_without_its_operator(tmp_path, monkeypatch, u
     monkeypatch.setattr(crew, "GONE_S", 0.1)
     sets = ("record.truth=false", f"blocks.operator.unattended='{unattended}'")
     session = Session(monkeypatch, tmp_path / "run", factor="8", duration="6", sets=sets)
-    with page(session) as (socket, _):
+    with page(session) as (socket, _), session.socket() as other:
+        assert hear(other, "welcome")["role"] == "watcher"
         say(socket, type="ready")
         hear(socket, "frame")
-    with session.socket() as other:
-        assert hear(other, "welcome")["role"] == "watcher"
+        monkeypatch.setattr(crew, "FRAME_S", 1e9)
+        while hear(other, "frame")["operators"] == 0:
+            pass
+        socket.close()
+        # Whoever watches is told, though a run that pauses comes to no other instant.
+        wait_for(lambda: hear(other, "frame", timeout=10.0)["operators"] == 0)
         if unattended == "goes on":
             hear(other, "end")
         else:

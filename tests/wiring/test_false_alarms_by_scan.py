@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS
 from scipy.stats import binom, chi2
-from wired import chain, sensor
+from wired import chain, noise_crosses, sensor
 
 import dsa_des
 from dsa_des.record.recording import MemorySink, Recorder
@@ -19,7 +19,6 @@ RADAR = {
     "azimuth_deg": [-15, 25], "elevation_deg": [-12, 8], "range_km": 2.0, "minimum_range_m": 500.0,
     "azimuth_resolution_deg": 2.0, "elevation_resolution_deg": 4.0, "range_resolution_m": 150.0,
     "mount_azimuth_deg": 30.0, "mount_roll_deg": 25.0, "misalignment_deg": [1.0, 0.0, 0.0],
-    "false_alarms": True, "false_alarm_probability": PFA,
 }  # fmt: skip
 CAMERA = {"azimuth_deg": [-15, 25], "range_km": 2.0, "false_alarms_per_frame": PER_FRAME,
           "threshold": 1.0, "noise_equivalent_contrast": None}  # fmt: skip
@@ -28,7 +27,10 @@ FAR = [{**crooked.ROLLING, "north_m": -60_000.0}]
 
 def noisy(rate_hz: int) -> dict:
     sensors = {
-        kind.replace(".", "_"): sensor(kind, scan_rate_hz=rate_hz, **RADAR) for kind in LINK_BUDGETS
+        kind.replace(".", "_"): sensor(
+            kind, scan_rate_hz=rate_hz, **RADAR, **noise_crosses(kind, PFA)
+        )
+        for kind in LINK_BUDGETS
     }
     for kind in CAMERAS:
         sensors[kind.replace(".", "_")] = sensor(kind, scan_rate_hz=rate_hz, **CAMERA)

@@ -98,7 +98,7 @@ def test_steady_echoes_are_as_strong_as_a_noncentral_sum(kind, pulses):
 
     keys = {"pulses": pulses, "power_w": 30.0, "swerling": 0, "scan_rate_hz": 500}
     if kind == "radar.threshold":
-        keys = {**keys, "threshold_db": -3.0}
+        keys = {**keys, "threshold_db": 10.0}
         keys.pop("swerling")
     view = {**VIEW, "azimuth_deg": [-180, 180], "elevation_deg": [-90, 90], **keys,
             "false_alarm_probability": 1e-6}  # fmt: skip

@@ -43,22 +43,28 @@ def clutter_to_signal(target: dict, height_m: float, gamma_db: float, rcs_m2: fl
 )
 @pytest.mark.parametrize("rain_mm_h", [0.0, 3.0])
 def test_clutter_is_that_of_the_ground_below_the_line_of_sight(ground_m, gamma_db, rain_mm_h):
-    """Rain on the way weakens both echoes alike."""
-    terrain = {"height_m": ground_m, "clutter_gamma_db": gamma_db}
+    """Rain on the way weakens both echoes alike, and its own adds to the ground's."""
     weather = {"rain_rate_mm_h": rain_mm_h, "rain_top_m": 9000.0}
-    scene = chain({"radar": RADAR}, targets=TARGETS, terrain=terrain, weather=weather)
-    seen = first_look(scene, "radar")
+
+    def clutter_to_noise(gamma_db: float) -> dict[str, tuple[float, float]]:
+        """Each target's SNR, and what stands beside it."""
+        terrain = {"height_m": ground_m, "clutter_gamma_db": gamma_db}
+        scene = chain({"radar": RADAR}, targets=TARGETS, terrain=terrain, weather=weather)
+        found = {}
+        for name, row in first_look(scene, "radar").items():
+            # Confidence counts clutter as noise, the recorded SNR does not.
+            lost_db = row["snr_db"] - RADAR["threshold_db"] - row["confidence"]
+            found[name] = 10.0 ** (0.1 * row["snr_db"]), 10.0 ** (0.1 * lost_db) - 1.0
+        return found
+
+    seen, dark = clutter_to_noise(gamma_db), clutter_to_noise(-100.0)
     height_m = crooked.OWNSHIP["alt_m"] - ground_m
     for target in TARGETS:
-        row = seen[target["name"]]
-        # Confidence counts clutter as noise, the recorded SNR does not.
-        lost_db = row["snr_db"] - RADAR["threshold_db"] - row["confidence"]
-        cnr = 10.0 ** (lost_db / 10.0) - 1.0
-        expected = 10.0 ** (row["snr_db"] / 10.0) * clutter_to_signal(
-            target, height_m, gamma_db, 10.0**0.301
-        )
+        snr, cnr = seen[target["name"]]
+        expected = snr * clutter_to_signal(target, height_m, gamma_db, 10.0**0.301)
         assert expected > 0.1
-        assert cnr == pytest.approx(expected, rel=1e-3)
+        assert cnr - dark[target["name"]][1] == pytest.approx(expected, rel=1e-3)
+        assert (dark[target["name"]][1] > 0.01) == (rain_mm_h > 0.0)
 
 
 @covers("clutter_mean", of=("[terrain]",))

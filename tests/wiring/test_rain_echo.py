@@ -10,7 +10,7 @@ import crooked
 import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from scipy.integrate import quad
-from wired import chain, first_look, run, sensor
+from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -287,8 +287,8 @@ def test_rain_makes_false_alarms_where_the_threshold_stays():
     pfa, power_w, scans = 1e-4, 3.0, 40
     keys = {**BEAM, "power_w": power_w, "antenna_gain_db": 30.0, "bandwidth_hz": 1e5,
             "azimuth_deg": [-15, 15], "elevation_deg": [-8, 8], "range_km": 3.9,
-            "minimum_range_m": 300.0, "false_alarm_probability": pfa,
-            "false_alarms": True, "clutter_threshold": "noise", "scan_rate_hz": 20}  # fmt: skip
+            "minimum_range_m": 300.0, "clutter_threshold": "noise", "scan_rate_hz": 20,
+            **noise_crosses("radar.threshold", pfa)}  # fmt: skip
     scene = chain({"radar": sensor("radar.threshold", **keys)}, duration_s=scans / 20,
                   targets=[{**TARGETS[0], "north_m": 50_000.0}],
                   weather={"rain_rate_mm_h": 1.0, "rain_top_m": 20_000.0})  # fmt: skip

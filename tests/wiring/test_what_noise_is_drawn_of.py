@@ -44,12 +44,12 @@ def test_detections_of_one_pixel_stand_by_their_confidence():
 
 @pytest.mark.parametrize("kind", ["radar.threshold", "radar.swerling"])
 def test_echoes_have_crossed_the_threshold_of_a_cell(kind):
-    """What is as faint as noise is as strong."""
+    """What is hardly stronger than noise is as strong as noise that has crossed it."""
     keys = {"scan_rate_hz": 20, **noise_crosses(kind, 0.05)}
-    if kind == "radar.threshold":  # which detects what is stronger on average
-        keys["threshold_db"] = -300.0
+    # A threshold detects what is stronger on average.
+    power_w = 1.0 if kind == "radar.threshold" else 1e-9
     found = rows(run(chain(
-        {"radar": noisy(kind, "grid", power_w=1e-9, **keys)},
+        {"radar": noisy(kind, "grid", power_w=power_w, **keys)},
         targets=CROWD, duration_s=4,
     )))  # fmt: skip
     strengths = [[row["snr_db"] for row in found if (row["target"] is None) == false]
