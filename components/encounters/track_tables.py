@@ -12,6 +12,8 @@ matrices and cannot be read outside of it.
 import csv
 import io
 import re
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,8 @@ from dsa_des.files.input_files import InputFileError, read_input_bytes, read_inp
 _GEODETIC = ("ID", "Time", "lat", "lon", "alt_MSL_ft")
 _PLANE = ("time_s", "x_ft", "y_ft", "z_ft")
 _ROWS = 7
+#: Of MATLAB's elements, the one that is packed.
+_COMPRESSED = 15
 #: Names of aircraft in their order.
 NAMES = ("ownship", "intruder")
 #: Tracks of one file, and where their origin is if that is known.
@@ -103,6 +107,30 @@ def _in_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
     return time_s, north, east, alt_ft * FOOT_M
 
 
+def _whole(file: bytes) -> None:
+    """Refuse a file of level 5 whose elements are cut off: SciPy reads on beyond their ends.
+
+    Raises
+    ------
+    ValueError, zlib.error
+        If one is, or is not as long as it says.
+    """
+    order = {b"IM": "<", b"MI": ">"}.get(file[126:128])
+    start = 128
+    while order is not None and start + 8 <= len(file):
+        kind, size = struct.unpack(f"{order}II", file[start : start + 8])
+        start += 8 + size
+        if start > len(file):
+            raise ValueError(f"an element of {size} bytes is cut off at byte {len(file)}")
+        if kind == _COMPRESSED:
+            unpack = zlib.decompressobj()
+            part = unpack.decompress(file[start - size : start], 2**20)
+            while part and not unpack.eof:
+                part = unpack.decompress(unpack.unconsumed_tail, 2**20)
+            if not unpack.eof:
+                raise ValueError(f"the packed element that ends at byte {start} is cut off")
+
+
 def read_track_matrices(path: Path) -> Tracks:
     """Read the tracks of a MATLAB file: every matrix of 7 rows in it, in order of their names.
 
@@ -115,7 +143,9 @@ def read_track_matrices(path: Path) -> Tracks:
     from scipy.io.matlab import MatlabObject, MatlabOpaque
 
     try:
-        content = loadmat(io.BytesIO(read_input_bytes(path)))
+        file = read_input_bytes(path)
+        _whole(file)
+        content = loadmat(io.BytesIO(file))
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None
     except Exception as error:  # SciPy raises whatever comes of bytes that it does not check

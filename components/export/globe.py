@@ -34,7 +34,8 @@ def _detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, flo
         name: run.numbers("detections", name)
         for name in ("time_s", "azimuth_rad", "elevation_rad", "range_m", *_POSE)
     }
-    there = np.flatnonzero(np.isfinite(list(number.values())).all(axis=0))
+    there = np.flatnonzero(~np.isnan(list(number.values())).any(axis=0))
+    run.refuse_large("detections", {n: np.where(np.isnan(v), 0.0, v) for n, v in number.items()})
     if len(there) == 0:
         return
     number = {name: values[there] for name, values in number.items()}

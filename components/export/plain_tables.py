@@ -1,11 +1,15 @@
 """A run's tables as CSV, and as one MATLAB file."""
 
 import io
+import re
 from typing import Any
 
 import numpy as np
 
 from components.export.recorded import RecordedTables
+from dsa_des.errors import UsageError
+
+_MATLAB_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
 def csv_files(run: RecordedTables) -> dict[str, bytes]:
@@ -35,9 +39,21 @@ def mat_bytes(run: RecordedTables) -> bytes:
     """Return a MATLAB file (level 5) with a struct for each table, a field for each column.
 
     Numbers are column vectors, NaN where nothing was measured; texts are cell arrays.
+
+    Raises
+    ------
+    UsageError
+        If a table or a column has a name that MATLAB cannot have.
     """
     from scipy.io import savemat
 
+    for table, columns in run.tables.items():
+        for name in (table, *columns.column_names):
+            if _MATLAB_NAME.fullmatch(name) is None:
+                raise UsageError(
+                    f"{run.folder}: {table}.parquet: {name!r} cannot be the name of a table or a "
+                    "column in MATLAB: a letter, then at most 62 letters, digits and underscores"
+                )
     content = {name: _struct(table) for name, table in run.tables.items()}
     stream = io.BytesIO()
     savemat(stream, content, long_field_names=True, oned_as="column")

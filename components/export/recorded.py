@@ -59,13 +59,7 @@ class RecordedTables:
             raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
         found: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
-        for name, values in columns.items():
-            if not (np.abs(values) <= _LARGEST).all():
-                row = int(np.argmax(~(np.abs(values) <= _LARGEST)))
-                raise UsageError(
-                    f"{self.folder}: truth.parquet: {name} in row {row} is {values[row]:g}: a "
-                    f"flight needs numbers within ±{_LARGEST:g}"
-                )
+        self.refuse_large("truth", columns)
         who = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
         for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
             mine = np.flatnonzero(who == name)
@@ -74,6 +68,22 @@ class RecordedTables:
             if len(time_s):
                 found[name] = {key: values[mine][first] for key, values in columns.items()}
         return found
+
+    def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
+        """Refuse what is no number, or greater than any of a run, by name and row.
+
+        Raises
+        ------
+        UsageError
+        """
+        for name, values in columns.items():
+            large = ~(np.abs(values) <= _LARGEST)
+            if large.any():
+                row = int(np.argmax(large))
+                raise UsageError(
+                    f"{self.folder}: {table}.parquet: {name} in row {row} is {values[row]:g}: a "
+                    f"flight needs numbers within ±{_LARGEST:g}"
+                )
 
     def numbers(self, table: str, name: str) -> FloatArray:
         """Return a column as numbers, NaN where nothing stands.

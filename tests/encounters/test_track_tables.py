@@ -132,6 +132,16 @@ def test_what_is_wrong_names_file_and_line_and_can_be_skipped(tmp_path: Path) ->
     out.unlink()
     (tmp_path / "none.mat").write_bytes(b"nothing")
     assert "is no MATLAB file" in refused(tmp_path / "none.mat")
+    # SciPy reads on beyond the end of what is cut off, which ended the process.
+    for packed in (False, True):
+        savemat(tmp_path / "cut.mat", {"a": matrix(1)}, do_compression=packed)
+        content = (tmp_path / "cut.mat").read_bytes()
+        (tmp_path / "cut.mat").write_bytes(content[:-1])
+        assert "is no MATLAB file of version 7 or less: an el" in refused(tmp_path / "cut.mat")
+        kind = content[128:132]
+        short = (len(content) - 137).to_bytes(4, "little")
+        (tmp_path / "cut.mat").write_bytes(content[:128] + kind + short + content[136:-1])
+        assert "cut off" in refused(tmp_path / "cut.mat") or not packed
     savemat(tmp_path / "other.mat", {"x": np.zeros((3, 9))})
     assert "holds no matrix of 7 rows" in refused(tmp_path / "other.mat")
     savemat(tmp_path / "events.mat", {"event": np.zeros((3, 4))})

@@ -218,6 +218,7 @@ def test_daa_holds_every_row_in_its_units():
         ("daa", "truth", "time_s", "x", "time_s holds no numbers"),
         ("czml", "truth", "lon_deg", None, "there is no column 'lon_deg'"),
         ("kml", "detections", "own_roll_rad", None, "there is no column 'own_roll_rad'"),
+        ("kml", "detections", "time_s", 1e300, "detections.parquet: time_s in row 0 is 1e+300"),
         ("view", "truth", "lat_deg", None, "truth.parquet: there is no column 'lat_deg'"),
         ("view", "detections", "azimuth_rad", "x", "its tables are not those of a run"),
     ],
@@ -239,6 +240,17 @@ def test_damaged_run_folders_are_said(run, tmp_path, to, table, column, value, s
     command, words = (view, []) if to == "view" else (export, ["--to", to])
     done = CliRunner().invoke(command, [str(folder), *words, "--out", str(tmp_path / "o.html")])
     assert done.exit_code == 2 and said in done.output and not (tmp_path / "o.html").exists()
+
+
+@pytest.mark.parametrize("name", ["", "_x", "1x", "x y", "x" * 64])
+def test_names_that_matlab_cannot_have_are_said(run, tmp_path, name):
+    folder = tmp_path / "named"
+    shutil.copytree(run, folder)
+    found = pq.read_table(folder / "scans.parquet")
+    pq.write_table(found.append_column(name, found["scan"]), folder / "scans.parquet")
+    words = [str(folder), "--to", "mat", "--out", str(tmp_path / "o.mat")]
+    done = CliRunner().invoke(export, words)
+    assert done.exit_code == 2 and f"scans.parquet: {name!r} cannot be the name" in done.output
 
 
 @pytest.mark.parametrize("to", ["csv", "kml", "czml", "daa", "mat"])
