@@ -152,9 +152,16 @@ def outcome_lines(summary: dict[str, Any]) -> list[str]:
     Parameters
     ----------
     summary : dict
-        With the sections of `components.display.outcomes.outcome_observers`.
+        With the sections of `components.display.outcomes.outcome_observers`, and ``late_looks`` of
+        trackers.
     """
     lines = [f"{name}: {_tracks_text(told)}" for name, told in summary.get("tracks", {}).items()]
+    lines += [
+        f"{name}: {told['left_out']:,} of {told['looks']:,} looks of {sensor} "
+        f"({told['share']:.0%}) came too late and were left out"
+        for name, late in summary.get("late_looks", {}).items()
+        for sensor, told in late.items()
+    ]
     for name, first_s in summary.get("alerts", {}).items():
         times = ", ".join(f"level {level} from {when:.1f} s" for level, when in first_s.items())
         lines.append(f"{name}: {'alerts of ' + times if times else 'no alert'}")

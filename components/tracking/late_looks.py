@@ -96,7 +96,7 @@ def keys_of(scans: Scans) -> list[Key]:
 
 def rerun_plan(
     scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
-) -> tuple[Plan, int]:
+) -> tuple[Plan, list[int]]:
     """Return the order of work where late looks have all since them worked on again.
 
     Parameters
@@ -115,7 +115,8 @@ def rerun_plan(
     Returns
     -------
     plan : Plan
-    left_out : int
+    left_out : list of int
+        Looks that are not worked on.
     """
     keys = keys_of(scans)
     row = scans.row.tolist()
@@ -124,12 +125,12 @@ def rerun_plan(
     brought_by: list[int] = []
     replica: list[int] = []
     forgotten: list[list[int]] = []
-    left_out = 0
+    left_out: list[int] = []
     for new, place in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
         known = memory.setdefault(place, Memory())
         key = keys[new]
         if known.keys and key[0] < known.keys[-1][0] - lag_ticks:
-            left_out += 1
+            left_out.append(new)
             continue
         here = bisect_left(known.keys, key)
         again = known.looks[here:]
@@ -152,7 +153,7 @@ def rerun_plan(
 
 def one_step_plan(
     scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
-) -> tuple[Plan, int]:
+) -> tuple[Plan, list[int]]:
     """Return the order of work where late looks are worked on in one step.
 
     Parameters and what is returned are those of `rerun_plan`.
@@ -163,13 +164,13 @@ def one_step_plan(
     seen_from: list[int] = []
     replica: list[int] = []
     forgotten: list[list[int]] = []
-    left_out = 0
+    left_out: list[int] = []
     for new, place in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
         known = memory.setdefault(place, Memory())
         key, first, gone = keys[new], -1, 0
         newest = known.keys[-1][0] if known.keys else key[0]
         if key[0] < newest - lag_ticks:
-            left_out += 1
+            left_out.append(new)
             continue
         if key[0] < newest:
             first = known.looks[bisect_left(known.keys, (key[0] + 1, 0))]
@@ -210,7 +211,7 @@ def _planned(
     )  # fmt: skip
 
 
-def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, int]:
+def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
     """Return the order of work where late looks are left out.
 
     Parameters
@@ -229,7 +230,7 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, i
     tells = np.append(row[1:] != row[:-1], True)[: len(look)]
     none = np.full(len(look), -1)
     plan = Plan(look, none, none, look, tells, of[look], row, [])
-    return plan, len(scans) - len(look)
+    return plan, np.flatnonzero(~keep).tolist()
 
 
 def stores_before(before: dict[int, Before], looks: list[int], replicas: list[int]) -> TrackStore:

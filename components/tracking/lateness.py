@@ -1,10 +1,12 @@
-"""What comes late to a tracker, as far as a scene says before a run: whose looks, and how many."""
+"""What comes late to a tracker: what a scene says of it before a run, and what a run counts."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 from components.messages.detections import SensorOffer
+from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Producer
 from dsa_des.time.clock import ClockSpec
 
@@ -92,3 +94,35 @@ def _instant(clock: ClockSpec, scan: int) -> Fraction:
 def warning(name: str, share: float, why: str) -> str:
     """Return a sentence about looks that will be left out."""
     return f"{why}: up to {share:.0%} of the looks of {name} come too late and are left out"
+
+
+@dataclass(frozen=True, eq=False)
+class LookCount:
+    """How many looks of each sensor came, and how many of them too late.
+
+    Parameters
+    ----------
+    came, left_out : dict of int
+        By name of the sensor.
+    """
+
+    came: Mapping[str, int] = field(default_factory=dict)
+    left_out: Mapping[str, int] = field(default_factory=dict)
+
+    def of(self, sensors: tuple[str, ...], came: IntArray, left_out: IntArray) -> "LookCount":
+        """Return the count with more looks, each a mask of its sensors."""
+        return LookCount(
+            {n: self.came.get(n, 0) + int((came >> i & 1).sum()) for i, n in enumerate(sensors)},
+            {
+                n: self.left_out.get(n, 0) + int((left_out >> i & 1).sum())
+                for i, n in enumerate(sensors)
+            },
+        )
+
+    def late(self) -> dict[str, dict[str, float]]:
+        """Return looks, those left out and their share, by sensor; of those that lost any."""
+        return {
+            name: {"looks": self.came[name], "left_out": lost, "share": lost / self.came[name]}
+            for name, lost in sorted(self.left_out.items())
+            if lost
+        }

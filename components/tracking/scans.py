@@ -186,8 +186,10 @@ def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArra
     return velocity
 
 
-def when_made(scans: Scans, ahead: Scans | None, wake: Wake) -> tuple[Scans, Scans | None]:
-    """Return the looks that have been made by the rows of a wake, and those that wait.
+def when_made(
+    scans: Scans, ahead: Scans | None, wake: Wake, wait_ticks: int = 0
+) -> tuple[Scans, Scans | None]:
+    """Return the looks that are due by the rows of a wake, in order, and those that wait.
 
     A sweeping radar reports a scan as it begins, with instants at which its beam meets the targets
     later: such a look waits for the first row at or after its own instant.
@@ -199,12 +201,14 @@ def when_made(scans: Scans, ahead: Scans | None, wake: Wake) -> tuple[Scans, Sca
     ahead : Scans or None
         Those that have waited.
     wake : Wake
+    wait_ticks : int
+        How long after its own instant a look is due: until no older one can come any more.
     """
-    if ahead is None and not bool((scans.tick > wake.ticks[scans.row]).any()):
+    if ahead is None and not bool((scans.tick + wait_ticks > wake.ticks[scans.row]).any()):
         return scans, None
     if ahead is not None:
         scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
-    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick))
+    row = np.maximum(scans.row, np.searchsorted(wake.ticks, scans.tick + wait_ticks))
     span = wake.span_ticks or np.iinfo(np.int64).max
     of_look = scans.tick // span
     there = np.minimum(row, len(wake) - 1)

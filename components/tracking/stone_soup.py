@@ -1,7 +1,6 @@
 """A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
 
 from dataclasses import replace
-from fractions import Fraction
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +15,7 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
-from components.tracking.lateness import left_out, warning
+from components.tracking.lateness import LookCount, latest_s
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -77,8 +76,9 @@ class StoneSoupTracker(Component):
 
     The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
     Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
-    `fusion.pass_through` also those in vain. A look that comes after a later one is left out and
-    counted. Tracks that a tracker shows count as confirmed, after a look in vain as coasted.
+    `fusion.pass_through` also those in vain. A look waits for as long as a scene says that an older
+    one may still come; one that comes later all the same is left out and counted. Tracks that a
+    tracker shows count as confirmed, after a look in vain as coasted.
     """
 
     mark = TRACKER
@@ -103,7 +103,10 @@ class StoneSoupTracker(Component):
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
         self._newest = -1
-        self._late = 0
+        self._count = LookCount()
+        self._wait_ticks = int(
+            latest_s(self._offers(), self.context.producers) * self.context.ticks_per_s
+        )
         self._masks: dict[str, int] = {}
         self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
         self._repeatable = Repeatable(
@@ -112,15 +115,9 @@ class StoneSoupTracker(Component):
         self._tracker = self._built()
 
     def warnings(self) -> list[str]:
-        """Say whose looks will be left out as too late, and how many."""
-        offers: dict[str, Any] = {}
-        for producer in self.context.producers:
-            if isinstance(producer.offer, dict):
-                offers |= producer.offer
-        shares = left_out(offers, Fraction(0), self.context.duration_s)
-        why = "no look is worked on after a later one"
-        found = [warning(name, share, why) for name, share in shares.items()]
-        for name, offer in sorted(offers.items()):
+        """Say whose errors last from look to look, which Stone Soup takes for new ones."""
+        found = []
+        for name, offer in sorted(self._offers().items()):
             told = offer.lasting if isinstance(offer, SensorOffer) else None
             if told is None or told:
                 what = (
@@ -131,6 +128,13 @@ class StoneSoupTracker(Component):
                 found.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
                              "too sure where errors are the same again")  # fmt: skip
         return super().warnings() + found
+
+    def _offers(self) -> dict[str, Any]:
+        offers: dict[str, Any] = {}
+        for producer in self.context.producers:
+            if isinstance(producer.offer, dict):
+                offers |= producer.offer
+        return offers
 
     def _built(self) -> Any:
         name = self.p.builder
@@ -159,7 +163,7 @@ class StoneSoupTracker(Component):
         fused = wake["fused"]
         if fused is None:
             return None
-        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake)
+        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake, self._wait_ticks)
         if len(scans) == 0:
             return None
         if self._origin is None:
@@ -170,7 +174,7 @@ class StoneSoupTracker(Component):
                                 (pose[3], pose[4], pose[5]))  # fmt: skip
         told: list[tuple[int, int, Followed]] = []
         rows: list[int] = []
-        for row, looks in _by_row(self._in_time(scans), scans.row):
+        for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):
             here: dict[int, Followed] = {}
             for look in looks:
                 here |= {one.number: one for one in self._looked(fused, scans, look, places, wake)}
@@ -180,16 +184,13 @@ class StoneSoupTracker(Component):
             return None
         return self._message(wake, fused.sensors, rows, told, places)
 
-    def _in_time(self, scans: Scans) -> list[int]:
+    def _in_time(self, scans: Scans, sensors: tuple[str, ...]) -> list[int]:
         """Return the looks that come after no later one; the others are counted."""
-        found = []
-        for look, tick in enumerate(scans.tick.tolist()):
-            if tick < self._newest:
-                self._late += 1
-                continue
-            self._newest = tick
-            found.append(look)
-        return found
+        newest = np.maximum.accumulate(np.append(self._newest, scans.tick))
+        in_time = scans.tick >= newest[:-1]
+        self._newest = int(newest[-1])
+        self._count = self._count.of(sensors, scans.sensors, scans.sensors[~in_time])
+        return np.flatnonzero(in_time).tolist()
 
     def _looked(
         self, fused: FusedDetections, scans: Scans, look: int, places: Place, wake: Wake
@@ -277,8 +278,8 @@ class StoneSoupTracker(Component):
         )  # fmt: skip
 
     def report(self) -> dict[str, Any]:
-        """Return how many looks came too late."""
-        return {"late_looks": {self.name: self._late}}
+        """Return whose looks came too late."""
+        return {"late_looks": {self.name: self._count.late()}}
 
 
 def _by_row(looks: list[int], row: IntArray) -> list[tuple[int, list[int]]]:

@@ -27,7 +27,7 @@ from components.tracking.late_looks import (
     stores_before,
     straight_plan,
 )
-from components.tracking.lateness import latest_s, left_out, may_come_late, warning
+from components.tracking.lateness import LookCount, latest_s, left_out, may_come_late, warning
 from components.tracking.one_step import late_step
 from components.tracking.parameters import TrackerParameters
 from components.tracking.replica_memory import Heads, Past
@@ -106,7 +106,7 @@ class Tracker(Component):
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
         self._remembers = may_come_late(self._offers(), self.context.producers)
-        self._late, self._early = 0, 0
+        self._count, self._early = LookCount(), 0
 
     def goes_side_by_side(self) -> bool:
         """Say no where looks are worked on again: one replica's are remembered."""
@@ -233,7 +233,7 @@ class Tracker(Component):
         else:
             planned = rerun_plan if self.p.late == "rerun" else one_step_plan
             plan, left_out = planned(scans, of, begin, memory, self._lag_ticks)
-        self._late += left_out
+        self._count = self._count.of(fused.sensors, scans.sensors[begin:], scans.sensors[left_out])
         moves = scans.velocity if self.rules.rates_of else None
         origin = selected(heads.origin, of)
         places = place_in_frame(tuple(origin), *_pose(scans.pose), moves)
@@ -250,7 +250,8 @@ class Tracker(Component):
                     self.rules, store, old, scans, places, codes, plan.look[late], replicas,
                     heads.next_number[places_of], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
-                self._late += int(gone.sum())
+                in_vain = scans.sensors[plan.look[late[gone]]]
+                self._count = self._count.of(fused.sensors, in_vain[:0], in_vain)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, heads, plan, works_now, before)
@@ -308,8 +309,9 @@ class Tracker(Component):
         return store
 
     def report(self) -> dict[str, Any]:
-        """Return how many looks came too late, and how many had to wait for their own instant."""
-        return {"late_looks": {self.name: self._late}, "early_looks": {self.name: self._early}}
+        """Return whose looks came too late, and how many had to wait for their own instant."""
+        late = {self.name: self._count.late()}
+        return {"late_looks": late, "early_looks": {self.name: self._early}}
 
 
 def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:

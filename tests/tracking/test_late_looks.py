@@ -112,7 +112,11 @@ def test_looks_older_than_the_lag_are_left_out_and_counted():
         simulation, table = tracked(Simulation, scene(*LATE, *sets, duration_s="2"))
         block = simulation.nodes["tracker"].component
         assert np.isfinite(table["existence"].to_numpy()).all()
-        return block.report()["late_looks"]["tracker"]
+        late = block.report()["late_looks"]["tracker"]
+        for told in late.values():
+            assert 0 < told["left_out"] <= told["looks"]
+            assert told["share"] == told["left_out"] / told["looks"]
+        return sum(told["left_out"] for told in late.values())
 
     rerun = "blocks.tracker.late='rerun'"
     assert left_out(rerun) == 0

@@ -6,6 +6,7 @@ from covering import covers
 from wired import chain, rows, run
 
 import dsa_des
+from components.display.terminal import outcome_lines
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import warnings_of
 
@@ -99,3 +100,18 @@ def test_what_a_policy_drops_is_said_with_its_share():
     assert "50% of the looks of a_pulse" in half
     (lag,) = shares("0.5", lag_s=0.2)
     assert "lag_s is 0.2" in lag and "100%" in lag
+
+
+def test_what_a_run_left_out_is_said_with_its_sensor_and_share():
+    """The radar's looks at 0, 0.2, ... come 0.25 s later, by when the camera has seen the near."""
+    simulation = Simulation(dsa_des.load_scene(scene("0.25", late="drop")))
+    summary = simulation.run().report
+    ((tracker, late),) = summary["late_looks"].items()
+    (told,) = late.values()
+    assert list(late) == ["a_pulse"] and told["looks"] == 19 and told["left_out"] >= 17
+    assert told["share"] == told["left_out"] / 19
+    (line,) = outcome_lines({"late_looks": summary["late_looks"]})
+    assert line == (
+        f"{tracker}: {told['left_out']} of 19 looks of a_pulse ({told['share']:.0%}) "
+        "came too late and were left out"
+    )

@@ -137,23 +137,42 @@ def test_states_are_laid_out_as_said(tmp_path):
         run(scene(f"{file}:build", 1, {"radar": RADAR}))
 
 
+def given(simulation):
+    """Return when looks were made that a tracker was given, s, and what of each."""
+    told = simulation.components["tracker"]._tracker.given
+    told.clear()  # of the class
+    simulation.run()
+    return [(when - datetime(2000, 1, 1)).total_seconds() for when, _ in told], told
+
+
+def test_looks_wait_for_older_ones_that_a_scene_foresees(tmp_path):
+    """One sensor 0.3 s late, the other in time with something to see or in vain."""
+    file = tmp_path / "fixed.py"
+    file.write_text(FAKE.format(size=6, length=6, mapping="(0, 2, 4)"))
+    for late, reach_km in (("radar", 20.0), ("camera", 20.0), ("camera", 1.0)):
+        # Told when something comes 0.3 s after a look: of the camera's at 0.6 s, its own report.
+        expected = [0.0, 0.0, 0.2, 0.25, 0.4, 0.5] + ([0.6] if late == "camera" else [])
+        sensors = {"radar": {**RADAR, "range_km": reach_km}, "camera": dict(CAMERA)}
+        sensors[late]["latency_s"] = 0.3
+        simulation = Simulation(dsa_des.load_scene(scene(f"{file}:build", 1, sensors)))
+        times, _ = given(simulation)
+        assert times == expected
+        assert simulation.components["tracker"].report() == {"late_looks": {"tracker": {}}}
+
+
 def test_it_is_given_every_look_and_no_name(tmp_path):
     file = tmp_path / "fixed.py"
     file.write_text(FAKE.format(size=6, length=6, mapping="(0, 2, 4)"))
     short = {**RADAR, "range_km": 2.3}
     sensors = {"radar": short, "camera": {**CAMERA, "latency_s": 0.1}}
     simulation = Simulation(dsa_des.load_scene(scene(f"{file}:build", 1, sensors)))
-    simulation.run()
-    block = simulation.components["tracker"]
-    given = block._tracker.given
-    # The camera's look at 0.2 s comes when the radar's at 0.25 s has been worked on.
-    times = [(when - datetime(2000, 1, 1)).total_seconds() for when, _ in given]
-    assert times == [0.0, 0.0, 0.25, 0.4, 0.5, 0.6, 0.75, 0.8]
-    assert block.report() == {"late_looks": {"tracker": 1}}
+    times, told = given(simulation)
+    # The radar's look at 0.25 s waits for the camera's of 0.2 s, which comes at 0.3 s.
+    assert times == [0.0, 0.0, 0.2, 0.25, 0.4, 0.5, 0.6, 0.75, 0.8]
     # One target is beyond the radar's range, both are within the camera's.
-    said = [sorted(str(one.metadata) for one in found) for _, found in given]
+    said = [sorted(str(one.metadata) for one in found) for _, found in told]
     radar, camera = ["{'sensor': 'radar'}"], ["{'sensor': 'camera'}"] * 2
-    assert said == [radar, camera, radar, camera, radar, camera, radar, camera]
+    assert said == [radar, camera, camera, radar, camera, radar, camera, radar, camera]
 
 
 def test_order_draws_and_bytes_are_repeatable(tmp_path):
