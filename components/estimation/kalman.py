@@ -234,6 +234,9 @@ def variance_of_what_is_new(
     spread : (m, n)
         p.
     """
+    # What lasts may be more than a detection states: a camera knows no range, so its angles hold
+    # nothing of an error of its place.
+    variance = np.maximum(variance, common)
     shared = np.minimum(common, spread)
     left = np.maximum(spread - shared, 1e-6 * spread)
     new = spread * (spread * variance - shared * shared) / (left * left)

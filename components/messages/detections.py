@@ -73,6 +73,24 @@ MEASURED = (
 
 
 @dataclass(frozen=True)
+class LastingPart:
+    """An error that is forgotten with a time constant.
+
+    Parameters
+    ----------
+    variance : float
+    lasts_s : float
+        Infinite for what stays the same throughout a run.
+    across_m2 : float
+        Variance of a place across the line of sight: that of an angle is it over the range squared.
+    """
+
+    variance: float = 0.0
+    lasts_s: float = math.inf
+    across_m2: float = 0.0
+
+
+@dataclass(frozen=True)
 class LastingError:
     """What of a quantity's error is not new at every look; all parts are in its variance.
 
@@ -80,18 +98,11 @@ class LastingError:
     ----------
     step : float
         Of the grid to which the quantity is rounded; 0 for none.
-    bias_variance : float
-        Of what stays the same throughout a run.
-    variance : float
-        Of what is forgotten with a time constant.
-    lasts_s : float
-        That time constant.
+    parts : tuple of LastingPart
     """
 
     step: float = 0.0
-    bias_variance: float = 0.0
-    variance: float = 0.0
-    lasts_s: float = math.inf
+    parts: tuple[LastingPart, ...] = ()
 
 
 @dataclass(frozen=True)

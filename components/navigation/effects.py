@@ -16,7 +16,7 @@ import numpy as np
 
 from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
 from components.geometry.wrapping import wrap_two_pi
-from components.messages.detections import Detections
+from components.messages.detections import Detections, LastingPart
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.error_model import attitude_with_error, position_with_error
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -52,6 +52,24 @@ def navigation_noise(context: Context) -> tuple[Three, Three]:
     if navigation is None:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     return navigation.position_noise_m, _radians(navigation.attitude_noise_deg)
+
+
+def lasting_navigation(context: Context) -> dict[str, list[LastingPart]]:
+    """Return what noise of navigation is in errors that last, by measured quantity.
+
+    Each angle has of each turn at most its noise, each direction of the position's noise at most
+    the greatest.
+    """
+    navigation = context.sections["navigation"]
+    position_m, attitude_rad = navigation_noise(context)
+    angle: list[LastingPart] = []
+    along: list[LastingPart] = []
+    if lasts_s := navigation.attitude_correlation_time_s:
+        angle.append(LastingPart(max(attitude_rad) ** 2, lasts_s))
+    if lasts_s := navigation.position_correlation_time_s:
+        angle.append(LastingPart(lasts_s=lasts_s, across_m2=max(position_m) ** 2))
+        along.append(LastingPart(max(position_m) ** 2, lasts_s))
+    return {"azimuth": angle, "elevation": angle, "range": along}
 
 
 def _errors_of(context: Context) -> list[str]:

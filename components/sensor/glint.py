@@ -12,6 +12,7 @@ import numpy as np
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
 from components.geometry.attitude import body_angles, body_to_ned, ned_to_body, unit_vector
+from components.messages.detections import LastingPart
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -62,7 +63,8 @@ class Wander:
 
     def __init__(self, block: Any) -> None:
         self._share = block.p.glint_share
-        self._process = GaussMarkov(block.stream("glint"), block.p.glint_correlation_time_s)
+        self._lasts_s = block.p.glint_correlation_time_s
+        self._process = GaussMarkov(block.stream("glint"), self._lasts_s)
         rosters = [one for one in known_targets(block.context) if len(one.extents_m)]
         rosters = rosters or [Roster.of([("", Aircraft())])]
         length2, span2, height2 = np.mean(
@@ -110,6 +112,15 @@ class Wander:
         x, y, z = (range_m * to + by for to, by in zip(along, off, strict=True))
         azimuth, elevation = body_angles(x, y, z)
         return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
+
+    def lasting(self) -> dict[str, list[LastingPart]]:
+        """Return what wander is in errors that last, by quantity."""
+        share2, lasts_s = self._share**2, self._lasts_s
+        return {
+            "azimuth": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._level2)],
+            "elevation": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._upward2)],
+            "range": [LastingPart(share2 * self._level2, lasts_s)],
+        }
 
     def variances(
         self,

@@ -1,7 +1,7 @@
 """Errors of measured values as an effect: stated ones, and those that follow from the signal."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.messages.constant_columns import constant_column, not_measured
-from components.messages.detections import LastingError
+from components.messages.detections import LastingError, LastingPart
 from components.sensor.error_parameters import StatedError
 from components.sensor.grid import VARIANCE_OF, variance_of_step
 from components.sensor.look import Cells, Look
@@ -226,10 +226,22 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
     for name, step in _steps(p, steps).items():
         stated = _stated(p, name)
         bias = mean_square(replace(stated, deviation=0.0), p.biases == "drawn")
-        lasts = stated.correlation_time_s
-        variance = 0.0 if lasts is None else stated.deviation**2
-        if step or bias or variance:
-            found[name] = LastingError(step, bias, variance, math.inf if lasts is None else lasts)
+        parts = [LastingPart(bias)] if bias else []
+        if stated.correlation_time_s is not None and stated.deviation:
+            parts.append(LastingPart(stated.deviation**2, stated.correlation_time_s))
+        if step or parts:
+            found[name] = LastingError(step, tuple(parts))
+    return found
+
+
+def with_parts(
+    errors: Mapping[str, LastingError], parts: Mapping[str, Iterable[LastingPart]]
+) -> dict[str, LastingError]:
+    """Return lasting errors with more parts, of some quantities."""
+    found = dict(errors)
+    for name, more in parts.items():
+        known = found.get(name, LastingError())
+        found[name] = replace(known, parts=(*known.parts, *more))
     return found
 
 

@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages.detections import Detections, SensorOffer
+from components.messages.detections import Detections, LastingError, SensorOffer
 from components.messages.every_look import EveryLook, looks_of
 from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.navigation.effects import NavigationReport, navigation_noise
+from components.navigation.effects import NavigationReport, lasting_navigation, navigation_noise
 from components.sensor.believed_pose import believed_pose
 from components.sensor.declaration_by_place import DeclarationByPlace
 from components.sensor.declaration_rule import DeclarationRule
@@ -28,6 +28,7 @@ from components.sensor.measurement_errors import (
     MeasurementErrors,
     constant_variances,
     lasting_errors,
+    with_parts,
 )
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import Mounting
@@ -110,6 +111,8 @@ class Sensor(Measuring):
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
+        if Glint().verdict(self).simulated:
+            lasting = with_parts(lasting, Glint().build(self).lasting())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
@@ -117,9 +120,11 @@ class Sensor(Measuring):
             # In the ownship's axes each angle has some of both: the coarser stands for them.
             angles = [lasting.pop(name) for name in ("azimuth", "elevation") if name in lasting]
             if angles:
-                worst = max(angles, key=lambda one: one.step)
+                parts = tuple(dict.fromkeys(part for one in angles for part in one.parts))
+                worst = LastingError(max(one.step for one in angles), parts)
                 lasting |= {"azimuth": worst, "elevation": worst}
         if any(any(sigmas) for sigmas in navigation_noise(self.context)):  # differs with the pose
+            lasting = with_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,

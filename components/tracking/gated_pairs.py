@@ -249,7 +249,8 @@ def common_errors(
     moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
     moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
     variance = scans.variance[rows][:, cells]
-    return rules.lasting.common(rows, there, variance, moved, since_s)
+    range_m = np.where(np.isfinite(since_s), part.seen[2, there, track], np.inf)
+    return rules.lasting.common(rows, there, variance, moved, since_s, range_m)
 
 
 def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:

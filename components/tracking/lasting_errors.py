@@ -20,35 +20,42 @@ _QUANTITIES = ("azimuth", "elevation", "range", "range_rate")
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
-    """What of each sensor's errors lasts, each (4 quantities, sensors); 0 where nothing does.
+    """What of each sensor's errors lasts.
 
     Parameters
     ----------
-    step : ndarray
-        Of the grid.
-    bias : ndarray
-        Variance of what stays the same.
-    variance, lasts_s : ndarray
-        Of what is forgotten with a time constant.
+    step : (4 quantities, sensors)
+        Of the grid; 0 for none.
+    variance, lasts_s, across_m2 : (parts, 4 quantities, sensors)
+        As in `LastingPart`; 0 where there is none.
     """
 
     step: FloatArray
-    bias: FloatArray
     variance: FloatArray
     lasts_s: FloatArray
+    across_m2: FloatArray
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
         """Return those of the sensors, or None where all errors are new at every look."""
-        found = np.zeros((4, len(_QUANTITIES), len(sensors)))
-        found[3] = np.inf
-        for j, name in enumerate(sensors):
-            offer = offers.get(name)
-            told = offer.lasting if isinstance(offer, SensorOffer) else None
-            for quantity, one in (told or {}).items():
-                i = _QUANTITIES.index(quantity)
-                found[:, i, j] = one.step, one.bias_variance, one.variance, one.lasts_s
-        return cls(*found) if found[:3].any() else None
+        told = {
+            (_QUANTITIES.index(quantity), j): one
+            for j, name in enumerate(sensors)
+            if isinstance(offer := offers.get(name), SensorOffer)
+            for quantity, one in (offer.lasting or {}).items()
+        }
+        if not told:
+            return None
+        most = max(len(one.parts) for one in told.values())
+        step = np.zeros((len(_QUANTITIES), len(sensors)))
+        variance, across_m2 = np.zeros((2, most, *step.shape))
+        lasts_s = np.full(variance.shape, np.inf)
+        for place, one in told.items():
+            step[place] = one.step
+            for k, part in enumerate(one.parts):
+                variance[k][place], across_m2[k][place] = part.variance, part.across_m2
+                lasts_s[k][place] = part.lasts_s
+        return cls(step, variance, lasts_s, across_m2)
 
     def common(
         self,
@@ -57,6 +64,7 @@ class LastingErrors:
         variance: FloatArray,
         moved: FloatArray,
         since_s: FloatArray,
+        range_m: FloatArray,
     ) -> FloatArray:
         """Return the covariance of measurements' errors with those of their sensors' last ones.
 
@@ -72,6 +80,8 @@ class LastingErrors:
             How far the value has moved since the sensor's last measurement of the track.
         since_s : (m, n)
             Time since then; infinite where there was none.
+        range_m : (m, n)
+            How far the track was then.
 
         Returns
         -------
@@ -82,12 +92,12 @@ class LastingErrors:
             up to one step; exp(-6 x) has its slope at 0, and is less only beyond 0.79 steps.
         """
         quantity = np.array(rows)[:, np.newaxis]
-        step, bias, lasting, lasts_s = (
-            values[quantity, source]
-            for values in (self.step, self.bias, self.variance, self.lasts_s)
-        )
+        step, lasts_s = self.step[quantity, source], self.lasts_s[:, quantity, source]
+        lasting = self.variance[:, quantity, source]
+        if self.across_m2.any():
+            lasting = lasting + self.across_m2[:, quantity, source] / np.maximum(range_m, 1.0) ** 2
         rounding = step * step / 12.0
-        white = np.maximum(variance - rounding - bias - lasting, 0.0)
+        white = np.maximum(variance - rounding - lasting.sum(axis=0), 0.0)
         safe = np.where(step > 0.0, step, 1.0)
         # A variance that comes out as 1e-20 of a step has none of its own.
         white = np.where(white > 1e-9 * rounding, white, 0.0)
@@ -95,5 +105,4 @@ class LastingErrors:
         seen = np.isfinite(since_s)
         # Time over an infinite time constant is 0: nothing is forgotten.
         forgotten = np.exp(-np.where(seen, since_s, 0.0) / lasts_s)
-        both = np.minimum(rounding + bias + lasting * forgotten, variance)
-        return np.where(seen, both, 0.0)
+        return np.where(seen, rounding + (lasting * forgotten).sum(axis=0), 0.0)

@@ -86,7 +86,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/stone_soup.py", (_BLOCK,),
-        ("late-looks-go-on", "if tick < self._newest:", "if tick < -1:"),
+        ("late-looks-go-on", "np.flatnonzero(in_time).tolist()", "list(range(len(scans)))"),
+        ("no-look-waits", "wake, self._wait_ticks)", "wake, 0)"),
         ("name-of-the-target", '[{"sensor": name} for name in names]',
          '[{"sensor": name, "target": 0} for name in names]'),
         ("origin-of-every-look", "if self._origin is None:", "if True:"),

@@ -23,6 +23,23 @@ def test_tracks_of_the_first_command_are_as_sure_as_they_are_right():
     assert 4.0 < nees["track_nees_mean"] < 8.0
 
 
+@pytest.mark.parametrize(
+    "sets",
+    [
+        [f"blocks.{name}.errors='signal'" for name in ("radar", "eo", "ir")],
+        ["navigation.attitude_noise_deg=[0.1,0.1,0.1]", "navigation.position_noise_m=[3,3,5]"],
+    ],
+    ids=["glint", "navigation"],
+)
+def test_neither_glint_nor_navigation_is_averaged_away(sets):
+    """Taken for new at every look: 8.2 and 46. One track for each target, whatever errs."""
+    scene = dsa_des.load_scene("first_light", sets=[*FIRST_COMMAND, *sets])
+    result = dsa_des.study(scene, metrics=["tracking"], replicas=2, workers=1)
+    found = {row["result"]: row["value"] for row in result.summary.to_pylist()}
+    assert 2.0 < found["track_nees_mean"] < 7.0
+    assert found["track_ambiguity"] < 1.05 and found["track_spuriousness"] == 0.0
+
+
 @pytest.mark.parametrize("case", ["bias", "lasting"])
 def test_biases_and_lasting_errors_are_not_averaged_away(case):
     """Taken for new ones at every look, 94 % of all tracks have a NEES above 60."""
@@ -56,12 +73,12 @@ def test_rounding_has_in_common_at_least_what_two_looks_have(noise, moved):
     )
     one = np.zeros((1, 1))
     variance = one + 1.0 / 12.0 + noise**2
-    found = lasting.common([0], one.astype(int), variance, one + moved, one + 0.1)[0, 0]
+    found = lasting.common([0], one.astype(int), variance, one + moved, one + 0.1, one)[0, 0]
     real = float(np.mean(errors[0] * errors[1]))
     assert found >= real - 3e-4
     if moved == 0.0:
         assert found <= 1.65 * real + 1e-3  # pi² / 6 by the bound's making
-    assert lasting.common([0], one.astype(int), variance, one, one + np.inf)[0, 0] == 0.0
+    assert lasting.common([0], one.astype(int), variance, one, one + np.inf, one)[0, 0] == 0.0
 
 
 class Silent(OpticalRangeBoundary):

@@ -158,6 +158,13 @@ def test_looks_wait_for_older_ones_that_a_scene_foresees(tmp_path):
         times, _ = given(simulation)
         assert times == expected
         assert simulation.components["tracker"].report() == {"late_looks": {"tracker": {}}}
+    sensors = {"radar": RADAR, "camera": {**CAMERA, "processor": "chip"}}
+    queued = {**scene(f"{file}:build", 1, sensors), "processors": {"chip": {"service_s": 0.3}}}
+    simulation = Simulation(dsa_des.load_scene(queued))
+    times, _ = given(simulation)
+    assert times == [0.0, 0.25, 0.5, 0.75]
+    late = {"camera": {"looks": 3, "left_out": 3, "share": 1.0}}
+    assert simulation.components["tracker"].report() == {"late_looks": {"tracker": late}}
 
 
 def test_it_is_given_every_look_and_no_name(tmp_path):
