@@ -16,6 +16,7 @@ _NUMBERS = (
     "true_azimuth_rad",
     "true_elevation_rad",
     "true_range_m",
+    "confidence",
     "snr_db",
     "detection_probability",
     "pixels",
@@ -63,6 +64,7 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
         "true_azimuth_rad": cells.body_azimuth_rad,
         "true_elevation_rad": cells.body_elevation_rad,
         "true_range_m": cells.range_m,
+        "confidence": look.confidence,
         **look.extras,
     }
     for name in _NUMBERS:

@@ -27,16 +27,13 @@ class MeasuredStrength(Effect):
     name = "measured strength"
     acts_on = "strength"
     neutral = False
-    outside_the_proof = "without errors and false alarms a report says what decided it"
+    outside_the_proof = "a radar always measures strength"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms`` and ``errors``, and whether the radar is switched on."""
-        p = block.p
-        if not p.enabled:
+        """Ask whether the radar is switched on."""
+        if not block.p.enabled:
             return Verdict(False, "enabled is false")
-        if p.false_alarms:
-            return Verdict(True, "false_alarms is true")
-        return Verdict(p.errors != "grid", f"errors is {p.errors!r}")
+        return Verdict(True, "a radar measures strength as it measures places")
 
     def build(self, block: Any) -> "Strength":
         """Return what measures the strength of detections."""

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pymap3d
 import pytest
 from covering import covers
-from wired import Row, chain, rows, run, sensor
+from wired import Row, chain, decided, run, sensor
 
 import dsa_des
 from components.encounters.set_file import read_set
@@ -138,7 +138,7 @@ def look(carrier: str, folder, craft: dict, **sensors) -> dict[str, Row]:
     """First detection of each sensor."""
     scene = chain({**SENSORS, **sensors})
     scene["blocks"]["traffic"] = CARRIERS[carrier](craft, folder)
-    return {row["block"]: row for row in rows(run(scene), scan=0)}
+    return {row["block"]: row for row in decided(run(scene), scan=0)}
 
 
 def area_m2(row: Row) -> float:
@@ -316,7 +316,7 @@ def test_a_named_aircraft_goes_before_what_all_are(carrier, tmp_path):
     snr = {}
     for rcs_dbsm in (0.0, 5.0):
         scene["blocks"]["traffic"] = {**table, "intruder": {**BASE, "rcs_dbsm": rcs_dbsm}}
-        snr[rcs_dbsm] = rows(run(scene), block="radar")[0]["snr_db"]
+        snr[rcs_dbsm] = decided(run(scene), block="radar")[0]["snr_db"]
     del scene["blocks"]["traffic"]["aircraft"]
-    alike = rows(run(scene), block="radar")[0]["snr_db"]
+    alike = decided(run(scene), block="radar")[0]["snr_db"]
     assert snr[0.0] == snr[5.0] == pytest.approx(alike + 3.0)

@@ -5,7 +5,7 @@ import math
 import crooked
 import numpy as np
 import pytest
-from wired import HEARS_ALL, SEES_ALL, chain, first_look, rows, run
+from wired import HEARS_ALL, SEES_ALL, chain, decided, first_look, run
 
 AZIMUTHS, ELEVATIONS = range(0, 360, 10), range(-90, 91, 10)
 OTHERS = (
@@ -76,7 +76,7 @@ def test_silhouettes_by_aspect_and_later_too(tmp_path, kind, band):
     camera = {**SEES_ALL, "type": kind, "silhouette": "aspect_table", "scan_rate_hz": 2}
     found = run(chain({"eye": camera}, targets=targets))
     for scan in (0, 1):
-        seen = {row["target"]: row for row in rows(found, block="eye", scan=scan)}
+        seen = {row["target"]: row for row in decided(found, block="eye", scan=scan)}
         for target in TARGETS:
             row = seen[target["name"]]
             area_m2 = row["pixels"] * (row["true_range_m"] * math.radians(0.01)) ** 2

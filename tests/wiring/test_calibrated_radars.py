@@ -7,7 +7,7 @@ import pytest
 from covering import covers
 from scipy.optimize import brentq
 from scipy.special import chndtr
-from wired import Row, chain, rows, run
+from wired import Row, chain, decided, run
 
 import dsa_des
 from dsa_des.running.simulation import Simulation
@@ -48,7 +48,7 @@ def at(range_m: float, rcs_dbsm: float, swerling: int) -> dict:
 
 def seen(scene: dict) -> Row | None:
     """The first detection in 20 scans; nothing moves, so all look the same."""
-    found = rows(run(scene))
+    found = decided(run(scene))
     return found[0] if found else None
 
 
@@ -117,7 +117,7 @@ def test_each_target_fluctuates_by_its_own_model():
     """Five targets at one place: none has another one's Pd."""
     radar = {**RADAR, "type": "radar.swerling", "bandwidth_hz": 2e6, "power_w": 30.0}
     targets = [{**at(3600, 5.0, model), "name": f"swerling{model}"} for model in range(5)]
-    found = {row["target"]: row for row in rows(run(chain({"radar": radar}, ownship=OWN,
+    found = {row["target"]: row for row in decided(run(chain({"radar": radar}, ownship=OWN,
              targets=targets)))}  # fmt: skip
     snr = 10.0 ** (0.1 * next(iter(found.values()))["snr_db"])
     assert 3.0 < snr < 100.0
@@ -138,7 +138,7 @@ calibrate = { rcs_dbsm = 5, range_km = 4.2, pd = 0.83 }
 
 def pd_and_snr_db(scene: dsa_des.Scene) -> tuple[float, float]:
     """Of a steady place in the scene: the probability and the SNR of the first detection."""
-    row = rows(dsa_des.run(scene))[0]
+    row = decided(dsa_des.run(scene.set({"record.looks": True})))[0]
     return row["detection_probability"], row["snr_db"]
 
 

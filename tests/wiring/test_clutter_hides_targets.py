@@ -11,7 +11,7 @@ import pytest
 from covering import RADARS, covers
 from scipy.optimize import brentq
 from scipy.stats import binom
-from wired import chain, rows, run, sensor
+from wired import chain, decided, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -45,7 +45,7 @@ def scene(kind: str, gamma_db: float | None, **keys) -> dict:
 
 
 def seen(kind: str, gamma_db: float | None, **keys) -> int:
-    return len(rows(run(scene(kind, gamma_db, **keys))))
+    return len(decided(run(scene(kind, gamma_db, **keys))))
 
 
 @covers("clutter_threshold", of=RADARS)
@@ -93,7 +93,7 @@ def test_pd_in_clutter_is_that_over_noise_and_clutter(cells):
     """Gandhi and Kassam's closed form where the threshold is an average."""
     keys = {} if cells is None else {"cfar_reference_cells": cells}
     pfa = 1e-3
-    found = rows(
+    found = decided(
         run(scene("radar.swerling", -30.0, false_alarm_probability=pfa, power_w=10.0, **keys))
     )
     assert len(found) > 30
@@ -119,7 +119,7 @@ def test_so_many_looks_detect_as_is_said():
                   cfar_reference_cells=10, scan_rate_hz=1000)  # fmt: skip
     target = {**LOW, "speed_mps": 0.0, "east_m": 0.3 * LOW["east_m"], "north_m": 1900.0}
     table["blocks"]["traffic"]["intruders"], table["duration_s"] = [target], 20
-    found = rows(run(table))
+    found = decided(run(table))
     pd = found[0]["detection_probability"]
     assert 0.1 < pd < 0.9
     low, high = binom.interval(0.99, 20_000, pd)
@@ -139,7 +139,7 @@ def test_a_threshold_radar_needs_the_loss_of_its_cells_more():
             table = scene("radar.threshold", None, cfar_reference_cells=number, **keys)
             radar = table["blocks"]["radar"]
             table["blocks"]["radar"] = {k: v for k, v in radar.items() if v is not None}
-            (row,) = [row for row in rows(run(table)) if row["scan"] == 270]
+            (row,) = [row for row in decided(run(table)) if row["scan"] == 270]
             margin_db = 12.0 if number is None else 12.0 + 10.0 * math.log10(loss)
             assert row["snr_db"] - row["confidence"] == pytest.approx(margin_db, abs=1e-9)
 
@@ -155,7 +155,7 @@ def test_the_boundary_lies_where_its_target_stands_out_of_noise_and_clutter(
 ):
     """At 8 km noise is the target's echo over the SNR that Pd needs."""
     keys = {} if cells is None else {"cfar_reference_cells": cells}
-    found = rows(
+    found = decided(
         run(
             scene(
                 "radar.range_boundary", -36.0, boundary_rcs_dbsm=rcs_dbsm, boundary_pd=pd,
@@ -168,7 +168,7 @@ def test_the_boundary_lies_where_its_target_stands_out_of_noise_and_clutter(
     if cells is not None:
         a = pfa ** (-1.0 / cells) - 1.0
         loss = (a / (pd ** (-1.0 / cells) - 1.0) - 1.0) / needed
-    everywhere = rows(run(scene("radar.range_boundary", None)))
+    everywhere = decided(run(scene("radar.range_boundary", None)))
     count = 0
     for row in everywhere:
         over = power_over_clutter(row, -36.0) * 10.0 ** (0.1 * rcs_dbsm)
@@ -182,7 +182,7 @@ def test_the_boundary_lies_where_its_target_stands_out_of_noise_and_clutter(
 
 def test_a_crude_radar_without_cells_hears_no_ground():
     found = run(scene("radar.range_boundary", -10.0, range_resolution_m=0.0))
-    assert len(rows(found)) == seen("radar.range_boundary", None)
+    assert len(decided(found)) == seen("radar.range_boundary", None)
 
 
 BAD = [

@@ -9,7 +9,7 @@ import pytest
 from covering import covers
 from scipy.special import gammaincc
 from scipy.stats import gamma, kstest, ncx2, norm
-from wired import HEARS_ALL, chain, rows
+from wired import HEARS_ALL, chain, decided, rows, run
 
 import dsa_des
 from components.radar.detection import detection_probability
@@ -41,13 +41,18 @@ def formation(count: int) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def looks(count: int, duration_s: float, window: int | None = None, **keys: Any) -> Any:
-    """Return the detections of a formation as columns, and the run."""
+def looks(
+    count: int, duration_s: float, window: int | None = None, table: str = "looks", **keys: Any
+) -> Any:
+    """Return the looks that detect one of a formation, or their detections, as columns."""
     scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(count), duration_s=duration_s)
     sink = MemorySink()
-    simulation = Simulation(load_scene(scene), recorder=Recorder([sink]), window=window)
+    simulation = Simulation(
+        load_scene({**scene, "record": {"looks": True}}), recorder=Recorder([sink]), window=window
+    )
     simulation.run()
-    return sink.tables()["detections"]
+    found = sink.tables()[table]
+    return found.filter(found["detected"]) if table == "looks" else found
 
 
 def power(**keys: Any) -> Any:
@@ -118,10 +123,10 @@ def test_a_faster_radar_sees_the_same_fades_at_the_same_instants():
 ])  # fmt: skip
 def test_windows_and_replicas_together_change_nothing(lasts):
     keys = {"power_w": 3.5, "swerling": 3, **lasts}
-    whole = looks(5, 2, **keys)
+    whole = looks(5, 2, table="detections", **keys)
     assert 20 < len(whole) < 100
     for window in (1, 7):
-        assert looks(5, 2, window=window, **keys).equals(whole)
+        assert looks(5, 2, window=window, table="detections", **keys).equals(whole)
     scene = chain({"sensor": {**RADAR, **keys}}, targets=formation(5), duration_s=2)
     scenes = [load_scene(scene, seed=seed) for seed in (20, 21, 22)]
     sink = MemorySink()
@@ -148,7 +153,7 @@ def test_an_echo_fades_between_two_publications_of_where_its_target_is():
     radar = {**RADAR, **LOUD, "fluctuation_correlation_s": 0.2}
     scene = chain({"sensor": radar}, targets=formation(3))
     scene["blocks"]["traffic"]["update_rate_hz"] = 1
-    published = {(row["scan"], row["target"]): row["snr_db"] for row in rows(dsa_des.run(scene))}
+    published = {(row["scan"], row["target"]): row["snr_db"] for row in decided(run(scene))}
     assert len(published) == len(set(published.values())) == 30
 
 
@@ -168,7 +173,7 @@ def test_an_echo_scintillates_as_the_target_turns(turned, extent_m):
         angles = {key: value + more.get(key, 0.0) for key, value in attitude.items()}
         targets = [{**target, **angles} for target in formation(count)]
         radar = {**RADAR, **LOUD, "scintillation_extent_m": extent_m, "scan_rate_hz": 1}
-        found = rows(dsa_des.run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
+        found = decided(run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
         by_name = {row["target"]: 10.0 ** (0.1 * row["snr_db"]) for row in found}
         power = np.array([by_name.get(target["name"], np.nan) for target in targets])
         seen.append(power / np.nanmean(power))
@@ -189,7 +194,7 @@ def test_an_echo_scintillates_as_the_target_is_seen_from_farther_below():
     for more_m in (0.0, 2.2):
         targets = [{**target, "up_m": target["up_m"] + more_m} for target in formation(count)]
         radar = {**RADAR, **LOUD, "scintillation_extent_m": extent_m, "scan_rate_hz": 1}
-        found = rows(dsa_des.run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
+        found = decided(run(chain({"sensor": radar}, targets=targets, duration_s=0.5)))
         by_name = {row["target"]: 10.0 ** (0.1 * row["snr_db"]) for row in found}
         seen.append([by_name.get(target["name"], 0.0) for target in targets])
         sides.append([crooked.ned(target) for target in targets])
@@ -218,7 +223,7 @@ def test_echoes_of_targets_with_models_of_their_own_scintillate_as_if_alone():
 
     def seen(some: list[dict[str, Any]]) -> dict[str, float]:
         scene = chain({"sensor": radar}, targets=some, duration_s=0.5)
-        return {row["target"]: row["snr_db"] for row in rows(dsa_des.run(scene))}
+        return {row["target"]: row["snr_db"] for row in decided(run(scene))}
 
     together = seen(targets)
     assert len(together) == 4
@@ -268,7 +273,7 @@ def declared_share(lasts_s: float | None, rate_hz: float) -> float:
     }
     if lasts_s is not None:
         keys["fluctuation_correlation_s"] = lasts_s
-    found = looks(600, 1.5, **keys).to_pydict()
+    found = looks(600, 1.5, table="detections", **keys).to_pydict()
     declared = {
         name for name, is_so in zip(found["target"], found["declared"], strict=True) if is_so
     }

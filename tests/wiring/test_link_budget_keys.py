@@ -6,7 +6,7 @@ import crooked
 import numpy as np
 import pytest
 from covering import LINK_BUDGETS, covers
-from wired import alone, chain, rows, run, sensor
+from wired import alone, chain, decided, run, sensor
 
 BASE = {"wavelength_m": 0.03, "integration_gain_db": 4.0, "noise_figure_db": 3.0, "losses_db": 5.0}
 RANGES = {target["name"]: float(np.linalg.norm(crooked.ned(target))) for target in crooked.TARGETS}
@@ -16,7 +16,7 @@ def snr_db(kind: str, targets=crooked.TARGETS, **keys) -> dict[str, float]:
     """SNR by target; keys that are None are left out of the radar's table."""
     table = {**sensor(kind), "frequency_hz": None, **BASE, **keys}
     given = {key: value for key, value in table.items() if value is not None}
-    found = rows(run(chain({"sensor": given}, targets=targets)), block="sensor")
+    found = decided(run(chain({"sensor": given}, targets=targets)), block="sensor")
     return {row["target"]: row["snr_db"] for row in found}
 
 
@@ -86,7 +86,7 @@ def test_decibels_of_a_calibration(kind, changed, gained_db):
 def test_nothing_is_heard_nearer_than_the_minimum_range(kind):
     far_m, near_m = RANGES["rolling"], RANGES["diving"]
     for nearest_m, seen in ((near_m - 0.1, 2), (near_m + 0.1, 1), (far_m + 0.1, 0)):
-        found = rows(alone(kind, minimum_range_m=nearest_m), block="sensor")
+        found = decided(alone(kind, minimum_range_m=nearest_m), block="sensor")
         assert len(found) == seen, nearest_m
 
 
@@ -97,7 +97,7 @@ def test_flat_drops_take_more_of_a_horizontal_wave(kind):
     for polarisation in ("horizontal", "circular", "vertical"):
         table = sensor(kind, polarisation=polarisation)
         weather = {"rain_rate_mm_h": 20.0, "rain_top_m": 9000.0}
-        found = rows(run(chain({"sensor": table}, weather=weather)))
+        found = decided(run(chain({"sensor": table}, weather=weather)))
         lost[polarisation] = {row["target"]: -row["snr_db"] for row in found}
     for name in RANGES:
         horizontal, circular, vertical = (lost[key][name] for key in lost)
@@ -110,8 +110,8 @@ def test_a_table_of_rcs_is_used_unless_told_not_to(kind, tmp_path):
     path = tmp_path / "rcs.csv"
     path.write_text("az_deg,el_deg,dbsm\n0,0,17\n180,0,17\n", encoding="utf-8")
     targets = [{**target, "rcs_table": str(path)} for target in crooked.TARGETS]
-    with_table = {r["target"]: r["snr_db"] for r in rows(alone(kind, targets=targets))}
+    with_table = {r["target"]: r["snr_db"] for r in decided(alone(kind, targets=targets))}
     off = alone(kind, targets=targets, aspect_rcs=False)
-    without = {r["target"]: r["snr_db"] for r in rows(off)}
+    without = {r["target"]: r["snr_db"] for r in decided(off)}
     for name in RANGES:
         assert with_table[name] - without[name] == pytest.approx(17.0 - 3.01, abs=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
 from scipy.stats import norm
-from wired import alone, chain, rows, run, sensor
+from wired import alone, chain, decided, rows, run, sensor
 
 from components.radar.parameters import RadarParameters
 from components.radar.radar_block import Radar
@@ -280,9 +280,9 @@ def test_errors_in_clutter_follow_the_ratio_to_noise_and_clutter():
     still = {"targets": [{**crooked.DIVING, "speed_mps": 0.0, "climb_mps": 0.0}],
              "ownship": {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}}  # fmt: skip
     exact, seen = (
-        rows(run(chain({"sensor": sensor("radar.threshold", **keys, **grid, errors=errors)},
+        read(run(chain({"sensor": sensor("radar.threshold", **keys, **grid, errors=errors)},
                        terrain=terrain, **still)))
-        for errors in ("grid", "signal")
+        for errors, read in (("grid", decided), ("signal", rows))
     )  # fmt: skip
     ratio_db = exact[0]["confidence"] - 250.0
     assert 10.0 < ratio_db < exact[0]["snr_db"] - 1.0

@@ -10,7 +10,7 @@ import crooked
 import numpy as np
 import pytest
 from covering import LINK_BUDGETS, RADARS, covers
-from wired import HEARS_ALL, chain, noise_crosses, rows, run, sensor
+from wired import HEARS_ALL, chain, decided, noise_crosses, rows, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -106,8 +106,8 @@ TARGETS = {target["name"]: target for target in crooked.TARGETS}
 def test_an_echo_is_let_through_by_its_range_rate(radar, kind, lock):
     """Against the ground's below it, or against 0."""
     keys = {"terrain": {"height_m": GROUND_M, "clutter_gamma_db": -90.0}}
-    plain = {(row["scan"], row["target"]): row for row in rows(looks(radar, **keys))}
-    found = rows(looks(radar, moving_target_filter=kind, clutter_lock=lock, **keys))
+    plain = {(row["scan"], row["target"]): row for row in decided(looks(radar, **keys))}
+    found = decided(looks(radar, moving_target_filter=kind, clutter_lock=lock, **keys))
     assert len(found) == 12
     for row in found:
         target, time_s = TARGETS[row["target"]], row["time_s"]
@@ -131,8 +131,8 @@ def test_a_sweeping_beam_hears_the_motion_of_the_instant_at_which_it_lights_the_
         {(row["scan"], row["target"]): row["snr_db"] for row in rows(table, "looks")}
         for table in (plain, found)
     )
-    assert len(rows(found)) > 3
-    for row in rows(found):
+    assert len(decided(found)) > 3
+    for row in decided(found):
         off = range_rate(TARGETS[row["target"]], row["illuminated_s"])
         expected_db = 10.0 * math.log10(gain("double_canceller", 3, off))
         look = row["scan"], row["target"]
@@ -145,9 +145,9 @@ def test_a_sweeping_beam_hears_the_motion_of_the_instant_at_which_it_lights_the_
 @pytest.mark.parametrize("radar", LINK_BUDGETS)
 @pytest.mark.parametrize(("pulses", "notch_m_s"), [(8, 25.0), (32, 25.0), (32, 3.0)])
 def test_a_bank_has_its_pulses_and_its_notch(radar, pulses, notch_m_s):
-    plain = {(row["scan"], row["target"]): row for row in rows(looks(radar))}
+    plain = {(row["scan"], row["target"]): row for row in decided(looks(radar))}
     keys = {"moving_target_filter": "filter_bank", "filter_pulses": pulses, "clutter_lock": False}
-    for row in rows(looks(radar, notch_m_s=notch_m_s, **keys)):
+    for row in decided(looks(radar, notch_m_s=notch_m_s, **keys)):
         off = range_rate(TARGETS[row["target"]], row["time_s"])
         tuned = tuned_to(pulses, off, 2.0 * notch_m_s / WAVELENGTH_M / PRF_HZ)
         expected_db = 10.0 * math.log10(gain("filter_bank", pulses, off, tuned))
@@ -178,7 +178,7 @@ def test_clutter_leaves_a_residue_by_its_spread(kind, lock, limit_db, motion_m_s
     cnr = []
     for keys in ({}, filtered):
         scene = chain({"radar": {**radar, **keys}}, targets=low, terrain=terrain)
-        (row,) = rows(run(scene))
+        (row,) = decided(run(scene))
         lost_db = row["snr_db"] - HEARS_ALL["threshold_db"] - row["confidence"]
         cnr.append(10.0 ** (0.1 * lost_db) - 1.0)
     mean = 0.0 if lock else ground_rate(low[0], 0.0, GROUND_M)
@@ -211,7 +211,7 @@ def passing(radar: str, ownship: dict, target: dict, **keys) -> list[float]:
     scene = chain(
         {"radar": table}, ownship=ownship, targets=[target], duration_s=30, terrain=terrain
     )
-    return [row["time_s"] for row in rows(run(scene), target="passing")]
+    return [row["time_s"] for row in decided(run(scene), target="passing")]
 
 
 @covers("moving_target_filter", "prf_hz", "frequency_hz", "clutter_lock", "filter_pulses",
@@ -301,7 +301,7 @@ def test_range_rates_of_one_prf_fold_at_the_unambiguous_velocity(radar, prf_hz):
     keys = {"measures_range_rate": True, "prf_hz": prf_hz, "frequency_hz": FREQUENCY_HZ}
     if radar != "radar.range_boundary":
         keys |= {**noise_crosses(radar, 1e-4), "range_km": 4.0}
-    found = rows(run(chain({"r": sensor(radar, **CELL, **keys, range_rate_folds=True)})))
+    found = decided(run(chain({"r": sensor(radar, **CELL, **keys, range_rate_folds=True)})))
     assert len([row for row in found if row["target"]]) == 2
     for row in found:
         assert abs(row["range_rate_m_s"]) <= 0.5 * blind_m_s * (1.0 + 1e-12)
@@ -318,7 +318,7 @@ def test_a_look_at_nothing_has_nothing_to_filter(radar):
     far = [{**crooked.ROLLING, "north_m": -90_000.0}]
     keys = {"moving_target_filter": "single_canceller", "prf_hz": PRF_HZ, "range_km": 3.0,
             "frequency_hz": FREQUENCY_HZ}  # fmt: skip
-    assert not rows(run(chain({"r": sensor(radar, **CELL, **keys)}, targets=far)))
+    assert not decided(run(chain({"r": sensor(radar, **CELL, **keys)}, targets=far)))
 
 
 BAD = [

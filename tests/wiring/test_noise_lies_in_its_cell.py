@@ -6,7 +6,7 @@ import crooked
 import numpy as np
 import pytest
 from scipy.stats import binom, kstest, norm
-from wired import chain, rows, run, sensor
+from wired import chain, decided, rows, run, sensor
 
 BEAM_DEG, CELL_M, PFA = (3.0, 5.0), 120.0, 0.04
 RADAR = {
@@ -86,7 +86,9 @@ def test_the_weakest_of_a_target_s_detections_are_noise(power_w):
     exact = sensor("radar.swerling", **{**RADAR, "power_w": power_w, "errors": "grid"})
     (mean_db,) = {
         row["snr_db"]
-        for row in rows(run(chain({"radar": exact}, ownship=OWN, targets=[target], duration_s=1)))
+        for row in decided(
+            run(chain({"radar": exact}, ownship=OWN, targets=[target], duration_s=1))
+        )
     }
     power = 1.0 + 10.0 ** (0.1 * mean_db)
     pd = PFA ** (1.0 / power)

@@ -8,7 +8,7 @@ import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from scipy.optimize import brentq
 from scipy.special import chndtr, gammaincc
-from wired import Row, alone, chain, noise_crosses, rows, run, sensor
+from wired import Row, alone, chain, decided, noise_crosses, run, sensor
 
 PFA = 1e-4
 
@@ -39,7 +39,7 @@ def detected(table: dict, targets=crooked.TARGETS, duration_s: float = 1) -> lis
     still = [{**target, "speed_mps": 0.0, "climb_mps": 0.0} for target in targets]
     own = {**crooked.OWNSHIP, "speed_mps": 0.0, "climb_mps": 0.0}
     scene = chain({"sensor": table}, ownship=own, targets=still, duration_s=duration_s)
-    return rows(run(scene), block="sensor")
+    return decided(run(scene), block="sensor")
 
 
 def linear(row: Row) -> float:
@@ -109,7 +109,7 @@ def test_ways_to_compute_pd_differ_by_what_they_say():
 def test_auto_takes_the_table_where_its_error_is_allowed(allowed, table):
     sections = {} if allowed is None else {"accuracy": {"detection_probability": allowed}}
     radar = weak(swerling=0, model="auto", power_w=0.5)
-    found = rows(run(chain({"sensor": radar}, **sections)), block="sensor")
+    found = decided(run(chain({"sensor": radar}, **sections)), block="sensor")
     error = max(abs(row["detection_probability"] - pd_of(linear(row), 0)) for row in found)
     assert (error > 1e-12) is table
 
@@ -145,14 +145,14 @@ def test_fewer_false_alarms_need_a_higher_threshold(pfa):
 
 @covers("threshold_db", of=("radar.threshold",))
 def test_a_threshold_parts_the_targets():
-    snr = {row["target"]: row["snr_db"] for row in rows(alone("radar.threshold"))}
+    snr = {row["target"]: row["snr_db"] for row in decided(alone("radar.threshold"))}
     assert snr["rolling"] < snr["diving"]
     for limit_db, names in (
         (snr["rolling"] - 0.01, {"rolling", "diving"}),
         (snr["rolling"] + 0.01, {"diving"}),
         (snr["diving"] + 0.01, set()),
     ):
-        found = rows(alone("radar.threshold", threshold_db=limit_db))
+        found = decided(alone("radar.threshold", threshold_db=limit_db))
         assert {row["target"] for row in found} == names
         for row in found:
             assert row["confidence"] == pytest.approx(row["snr_db"] - limit_db)
@@ -169,8 +169,8 @@ VIEW = {
 def test_false_alarms_fill_the_field_of_view_at_the_rate_of_their_cells(kind):
     """50 by 10 by 30 cells from the minimum range of 0 m on, and 20 scans."""
     noisy = {**noise_crosses(kind, 1e-3), "scan_rate_hz": 20}
-    assert not rows(alone(kind, **{**VIEW, **noisy, "false_alarms": False}), target=None)
-    found = rows(alone(kind, **VIEW, **noisy, minimum_range_m=1.0), target=None)
+    assert not decided(alone(kind, **{**VIEW, **noisy, "false_alarms": False}), target=None)
+    found = decided(alone(kind, **VIEW, **noisy, minimum_range_m=1.0), target=None)
     expected = 50 * 10 * 30 * 1e-3 * 20
     assert len(found) == pytest.approx(expected, abs=5 * math.sqrt(expected))
     azimuth, elevation, range_m = (
@@ -189,9 +189,9 @@ def test_false_alarms_fill_the_field_of_view_at_the_rate_of_their_cells(kind):
 def test_a_beam_meets_each_target_in_the_order_of_its_sweep(kind):
     """From -90 to 70 deg of body azimuth in half a second, clockwise."""
     view = {"azimuth_deg": [-90, 70], "scan_rate_hz": 2}
-    still = rows(alone(kind, **view), block="sensor")
+    still = decided(alone(kind, **view), block="sensor")
     assert all(row["illuminated_s"] is None for row in still)
-    found = rows(alone(kind, **view, beam_sweep=True), block="sensor")
+    found = decided(alone(kind, **view, beam_sweep=True), block="sensor")
     assert len(found) == 4
     for row in found:
         (target,) = (t for t in crooked.TARGETS if t["name"] == row["target"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import gammaincc
-from wired import alone, chain, first_look, noise_crosses, rows, run, sensor
+from wired import alone, chain, decided, first_look, noise_crosses, run, sensor
 
 STILL = {"speed_mps": 0.0, "climb_mps": 0.0}
 OWN = {**crooked.OWNSHIP, **STILL}
@@ -35,7 +35,7 @@ def test_a_calibration_is_of_the_radar_s_own_pulses_and_false_alarms(pulses, pfa
         swerling=2, scan_rate_hz=20,
     )  # fmt: skip
     del radar["bandwidth_hz"]
-    row = rows(run(chain({"radar": radar}, targets=[crooked.ROLLING])))[0]
+    row = decided(run(chain({"radar": radar}, targets=[crooked.ROLLING])))[0]
     needed = brentq(lambda s: swerling_2(s, pulses, pfa) - 0.7, 1e-3, 1e5, xtol=1e-12)
     nearer_db = 40.0 * math.log10(2600.0 / row["true_range_m"])
     assert row["snr_db"] == pytest.approx(10.0 * math.log10(needed) + nearer_db, abs=1e-4)
@@ -43,7 +43,7 @@ def test_a_calibration_is_of_the_radar_s_own_pulses_and_false_alarms(pulses, pfa
     assert row["detection_probability"] == pytest.approx(swerling_2(snr, pulses, pfa), rel=1e-6)
     threshold = {**radar, "type": "radar.threshold"}
     del threshold["swerling"]
-    other = rows(run(chain({"radar": threshold}, targets=[crooked.ROLLING])))[0]
+    other = decided(run(chain({"radar": threshold}, targets=[crooked.ROLLING])))[0]
     assert other["confidence"] == pytest.approx(nearer_db, abs=1e-4)
 
 
@@ -53,7 +53,7 @@ def test_a_calibration_is_of_the_radar_s_own_pulses_and_false_alarms(pulses, pfa
 def test_a_sampled_rcs_from_pulse_to_pulse_is_steadier_the_more_there_are(model, pulses, variance):
     keys = {"swerling": model, "fluctuation": "sampled", "pulses": pulses, "scan_rate_hz": 300}
     still = [{**crooked.ROLLING, **STILL}]
-    found = rows(run(chain({"r": sensor("radar.swerling", **keys)}, ownship=OWN, targets=still)))
+    found = decided(run(chain({"r": sensor("radar.swerling", **keys)}, ownship=OWN, targets=still)))
     power = np.array([10.0 ** (row["snr_db"] / 10.0) for row in found])
     assert len(power) > 290
     assert np.var(power) / np.mean(power) ** 2 == pytest.approx(variance, rel=0.35)
@@ -97,7 +97,7 @@ def test_a_fluctuating_target_in_clutter(model, threshold):
     for name, row in first_look(chain({"radar": plain}, **sections), "radar").items():
         lost_db = row["snr_db"] + 250.0 - row["confidence"]
         clutter[name] = (10.0 ** (lost_db / 10.0) - 1.0) / 10.0 ** (row["snr_db"] / 10.0)
-    found = rows(run(chain({"radar": radar}, **sections)))
+    found = decided(run(chain({"radar": radar}, **sections)))
     assert {row["target"] for row in found} == {"rolling", "diving"}
     for row in found:
         snr = 10.0 ** (row["snr_db"] / 10.0)
@@ -122,14 +122,14 @@ def test_noise_that_crosses_the_threshold_is_as_strong_as_that_takes(kind, pulse
         "elevation_resolution_deg": 2.0, "azimuth_deg": [-40, 40], "elevation_deg": [-10, 10],
         "scan_rate_hz": 3 if pfa == 1e-3 else 30,
     }  # fmt: skip
-    found = rows(alone(kind, **keys), block="sensor", target=None)
+    found = decided(alone(kind, **keys), block="sensor", target=None)
     assert len(found) > 60
     least = threshold_of(pulses, pfa) / pulses - 1.0
     snr = np.array([10.0 ** (row["snr_db"] / 10.0) for row in found])
     assert snr.min() == pytest.approx(least, rel=0.05)
     assert snr.min() >= least * (1.0 - 1e-9)
     zero = {row["snr_db"] - row["confidence"] for row in found}
-    true = rows(alone(kind, **keys), block="sensor", target="rolling", scan=0)
+    true = decided(alone(kind, **keys), block="sensor", target="rolling", scan=0)
     expected = [row["snr_db"] - row["confidence"] for row in true]
     assert max(zero) - min(zero) < 1e-9
     assert max(zero) == pytest.approx(expected[0], abs=1e-9)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from covering import LINK_BUDGETS, RADARS, covers
 from scipy.stats import binom
-from wired import alone, chain, noise_crosses, rows, run, sensor
+from wired import alone, chain, decided, noise_crosses, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -32,7 +32,7 @@ def by_scan(kind: str, merged: bool) -> dict[int, dict[str, dict]]:
     run_ = alone(
         kind, targets=TARGETS, duration_s=4, scan_rate_hz=5, resolution_cells=merged, **CELL
     )
-    for row in rows(run_):
+    for row in decided(run_):
         found.setdefault(row["scan"], {})[row["target"]] = row
     return found
 
@@ -86,7 +86,9 @@ def test_noise_reports_a_cell_with_the_false_alarm_probability_however_many_are_
         scan_rate_hz=100, resolution_cells=merged, **CELL,
     )  # fmt: skip
     del radar["mount_roll_deg"], radar["mount_azimuth_deg"]
-    found = rows(run(chain({"radar": radar}, ownship=own, targets=still, duration_s=scans / 100)))
+    found = decided(
+        run(chain({"radar": radar}, ownship=own, targets=still, duration_s=scans / 100))
+    )
     looks = scans * (1 if merged else len(swarm))
     low, high = binom.interval(0.99, looks, pfa)
     assert low <= len(found) <= high
@@ -178,11 +180,11 @@ def test_beams_are_the_cells_where_they_are_given(keys, merges):
     """Where errors are not the grid's, targets of one cell that has a size are one by default."""
     found: dict[int, dict[str, dict]] = {}
     radar = sensor("radar.threshold", **{**BEAM, **keys})
-    for row in rows(run(chain({"radar": radar}, targets=TARGETS, duration_s=4))):
+    for row in decided(run(chain({"radar": radar}, targets=TARGETS, duration_s=4))):
         found.setdefault(row["scan"], {})[row["target"]] = row
     apart = {
         (row["scan"], row["target"]): row
-        for row in rows(run(chain({"radar": sensor("radar.threshold", **BEAM)}, targets=TARGETS,
+        for row in decided(run(chain({"radar": sensor("radar.threshold", **BEAM)}, targets=TARGETS,
                                   duration_s=4)))
     }  # fmt: skip
     together = 0
@@ -206,7 +208,7 @@ def test_noise_fills_the_beams_of_the_field_of_view():
     """20 by 10 by 30 cells of 5 by 4 deg and 100 m, however fine the grid."""
     view = {**VIEW, "azimuth_beamwidth_deg": 5.0, "elevation_beamwidth_deg": 4.0,
             "azimuth_resolution_deg": 0.1, **noise_crosses("radar.threshold", 1e-3)}  # fmt: skip
-    found = rows(alone("radar.threshold", **view, scan_rate_hz=50, duration_s=4), target=None)
+    found = decided(alone("radar.threshold", **view, scan_rate_hz=50, duration_s=4), target=None)
     low, high = binom.interval(0.99, 20 * 10 * 30 * 200, 1e-3)
     assert low <= len(found) <= high
 
@@ -225,5 +227,5 @@ def test_astern_the_last_cell_is_the_first_one(kind):
     scene = chain(
         {"radar": sensor(kind, **cell, resolution_cells=True)}, ownship=own, targets=behind
     )
-    reported = {row["target"] for row in rows(run(scene))}
+    reported = {row["target"] for row in decided(run(scene))}
     assert len(reported) == 2 and "at 2.5" in reported

@@ -6,7 +6,7 @@ import crooked
 import pytest
 from covering import LINK_BUDGETS, covers
 from scipy.stats import gamma
-from wired import alone, chain, rows, run, sensor
+from wired import alone, chain, decided, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
@@ -22,7 +22,7 @@ TIME_KEYS = ("budget", "azimuth_beamwidth_deg", "elevation_beamwidth_deg", "beam
 
 
 def snr_db(kind: str, **keys) -> dict[str, float]:
-    found = rows(alone(kind, **POWER[kind], **keys), scan=0)
+    found = decided(alone(kind, **POWER[kind], **keys), scan=0)
     return {row["target"]: row["snr_db"] for row in found}
 
 
@@ -62,7 +62,7 @@ def test_pulses_are_summed_in_power_instead():
     keys = {**DWELL, "integration": "noncoherent"}
     radar = {**sensor("radar.swerling"), **keys, "swerling": 0, "power_w": 2e3,
              "false_alarm_probability": 1e-6, "scan_rate_hz": 4}  # fmt: skip
-    found = rows(run(chain({"sensor": radar}, duration_s=6)), block="sensor")
+    found = decided(run(chain({"sensor": radar}, duration_s=6)), block="sensor")
     assert found
     level = gamma.isf(1e-6, 35)
     for row in found:
@@ -78,7 +78,7 @@ def test_pulses_are_summed_in_power_instead():
         ("free, 35 pulses", {"pulses": 35}),
         ("dwell", {"budget": "dwell", "integration": "noncoherent"}),
     ):
-        row = rows(run(chain({"sensor": {**table, **given}})), block="sensor")[0]
+        row = decided(run(chain({"sensor": {**table, **given}})), block="sensor")[0]
         limits[name] = row["snr_db"], row["confidence"]
     assert limits["dwell"] == pytest.approx(limits["free, 35 pulses"], abs=1e-9)
 
@@ -95,7 +95,7 @@ def test_a_calibration_is_that_of_the_look_it_states(integration):
     pd = {}
     for rate in ("50/7", 20):
         scene = chain({"sensor": {**radar, "scan_rate_hz": rate}}, ownship=own, targets=[target])
-        seen = rows(run(scene), block="sensor")
+        seen = decided(run(scene), block="sensor")
         pd[rate] = seen[0]["detection_probability"]
         assert seen[0]["scan"] == 0
     assert pd["50/7"] == pytest.approx(0.97, abs=1e-6)
@@ -181,4 +181,4 @@ def test_what_fits_and_what_is_free_runs():
         {**FITS, "scan_rate_hz": 5, "budget": "free"},
         {**FITS, "prf_hz": 500.0, "integration_gain_db": 7.0},
     ):
-        assert rows(alone("radar.threshold", **keys))
+        assert decided(alone("radar.threshold", **keys))

@@ -57,8 +57,8 @@ def chain(
 
 
 def run(scene: Mapping[str, Any]) -> Any:
-    """Run a scene in memory."""
-    return dsa_des.run(scene)
+    """Run a scene in memory and record every look."""
+    return dsa_des.run({**scene, "record": {"looks": True, **scene.get("record", {})}})
 
 
 def rows(run: Any, table: str = "detections", **wanted: Any) -> list[Row]:
@@ -67,9 +67,25 @@ def rows(run: Any, table: str = "detections", **wanted: Any) -> list[Row]:
     return [row for row in found if all(row[key] == value for key, value in wanted.items())]
 
 
+def decided(run: Any, **wanted: Any) -> list[Row]:
+    """Return detections with the mean SNR, the Pd and the margin that decided.
+
+    Only the truth knows those: a detection's own are of one output, with its noise.
+    """
+    said = ("snr_db", "detection_probability", "confidence")
+    looks = {
+        (row["block"], row["scan"], row["target"]): {key: row[key] for key in said}
+        for row in rows(run, "looks")
+    }
+    return [
+        {**row, **looks.get((row["block"], row["scan"], row["target"]), {})}
+        for row in rows(run, **wanted)
+    ]
+
+
 def first_look(scene: Mapping[str, Any], block: str) -> dict[str, Row]:
-    """Return a sensor's detections of its first scan by target."""
-    return {row["target"]: row for row in rows(run(scene), block=block, scan=0)}
+    """Return a sensor's detections of its first scan by target, as they were decided."""
+    return {row["target"]: row for row in decided(run(scene), block=block, scan=0)}
 
 
 def measured(scene: Mapping[str, Any], *metrics: Any) -> Row:
