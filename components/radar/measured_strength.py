@@ -62,6 +62,8 @@ class Strength:
             Those that are detected; of others nothing is measured.
         look : Look
         """
+        if "snr" not in look.signal:  # a radar of one's own that says no strength
+            return look
         block = self._block
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:

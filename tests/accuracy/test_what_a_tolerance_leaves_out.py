@@ -33,7 +33,7 @@ def scene(**sections) -> dict:
 
 
 def probabilities(given: dict) -> dict[str, float]:
-    found = dsa_des.run(given)["detections"].to_pylist()
+    found = dsa_des.run({**given, "record": {"looks": True}})["looks"].to_pylist()
     return {row["target"]: row["detection_probability"] for row in found}
 
 

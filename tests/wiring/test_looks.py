@@ -61,7 +61,7 @@ def test_every_sensor_looks_at_every_target_and_says_what_came_of_it():
             assert row["true_range_m"] is None
     # A sensor that is switched off fills no rows anywhere.
     assert {row["block"] for row in rows(found, "scans")} == {"radar", "blind"}
-    assert "looks" not in run(chain(sensors, duration_s=1)).tables
+    assert "looks" not in dsa_des.run(chain(sensors, duration_s=1)).tables
 
 
 def away(seed):

@@ -7,7 +7,7 @@ import looks
 import numpy as np
 import pytest
 from covering import CAMERAS, LINK_BUDGETS, RADARS, SENSORS, covers
-from scipy.stats import norm
+from scipy.stats import kstest, ncx2, norm
 from wired import alone, chain, decided, rows, run, sensor
 
 from components.radar.parameters import RadarParameters
@@ -365,3 +365,21 @@ def test_what_no_sensor_can_have_is_one_clear_error(kind, keys, said):
         load_scene(chain({"sensor": sensor(kind, **keys)}))
     text = str(caught.value)
     assert said in text and text.count("sensor") >= 1
+
+
+@pytest.mark.parametrize("kind", LINK_BUDGETS)
+def test_strength_on_a_grid_is_measured_too(kind):
+    """Twice the summed output is chi-square, noncentral by a steady echo: it hides the range."""
+    keys = {"power_w": 5.0, "errors": "grid", "scan_rate_hz": 200, "false_alarms": False}
+    if kind == "radar.swerling":
+        keys["swerling"] = 0
+    found = alone(kind, targets=[crooked.DIVING], duration_s=2, **keys)
+    told = decided(found)
+    said = np.array([10.0 ** (0.1 * row["snr_db"]) for row in rows(found)])
+    mean = np.array([10.0 ** (0.1 * row["snr_db"]) for row in told])
+    assert len(said) == 400 and 10.0 < mean.min() < mean.max() < 1e6
+    places = ncx2.cdf(2.0 * (said + 1.0), 2.0, 2.0 * mean)
+    assert kstest(places, "uniform").pvalue > 1e-3
+    margins = np.array([row["confidence"] for row in rows(found)])
+    assert np.ptp(margins - 10.0 * np.log10(said)) < 1e-9
+    assert {row["detection_probability"] for row in rows(found)} == {None}

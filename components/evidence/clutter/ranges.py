@@ -60,7 +60,8 @@ def half_range_m(
     radar: Mapping[str, Any], gamma_db: float | None, target_mps: float = 60.0
 ) -> float:
     """Return the farthest range at which one look in two detects the intruder, m; NaN if none."""
-    rows = run(scene(radar, gamma_db, target_mps))["detections"].to_pydict()
+    asked = {**scene(radar, gamma_db, target_mps), "record": {"looks": True}}
+    rows = run(asked)["looks"].to_pydict()
     range_m = np.array(rows["true_range_m"], dtype=np.float64)
     pd = np.array(rows["detection_probability"], dtype=np.float64)
     good = pd >= 0.5
