@@ -9,6 +9,7 @@ values changed. `--only` takes the files whose path holds a text.
 """
 
 import hashlib
+import io
 import json
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow import csv
 
 import dsa_des
 
@@ -51,10 +53,10 @@ def digests(folder: Path) -> dict[str, str]:
     for file in sorted(folder.rglob("*.parquet")):
         table = pq.read_table(file)
         for name in table.column_names:
-            column = table[name].combine_chunks()
-            if pa.types.is_dictionary(column.type):
-                column = column.dictionary_decode()
-            text = json.dumps([str(column.type), column.to_pylist()]).encode()
+            frame = pa.table({name: table[name].combine_chunks()})
+            sink = io.BytesIO()
+            csv.write_csv(frame, sink)
+            text = f"{table[name].type} ".encode() + sink.getvalue()
             found[f"{file.relative_to(folder)}:{name}"] = hashlib.sha256(text).hexdigest()[:16]
     return found
 
