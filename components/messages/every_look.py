@@ -6,34 +6,37 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from components.messages.columns import DESCRIBED
+from components.messages.columns import TrueLine
 from dsa_des.arrays.types import AnyArray
-from dsa_des.block.message import Message
-from dsa_des.block.recorded_columns import Columns, Text
+from dsa_des.block.message import Column, Columns, Message, Text, columns_of
 
-_FLAGS = ("evaluated", "detected")
-_NUMBERS = (
-    "true_azimuth_rad",
-    "true_elevation_rad",
-    "true_range_m",
-    "confidence",
-    "snr_db",
-    "detection_probability",
-    "pixels",
-)
+_TRUE = TrueLine.__dataclass_fields__
+_NUMBERS = (*_TRUE, "confidence", "snr_db", "detection_probability", "pixels")
 
 
 @dataclass(eq=False)
 class EveryLook(Message):
     """What a sensor records where looks are asked for; it goes over no wire."""
 
-    described = DESCRIBED
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
+    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
         "looks": {
-            "scan": "int64",
-            "target": "text",
-            **dict.fromkeys(_FLAGS, "bool"),
-            **dict.fromkeys(_NUMBERS, "float64"),
+            "scan": Column("", "", "number of the scan", "int64"),
+            "target": Column("", "", "name of the target", "text"),
+            "evaluated": Column(
+                "", "", "whether its physics was evaluated: all else is null without", "bool"
+            ),
+            "detected": Column("", "", "whether it was detected", "bool"),
+            **columns_of(TrueLine),
+            "confidence": Column(
+                "dB or signature", "", "margin that decided, by the kind of sensor"
+            ),
+            "snr_db": Column(
+                "dB", "", "mean signal-to-noise ratio of a radar, or that of a sampled RCS"
+            ),
+            "detection_probability": Column(
+                "", "", "probability with which the detection was drawn"
+            ),
+            "pixels": Column("pixels", "", "pixels that the target covers in a camera"),
         }
     }
 

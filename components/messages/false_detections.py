@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.messages.detections import MEASURED, Detections
+from components.messages.columns import MEASURED
+from components.messages.detections import Detections
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 #: Index into the roster of a detection without a target; it is recorded as null.

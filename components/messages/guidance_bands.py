@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry
+from dsa_des.block.message import Message, Text, column
 
 #: What bands are of, and the regions they are painted with.
 BAND_KINDS = ("direction", "altitude")
@@ -28,13 +27,20 @@ class GuidanceBands(Message):
         Altitudes; NaN in bands of direction.
     """
 
-    described = DESCRIBED
     entry_table = "bands"
 
     offsets: IntArray
-    band: IntArray = per_entry(column="text", value=lambda m: Text(m.band, BAND_KINDS))
-    region: IntArray = per_entry(column="text", value=lambda m: Text(m.region, BAND_REGIONS))
-    low_rad: FloatArray = per_entry(column="float64")
-    high_rad: FloatArray = per_entry(column="float64")
-    low_m: FloatArray = per_entry(column="float64")
-    high_m: FloatArray = per_entry(column="float64")
+    band: IntArray = column(
+        "", "", "direction or altitude: what it is a stretch of", "text",
+        value=lambda m: Text(m.band, BAND_KINDS),
+    )  # fmt: skip
+    region: IntArray = column(
+        "", "", "FAR, MID or NEAR: whose volumes are met; RECOVERY: what leads out", "text",
+        value=lambda m: Text(m.region, BAND_REGIONS),
+    )  # fmt: skip
+    low_rad: FloatArray = column(
+        "rad", "", "direction over the ground from north at which it begins"
+    )
+    high_rad: FloatArray = column("rad", "", "direction, clockwise, at which it ends")
+    low_m: FloatArray = column("m", "", "altitude at which it begins")
+    high_m: FloatArray = column("m", "", "altitude at which it ends")

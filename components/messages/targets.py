@@ -17,8 +17,7 @@ from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
 from components.messages.true_states import truth_columns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.message import Message, per_row, per_row_tick, static
-from dsa_des.block.recorded_columns import Columns
+from dsa_des.block.message import Columns, Message, per_row, static
 
 
 @dataclass(eq=False)
@@ -161,7 +160,7 @@ class RelativeTargets(Message):
     believed: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     own_attitude: dict[str, FloatArray] | None = per_row(default=None, kw_only=True)
     revisit: KnownFlights | None = per_row(default=None, kw_only=True)
-    state_tick: IntArray | None = per_row_tick(default=None, kw_only=True)
+    state_tick: IntArray | None = per_row(is_tick=True, default=None, kw_only=True)
     hidden: BoolArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})

@@ -7,10 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
-from components.messages.columns import DESCRIBED
+from components.messages.columns import OWN_NED, TURNED, WGS84
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message
-from dsa_des.block.recorded_columns import Columns, Text
+from dsa_des.block.message import Column, Columns, Message, Text
 
 #: Half of the time over which positions are compared for a velocity; a power of two, so that
 #: times differ by it exactly.
@@ -28,9 +27,19 @@ _NUMBERS = (*_PLACE, *_VELOCITY, *_TURNED.values())
 class TrueStates(Message):
     """What a traffic block records where the truth is asked for; it goes over no wire."""
 
-    described = DESCRIBED
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "truth": {"target": "text", **dict.fromkeys(_NUMBERS, "float64")}
+    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
+        "truth": {
+            "target": Column("", "", "name of the target; null for the ownship", "text"),
+            "lat_deg": Column("deg", WGS84, "latitude"),
+            "lon_deg": Column("deg", WGS84, "longitude"),
+            "alt_m": Column("m", WGS84, "height above the ellipsoid"),
+            "velocity_north_m_s": Column("m/s", OWN_NED, "velocity over ground, north"),
+            "velocity_east_m_s": Column("m/s", OWN_NED, "east"),
+            "velocity_down_m_s": Column("m/s", OWN_NED, "down"),
+            "heading_rad": Column("rad", TURNED, "where the nose points, from north"),
+            "pitch_rad": Column("rad", TURNED, "pitch, nose up"),
+            "roll_rad": Column("rad", TURNED, "roll, right wing down"),
+        }
     }
 
 

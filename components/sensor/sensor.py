@@ -64,7 +64,7 @@ class Sensor(Measuring):
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
-    also_records = (EveryLook,)
+    also_records: ClassVar[tuple[type[Message], ...]] = (EveryLook,)
     windowed = True
     rewindable = True
     hooks: ClassVar[Mapping[str, str]] = {

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import POSE
+from components.messages.columns import POSE
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
 from components.messages.true_entries import true_entries
