@@ -22,7 +22,7 @@ from components.messages.columns import (
     TrueLine,
     target_names,
 )
-from components.messages.every_look import look_columns
+from components.messages.looks import look_columns
 from components.messages.reach import Reach
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import (
@@ -201,7 +201,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
     looks : dict of (rows, targets), or None
-        Every look at every target (`components.messages.every_look`), where they are recorded.
+        Every look at every target (`components.messages.looks`), where they are recorded.
     roster : Roster
     """
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from components.geometry.wrapping import wrap_pi_unchecked
-from components.messages.constant_columns import constant_column
 from components.messages.detections import LastingError, LastingPart
+from components.sensor.constant_columns import constant_column
 from components.sensor.error_parameters import StatedError
 from components.sensor.grid import VARIANCE_OF, variance_of_step
 from components.sensor.look import Cells, Look

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.messages.detections import Detections, LastingError, SensorOffer
-from components.messages.every_look import EveryLook, looks_of
+from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport, lasting_navigation, navigation_noise
