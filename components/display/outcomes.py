@@ -15,7 +15,8 @@ from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, State
 from components.messages.steering import Manoeuvres
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import IntArray
-from dsa_des.record.recording import Columns, Observer
+from dsa_des.record.recording import Columns
+from dsa_des.record.sinks import Observer
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation

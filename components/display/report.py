@@ -8,7 +8,7 @@ from components.display.change import share_that_differs
 from components.display.outcomes import outcome_observers
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
-from dsa_des.record.recording import Observer
+from dsa_des.record.sinks import Observer
 from dsa_des.running.reports import Change, Difference
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from components.traffic.source import TrafficSource
 from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
-from dsa_des.scene.block import Block
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.time.randomness import Streams
 

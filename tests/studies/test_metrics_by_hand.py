@@ -12,7 +12,7 @@ from components.metrics.flights_together import first_losses_s, nearest_of, ways
 from components.metrics.separation import Separation, closest, first_inside, separations
 from components.metrics.track_quality import _ramp_quantiles
 from components.well_clear.volume import PRESETS
-from dsa_des.block.entry_points import registered
+from dsa_des.block.class_text import registered
 from dsa_des.block.message import Text
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Recorded, run_replicas
