@@ -24,7 +24,7 @@ class ConnectionLimit:
     def __init__(self, say: Callable[[str], None], most: int = MOST_CONNECTIONS) -> None:
         self._say, self._most = say, most
         self._open = 0
-        self._said = False
+        self._said = self._starved = False
 
     def connection(self, *given: Any, **options: Any) -> ServerConnection:
         """Return what `websockets.asyncio.server.serve` makes of a new connection."""
@@ -46,7 +46,11 @@ class ConnectionLimit:
         """Handle what the loop could not: connections may come faster than they can be dropped."""
         error = context.get("exception")
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            self._starved = True
             self._tell("more connections than files may be open")
+        elif self._starved and isinstance(error, ValueError) and "descriptor: -1" in str(error):
+            # A second later the loop listens again, to a socket that the end has closed meanwhile.
+            pass
         else:
             loop.default_exception_handler(context)
 

@@ -1,5 +1,7 @@
 """A flood of connections costs a line in the terminal, and the display stays."""
 
+import asyncio
+import errno
 import resource
 import socket
 import time
@@ -8,7 +10,7 @@ import pytest
 
 from components.cdti import server as server_module
 from components.cdti.admission import Admission
-from components.cdti.connection_limit import MOST_CONNECTIONS
+from components.cdti.connection_limit import MOST_CONNECTIONS, ConnectionLimit
 from components.cdti.server import DisplayServer
 
 
@@ -81,3 +83,20 @@ def test_a_flood_beyond_the_limit_of_open_files_is_one_line(served, capfd):
     while (answer := page_of(server, admission)) == b"" and time.monotonic() < deadline:
         time.sleep(0.05)
     assert answer == b"HTTP/1.1 200 OK"
+
+
+@pytest.mark.parametrize("flooded", [True, False])
+def test_listening_again_after_the_end_of_a_flood_is_silent(flooded, caplog):
+    """Loops do a second after files ran out, also to a socket that has been closed meanwhile."""
+    said = []
+    closed = socket.socket()
+    closed.close()
+    loop = asyncio.new_event_loop()
+    loop.set_exception_handler(ConnectionLimit(said.append).on_error)
+    if flooded:
+        loop.call_exception_handler({"message": "", "exception": OSError(errno.EMFILE, "")})
+    loop.call_soon(loop.add_reader, closed, print)
+    loop.run_until_complete(asyncio.sleep(0.01))
+    loop.close()
+    assert len(said) == flooded
+    assert ("Invalid file descriptor" in caplog.text) is not flooded
