@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.geometry.ellipsoid import north_east_up
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 

@@ -21,7 +21,7 @@ import numpy as np
 import dsa_des
 from components.estimation.motion import CoordinatedTurn, Motion
 from components.geometry.enu import enu_to_geodetic
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import RecordedTruth
 from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary
 from components.radar.range_boundary import RangeBoundary as RadarBoundary

@@ -11,14 +11,19 @@ import numpy as np
 
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
-from components.messages.guidance_bands import BAND_REGIONS
+from components.messages.alerts import BAND_REGIONS
 from components.view.picture import RunPicture, TangentPlane
 from components.view.sensor_marks import sensor_marks
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.errors import UsageError
+from dsa_des.record.run_folder import with_columns_of_rows
 
 _NO_TARGET = -1
+_TABLES = (
+    "detections", "scans", "truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres",
+    "bands",
+)  # fmt: skip
 _OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
         "own_roll_rad")  # fmt: skip
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
@@ -47,12 +52,11 @@ def run_picture(folder: Path) -> RunPicture:
     """
     info = _json(folder / "run.json")
     scene = _toml(folder / "scene.toml")
-    tables = {name: _table(folder / f"{name}.parquet") for name in ("detections", "scans")}
-    if tables["scans"] is None or tables["detections"] is None:
+    tables = _read(folder)
+    if not {"scans", "detections"} <= tables.keys():
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
-    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres", "bands"):
-        tables[name] = _table(folder / f"{name}.parquet")
-    found: dict[str, Table] = {name: table for name, table in tables.items() if table is not None}
+    tables["detections"] = with_columns_of_rows(tables, "detections")
+    found = {name: _columns(folder / f"{name}.parquet", table) for name, table in tables.items()}
     detections = found["detections"]
     names = _names(found)
     own = _own(found)
@@ -137,17 +141,26 @@ def _toml(path: Path) -> dict[str, Any]:
         raise UsageError(f"{path}: is not TOML ({error})") from error
 
 
-def _table(path: Path) -> Table | None:
-    """Return a table's columns, text as Python's; None where there is no such file."""
-    if not path.is_file():
-        return None
+def _read(folder: Path) -> dict[str, Any]:
+    """Return the tables that are shown, as Arrow has them."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
+    found = {}
+    for name in _TABLES:
+        path = folder / f"{name}.parquet"
+        try:
+            if path.is_file():
+                found[name] = pq.read_table(path)
+        except (pa.ArrowException, OSError) as error:
+            raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
+    return found
+
+
+def _columns(path: Path, table: Any) -> Table:
+    """Return a table's columns, text as Python's."""
+    import pyarrow as pa
+
     found = _TableColumns(path)
     for name in table.column_names:
         column = table[name]

@@ -7,7 +7,7 @@ import dsa_des
 from components.display.consistency import draw_consistency
 from components.display.drawn_tracks import DrawnTracks, distances, errors_squared
 from components.display.tracks import draw_tracks
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
 
 EKF = "blocks.tracker.type='tracking.ekf'"

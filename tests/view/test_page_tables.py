@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pymap3d
 import pytest
 
-from components.messages.guidance_bands import BAND_REGIONS
+from components.messages.alerts import BAND_REGIONS
 from components.sensor import marks
 from components.view.encounter_scenes import encounter_picture
 from components.view.run_scenes import run_picture
