@@ -1,4 +1,4 @@
-"""Array tools that metrics share: rows of a group of replicas, chosen and reduced by replica."""
+"""Rows of a group of replicas: chosen, reduced by replica, and censored by a run's start."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,15 +6,21 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.sensor.cut_off import START, in_scan, said
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import Metric, recorded_by
+from dsa_des.studies.metric import TRIALS, Group, Metric, recorded_by
 
 FUSED = "fused"
+#: Columns of the sensors' scans that `scan_time_s` needs.
+SCANS = {"scans": ("block", "time_s")}
+# Rows of a replica among which its scan is sought first.
+_FIRST_LOOK = 64
+_SIDES: Any = ("left", "right")
 
 
 class TargetParameters(Parameters):
@@ -46,13 +52,7 @@ class TargetMetric(Metric):
 
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
-    """Return the sensors to measure: those chosen, or all, and `extra` names.
-
-    Raises
-    ------
-    ValueError
-        If one of those chosen is not there.
-    """
+    """Return the sensors to measure: those chosen, or all, and `extra` names."""
     known = [*recorded_by(scene, "detections"), *extra]
     for name in chosen or ():
         if name not in known:
@@ -79,28 +79,20 @@ def of_target(columns: Columns, target: str | None) -> BoolArray:
 
 def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
     """Return the chosen rows of ``replica`` and the named columns."""
-    place = np.flatnonzero(rows)
+    kept = np.flatnonzero(rows)
     found: dict[str, Any] = {}
     for name in ("replica", *names):
         values: Any = columns[name]
         text = isinstance(values, Text)
-        found[name] = Text(values.codes[place], values.names) if text else values[place]
+        found[name] = Text(values.codes[kept], values.names) if text else values[kept]
     return found
 
 
 def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
     """Return the row of each replica's first report, -1 where it has none.
 
-    Of several rows of one instant the one with the smallest true range counts.
-
-    Parameters
-    ----------
-    columns : mapping
-        With ``replica``, ``tick`` and ``true_range_m``, in recorded order.
-    rows : (n,)
-        The rows to look at, ascending.
-    count : int
-        Number of replicas.
+    Rows to look at and columns are in recorded order; of several rows of one instant the one with
+    the smallest true range counts.
     """
     table: Any = columns
     if len(rows) == 0:
@@ -132,8 +124,6 @@ def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
 
 def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
     """Return a share and its trials; NaN where there was no trial."""
-    from dsa_des.studies.metric import TRIALS
-
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)
     return {name: share, name + TRIALS: trials.astype(float)}
@@ -148,3 +138,37 @@ def name_ranks(column: Any) -> IntArray:
     )
     rank[-1] = -1
     return np.asarray(rank[column.codes])
+
+
+def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
+    """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
+    return group.once(("scan_time_s", name, number), lambda: _scan_time_s(group, name, number))
+
+
+def _scan_time_s(group: Group, name: str, number: int) -> FloatArray:
+    columns: Any = group.tables["scans"]
+    start, end = (np.searchsorted(columns["replica"], np.arange(len(group)), s) for s in _SIDES)
+    found = np.full(len(group), np.nan)
+    of_sensor = is_named(columns["block"], name)
+    left, width = np.flatnonzero(end > start), _FIRST_LOOK
+    while len(left):  # farther, where a replica has not so many scans among its first rows
+        rows = start[left, np.newaxis] + np.arange(width)
+        inside = rows < end[left, np.newaxis]
+        rows = np.where(inside, rows, 0)
+        mine = inside & of_sensor[rows]
+        there = mine & (np.cumsum(mine, axis=1) == number)
+        seen = there.any(axis=1)
+        found[left[seen]] = columns["time_s"][rows[there]]
+        left = left[~seen & inside[:, -1]]
+        width *= 8
+    return found
+
+
+def at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
+    """Return whether what takes so many scans of a sensor was seen as early as a start lets it."""
+    return in_scan(time_s, scan_time_s(group, name, scans))
+
+
+def start_or_never(cut: BoolArray, values: FloatArray) -> AnyArray:
+    """Return the column that says where values are left-censored, by the start of the run."""
+    return said(np.where(cut, START, ""), values)

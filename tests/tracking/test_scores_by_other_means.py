@@ -7,8 +7,12 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
-from components.metrics.set_distances import set_distance
-from components.metrics.track_tally import ToldTracks, TrackTally, innovation_results
+from components.metrics.track_scores import (
+    ReportedTracks,
+    TrackTally,
+    innovation_results,
+    set_distance,
+)
 
 LIMIT = 100.0
 
@@ -18,7 +22,7 @@ def told(time_s, tracks, confirmed_s=0.0):
     state = np.zeros((6, len(tracks)))
     for k, place in enumerate(tracks.values()):
         state[:3, k] = place
-    return ToldTracks(
+    return ReportedTracks(
         time_s, np.array(list(tracks), dtype=np.int64), state,
         np.repeat(np.eye(6)[np.newaxis], len(tracks), axis=0),
         np.full(len(tracks), confirmed_s),

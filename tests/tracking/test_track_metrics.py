@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.metrics.set_distances import set_distance
-from components.metrics.track_tally import changes
+from components.metrics.track_scores import changes, set_distance
 from dsa_des.studies.statistics import chi_square_bounds
 
 

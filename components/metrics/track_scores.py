@@ -1,13 +1,18 @@
-"""What is added up of tracks and targets over the instants of one run, and what it comes to."""
+"""Scores of the tracks of one run against the truth: errors, NEES, OSPA, GOSPA, SIAP, identities.
 
+Sources: Schuhmacher, Vo, Vo, IEEE Trans. Signal Proc. 56 (2008), eq. 3 (OSPA); Rahmathullah,
+García-Fernández, Svensson, *Generalized optimal sub-pattern assignment metric*, FUSION 2017, with
+alpha = 2, where missed and false ones are told apart.
+"""
+
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.metrics.set_distances import assigned, set_distance
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.studies.statistics import chi_square_bounds
 
@@ -18,19 +23,55 @@ _SETS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class ToldTracks:
-    """Confirmed tracks that have a range, as they were told at one instant.
+class SetDistance(NamedTuple):
+    """OSPA, from 0 to the cut-off, and GOSPA, whose p-th power is the sum of those of its parts."""
 
-    Parameters
-    ----------
-    time_s : float
-    number : (tracks,) of int
-    state : (6, tracks)
-        Position and velocity, north, east, down.
-    covariance : (tracks, 6, 6)
-    confirmed_s : (tracks,)
-        When each was first told as confirmed.
+    ospa_m: float
+    gospa_m: float
+    localisation_m: float
+    missed_m: float
+    false_m: float
+
+
+def set_distance(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) -> SetDistance:
+    """Return OSPA and GOSPA from distances (tracks, truths); p is the order, 1 or more."""
+    tracks, truths = distance_m.shape
+    if tracks == 0 and truths == 0:
+        return SetDistance(0.0, 0.0, 0.0, 0.0, 0.0)
+    powers = np.minimum(distance_m, cutoff_m) ** order
+    row, column = assigned(powers)
+    near = powers[row, column]
+    apart = abs(tracks - truths)
+    ospa = (near.sum() + cutoff_m**order * apart) / max(tracks, truths)
+    # A pair at the cut-off costs as much as one missed and one false: GOSPA leaves it unassigned.
+    together = near[distance_m[row, column] < cutoff_m]
+    half = 0.5 * cutoff_m**order
+    missed, false = half * (truths - len(together)), half * (tracks - len(together))
+    parts = [float(together.sum()), missed, false]
+    return SetDistance(
+        float(ospa) ** (1.0 / order),
+        math.fsum(parts) ** (1.0 / order),
+        *(part ** (1.0 / order) for part in parts),
+    )
+
+
+def assigned(cost: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return rows and columns of the assignment that costs least."""
+    if cost.size == 0:
+        none = np.empty(0, dtype=np.int64)
+        return none, none
+    from scipy.optimize import linear_sum_assignment
+
+    row, column = linear_sum_assignment(cost)
+    return row, column
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedTracks:
+    """Confirmed tracks that have a range, as reported at one instant.
+
+    State (6, tracks) is position and velocity north, east, down, with its covariance
+    (tracks, 6, 6); ``confirmed_s`` is when each was first reported as confirmed.
     """
 
     time_s: float
@@ -45,17 +86,9 @@ class TrackTally:
     """Sums over the instants of one run.
 
     At every instant tracks and targets are assigned one to one so that the sum of distances is
-    least. A track that is left over belongs to the nearest target, as one too many, if that is near
-    enough; otherwise it is spurious.
-
-    Parameters
-    ----------
-    within_m : float
-        So near a target a track may be its own; cut-off of OSPA and GOSPA.
-    order : float
-        Their power.
-    step_s : float
-        From one instant to the next.
+    least. A track that is left over belongs to the nearest target, as one too many, if that is
+    within `within_m`, the cut-off of OSPA and GOSPA of an order; otherwise it is spurious. Instants
+    are `step_s` apart.
     """
 
     within_m: float
@@ -65,7 +98,7 @@ class TrackTally:
     error: list[FloatArray] = field(default_factory=list)
     paired_s: list[float] = field(default_factory=list)
     accuracy: list[tuple[float, float]] = field(default_factory=list)
-    sets: list[tuple[float, ...]] = field(default_factory=list)
+    sets: list[SetDistance] = field(default_factory=list)
     present: int = 0
     tracked: int = 0
     tracks: int = 0
@@ -77,28 +110,20 @@ class TrackTally:
     steps_present: dict[int, int] = field(default_factory=dict)
     before_s: float = 0.0
 
-    def add(self, told: ToldTracks, true: FloatArray, present: IntArray) -> None:
-        """Compare the tracks of an instant with the targets.
+    def add(self, tracks: ReportedTracks, true: FloatArray, present: IntArray) -> None:
+        """Compare the tracks of an instant with the targets that are present.
 
-        Parameters
-        ----------
-        told : ToldTracks
-        true : (targets, 6, tracks)
-            Where each target was at the instant that each track's state speaks of.
-        present : (n,) of int
-            Targets that are there.
+        True states (targets, 6, tracks) are at the instant that each track's state speaks of.
         """
-        count = len(told.number)
+        count = len(tracks.number)
         apart = np.empty((count, len(present)))
         for k, target in enumerate(present.tolist()):
-            apart[:, k] = np.sqrt(((told.state[:3] - true[target, :3]) ** 2).sum(axis=0))
+            apart[:, k] = np.sqrt(((tracks.state[:3] - true[target, :3]) ** 2).sum(axis=0))
         found = set_distance(apart, self.within_m, self.order)
-        self.sets.append(
-            (found.ospa_m, found.gospa_m, found.localisation_m, found.missed_m, found.false_m)
-        )
+        self.sets.append(found)
         self.present += len(present)
         self.tracks += count
-        self.confirmed |= set(told.number.tolist())
+        self.confirmed |= set(tracks.number.tolist())
         for target in present.tolist():
             self.steps_present[target] = self.steps_present.get(target, 0) + 1
         left = set(range(count))
@@ -106,27 +131,27 @@ class TrackTally:
             if apart[track, k] >= self.within_m:
                 continue
             left.discard(int(track))
-            self._pair(told, true, int(track), int(present[k]))
+            self._pair(tracks, true, int(track), int(present[k]))
         for track in left:
             near = int(np.argmin(apart[track])) if len(present) else -1
             if near < 0 or apart[track, near] >= self.within_m:
                 self.spurious += 1
                 continue
-            self.owned.add(int(told.number[track]))
-            self._accuracy(told.state[:, track] - true[present[near], :, track])
-        self.before_s = told.time_s
+            self.owned.add(int(tracks.number[track]))
+            self._accuracy(tracks.state[:, track] - true[present[near], :, track])
+        self.before_s = tracks.time_s
 
-    def _pair(self, told: ToldTracks, true: FloatArray, track: int, target: int) -> None:
-        error = told.state[:, track] - true[target, :, track]
+    def _pair(self, tracks: ReportedTracks, true: FloatArray, track: int, target: int) -> None:
+        error = tracks.state[:, track] - true[target, :, track]
         self.tracked += 1
-        self.nees.append(float(error @ np.linalg.solve(told.covariance[track], error)))
+        self.nees.append(float(error @ np.linalg.solve(tracks.covariance[track], error)))
         self.error.append(error)
-        self.paired_s.append(told.time_s)
+        self.paired_s.append(tracks.time_s)
         self._accuracy(error)
-        number = int(told.number[track])
+        number = int(tracks.number[track])
         self.numbers.setdefault(target, []).append(number)
-        # Between two instants a track was confirmed when it was told so, not at the next instant.
-        self.since.setdefault(target, max(float(told.confirmed_s[track]), self.before_s))
+        # Between two instants it was confirmed when that was reported, not at the next instant.
+        self.since.setdefault(target, max(float(tracks.confirmed_s[track]), self.before_s))
         self.owned.add(number)
 
     def _accuracy(self, error: FloatArray) -> None:
@@ -139,16 +164,7 @@ class TrackTally:
         covered_s: Mapping[str, float],
         duration_s: float,
     ) -> dict[str, float]:
-        """Return what it comes to.
-
-        Parameters
-        ----------
-        names : list of str
-            Of the targets.
-        detected_s, covered_s : mapping
-            When each was first detected, and entered the sensors' coverage.
-        duration_s : float
-        """
+        """Return the scores, by when each target was first detected and entered the coverage."""
         found = self._errors()
         sets = np.array(self.sets).reshape(-1, len(_SETS))
         found |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
@@ -201,15 +217,7 @@ class TrackTally:
 
 
 def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:
-    """Return how honest expected measurements are.
-
-    Parameters
-    ----------
-    nis : (n,)
-        Normalised innovations squared.
-    freedom : (n,) of int
-        How many quantities each is of.
-    """
+    """Return consistency from normalised innovations squared and their degrees of freedom."""
     inside = np.zeros(len(nis), dtype=bool)
     for many in np.unique(freedom).tolist():
         low, high = chi_square_bounds(many)
