@@ -9,14 +9,7 @@ MOST_TARGETS = 10
 
 
 def show(console: Any, summary: dict[str, Any]) -> None:
-    """Print a run's summary: sensors, fusion, closest approaches, what came of them, speed.
-
-    Parameters
-    ----------
-    console : rich.console.Console
-    summary : dict
-        As described in `DetectAndSenseReport.show`.
-    """
+    """Print a run's summary: sensors, fusion, closest approaches, outcomes, attitude, speed."""
     if summary.get("sensors"):
         _print_table(
             console,
@@ -99,13 +92,7 @@ _WHY_NOT_SEEN = {
 
 
 def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say what the asterisk means behind the first and last detections that the run cut off.
-
-    Parameters
-    ----------
-    sensors : dict
-        As of `SensorSummary.result`.
-    """
+    """Say what the asterisk means behind the first and last detections that the run cut off."""
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()
@@ -116,13 +103,7 @@ def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def unseen_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say of each sensor without a detection why it saw nothing.
-
-    Parameters
-    ----------
-    sensors : dict
-        As of `SensorSummary.result`.
-    """
+    """Say of each sensor without a detection why it saw nothing."""
     lines = []
     for name, entry in sensors.items():
         if entry["first_detection"] is not None:
@@ -147,14 +128,7 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def outcome_lines(summary: dict[str, Any]) -> list[str]:
-    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do.
-
-    Parameters
-    ----------
-    summary : dict
-        With the sections of `components.display.outcomes.outcome_observers`, and ``late_looks`` of
-        trackers.
-    """
+    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do."""
     lines = [f"{name}: {_tracks_text(told)}" for name, told in summary.get("tracks", {}).items()]
     lines += [
         f"{name}: {told['left_out']:,} of {told['looks']:,} looks of {sensor} "
@@ -189,13 +163,7 @@ def _tracks_text(told: dict[str, Any]) -> str:
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:
-    """Say that attitude was derived from flown paths, and how wrong that is.
-
-    Parameters
-    ----------
-    traffic : dict
-        The section of a block that replays flights, with ``derived_attitude`` where any was.
-    """
+    """Say that attitude was derived from flown paths, and how wrong that is."""
     derived = traffic.get("derived_attitude")
     if not derived:
         return []

@@ -9,10 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.display.flights import Flights
-from components.display.marks import Detected, read_fused
-from components.display.scan_times import ScansShown, SensorScans, read_scans, scans_between
-from components.display.styles import mark_of
-from components.display.thinning import by_target, evenly, staggered
+from components.display.recorded_rows import (
+    Detected,
+    ScansShown,
+    SensorScans,
+    read_fused,
+    read_scans,
+    scans_between,
+)
+from components.display.symbols import by_target, evenly, mark_of, staggered
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
@@ -31,16 +36,7 @@ _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 @dataclass
 class CloseUp:
-    """The part of a run in which single scans are shown.
-
-    Parameters
-    ----------
-    start_s, end_s : float
-    what : str
-        Why this part.
-    joined : list of (time_s, sensors)
-        Instants in it at which two or more sensors were fused.
-    """
+    """A part of a run in which single scans are shown, why, and where sensors were fused."""
 
     start_s: float
     end_s: float
@@ -55,19 +51,7 @@ def draw_timeline(
     detected: Detected,
     folder: Path,
 ) -> Path:
-    """Draw a close-up of single scans, and range over time for the whole run.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG to write.
-    simulation : Simulation
-    flights : Flights or None
-        For the targets' true ranges.
-    detected : Detected
-    folder : Path
-        Holds the run's Parquet tables.
-    """
+    """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
     close_up = find_close_up(scans, folder, duration_s)
@@ -157,8 +141,8 @@ def _draw_scans(
         here = shown.get(name, nothing)
         style = styles[name]
         rate_hz = scans[name].rate_hz if name in scans else None
-        who = figure_text(name, 16)
-        names.append(f"{who}\n{rate_hz:.4g} Hz" if rate_hz else who)
+        label = figure_text(name, 16)
+        names.append(f"{label}\n{rate_hz:.4g} Hz" if rate_hz else label)
         size = min(7.0, _mark_size(len(here.time_s)))
         axes.plot(
             here.time_s, np.full(len(here.time_s), height[name]), linestyle="none", marker="|",

@@ -50,6 +50,32 @@ def states_in_frame(
     return state, present
 
 
+class TargetsInFrame:
+    """Targets in one frame, north, east and down of an origin in deg and m; NaN if not there."""
+
+    def __init__(self, flights: Sequence[Any], origin: Sequence[float]) -> None:
+        self._flights, self._origin = flights, np.array(origin)
+        self.names = [flight.name for flight in flights]
+
+    def place(self, flight: Any, time_s: FloatArray) -> FloatArray:
+        """Return where an aircraft is, (3, n), m."""
+        origin = np.repeat(self._origin[:, np.newaxis], len(time_s), axis=1)
+        position, there = position_in_frame(flight, time_s, origin)
+        return np.where(there, position, np.nan)
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """Return where the targets are, (targets, 3, n), m."""
+        found = [self.place(flight, time_s) for flight in self._flights]
+        return np.array(found).reshape(len(found), 3, len(time_s))
+
+    def states(self, time_s: FloatArray) -> FloatArray:
+        """Return positions and velocities, (targets, 6, n), m and m/s."""
+        before = np.maximum(time_s - _STEP_S, 0.0)
+        after = before + 2.0 * _STEP_S
+        velocity = (self.at(after) - self.at(before)) / (2.0 * _STEP_S)
+        return np.concatenate([self.at(time_s), velocity], axis=1)
+
+
 def reaches_of(scene: Scene) -> list[Reach]:
     """Return where the sensors of a scene look, in the ownship's body axes."""
     found = []

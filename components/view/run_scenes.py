@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from components.display.symbols import sensor_marks
 from components.geometry.attitude import body_to_ned
 from components.geometry.enu import enu_to_geodetic
 from components.messages.guidance_bands import BAND_REGIONS
 from components.view.picture import RunPicture, TangentPlane
-from components.view.sensor_marks import sensor_marks
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.errors import UsageError

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from components.display import labels as module
-from components.display.labels import Labels
+from components.display import symbols as module
+from components.display.symbols import Labels
 
 LETTER, LINE, GAP, CELL = module._LETTER_PX, module._LINE_PX, module._GAP_PX, module._CELL_PX
 UNIT = 0.01  # per pixel, on a map of 800 by 600 pixels

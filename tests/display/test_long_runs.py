@@ -9,11 +9,16 @@ import pyarrow.parquet as pq
 from hypothesis import given
 from hypothesis import strategies as st
 
-from components.display import marks
-from components.display.marks import Detected
-from components.display.scan_times import read_scans, scans_between
+from components.display import recorded_rows
+from components.display.recorded_rows import (
+    Detected,
+    ThinnedStream,
+    places_in_groups,
+    read_scans,
+    scans_between,
+    strides,
+)
 from components.display.summary import FusedSummary, SensorSummary
-from components.display.thinned_stream import ThinnedStream, places_in_groups, strides
 from dsa_des.block.message import Text
 
 series = st.lists(st.integers(0, 6), max_size=300)
@@ -70,7 +75,7 @@ def write(folder, name, columns, group=64):
 
 
 def test_a_rare_target_stays_beside_one_that_is_always_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr(marks, "MOST_ROWS", 500)
+    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 500)
     count = 20_000
     rare = np.isin(np.arange(count), [7, 9_000, 19_990])
     names = np.where(rare, "rare", "always").astype(object)
@@ -162,12 +167,12 @@ def drawn(folder, groups):
     tracemalloc.stop()
     assert scans["radar"].count == groups * 4000
     assert len(shown["radar"].time_s) == 101
-    assert len(detected.time_s["radar"]) <= marks.MOST_ROWS
+    assert len(detected.time_s["radar"]) <= recorded_rows.MOST_ROWS
     return peak
 
 
 def test_reading_for_figures_takes_the_same_memory_however_long_the_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(marks, "MOST_ROWS", 6000)
+    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 6000)
     drawn(tmp_path, 2)
     assert drawn(tmp_path, 60) < 1.3 * drawn(tmp_path, 6)
 

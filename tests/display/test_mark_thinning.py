@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from components.display.labels import Labels
-from components.display.thinning import by_target, evenly, staggered
+from components.display.symbols import Labels, by_target, evenly, staggered
 
 
 def test_marks_keep_their_distance_and_the_first_one():

@@ -6,7 +6,7 @@ import pymap3d
 import pytest
 
 import dsa_des
-from components.display.outcomes import ManoeuvreSummary, TrackSummary
+from components.display.summary import ManoeuvreSummary, TrackSummary
 from components.display.terminal import outcome_lines, unseen_lines
 from components.messages.state_tracks import STATUSES
 from dsa_des.block.message import Text

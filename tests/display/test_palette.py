@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from components.display.styles import styles_of
+from components.display.symbols import styles_of
 from components.fusion.gated import Gated
 from components.optical.eo import ElectroOptical
 from components.optical.ir import Infrared

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.display.consistency import draw_consistency
-from components.display.drawn_tracks import DrawnTracks, distances, errors_squared
-from components.display.tracks import draw_tracks
+from components.display.summary import distances
+from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
 from components.messages.columns import COVARIANCE
 from dsa_des.running.simulation import Simulation
 
@@ -83,6 +82,6 @@ def test_errors_are_those_to_the_nearest_target_at_the_same_time():
         apart = [np.linalg.norm(estimate[:3, row] - states[t, :3, row]) for t in range(3)]
         error = estimate[:, row] - states[int(np.argmin(apart)), :, row]
         assert found[row] == pytest.approx(error @ np.linalg.inv(spread[row]) @ error)
-    np.testing.assert_allclose(distances(columns, states[:, :3])[:, 0], [
+    np.testing.assert_allclose(distances(columns, slice(None), states[:, :3])[:, 0], [
         np.linalg.norm(estimate[:3, 0] - states[t, :3, 0]) for t in range(3)])  # fmt: skip
     assert not errors_squared(columns, np.empty((0, 6, 4)))[1].any()

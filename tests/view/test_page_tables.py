@@ -9,11 +9,11 @@ import pyarrow.parquet as pq
 import pymap3d
 import pytest
 
+from components.display.symbols import sensor_marks
 from components.messages.guidance_bands import BAND_REGIONS
 from components.sensor import marks
 from components.view.encounter_scenes import encounter_picture
 from components.view.run_scenes import run_picture
-from components.view.sensor_marks import sensor_marks
 
 SCENE = """
 title = "By hand"
