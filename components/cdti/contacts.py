@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from components.cdti.own_flight import OwnFlight, OwnNow
-from components.geometry.attitude import body_to_ned
-from components.geometry.enu import enu_to_geodetic
+from components.display.picture import offset_positions
+from components.geometry.attitude import body_to_ned, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
@@ -79,9 +79,7 @@ def contacts_of_lines(
     if before is not None:
         range_m, range_s = _held(message.target, seen_s, range_m, range_s, before)
     pose = own.poses(message.measured_tick)
-    azimuth, elevation = message.azimuth_rad, message.elevation_rad
-    level = np.cos(elevation)
-    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
+    body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
     away = np.stack([east, north, -down], axis=1) * range_m[:, np.newaxis]
     toward = np.stack([np.arctan2(east, north), np.arcsin(np.clip(-down, -1.0, 1.0))], axis=1)
@@ -118,17 +116,11 @@ def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -
     lives = np.flatnonzero(message.track_status != DELETED)
     place = np.full((len(lives), 3), np.nan)
     ranged = message.has_range[lives] & np.isfinite(message.north_m[lives])
-    with_range = lives[ranged]
-    if len(with_range) and own.plane is not None:
-        lat, lon, alt = enu_to_geodetic(
-            message.east_m[with_range],
-            message.north_m[with_range],
-            -message.down_m[with_range],
-            reference_lat_deg=message.origin_lat_deg[with_range],
-            reference_lon_deg=message.origin_lon_deg[with_range],
-            reference_alt_m=message.origin_alt_m[with_range],
-        )
-        place[ranged] = np.stack([*own.plane.east_north_m(lat, lon, alt), alt], axis=1)
+    if own.plane is not None:
+        ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
+        origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
+        ends = offset_positions(np.where(ranged, ned_m, np.nan), [part[lives] for part in origin])
+        place = np.stack([*own.plane.east_north_m(*ends), ends[2]], axis=1)
     toward = np.stack([message.azimuth_rad[lives], message.elevation_rad[lives]], axis=1)
     seen_s = message.updated_s[lives]
     unknown = np.full(len(lives), np.nan)

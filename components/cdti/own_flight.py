@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from components.display.picture import TangentPlane
 from components.messages.targets import TrafficStates
-from components.view.picture import TangentPlane
 from dsa_des.arrays.types import FloatArray, IntArray
 
 _KEPT = 600

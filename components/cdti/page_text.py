@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from components.view.page_program import page_filled, page_part, page_program
+from components.view.page import page_filled, page_part, page_program
 
 _PACKAGE = "components.cdti"
 #: The program's parts, in the order in which they need each other.

@@ -71,7 +71,7 @@ class Flights:
         own = source.own_at(times)
         start = int(np.argmax(own.present))
         #: Latitude and longitude in degrees and altitude in metres of the map's origin.
-        self.origin = tuple(float(v[start]) for v in (own.lat_deg, own.lon_deg, own.alt_m))
+        self.origin = float(own.lat_deg[start]), float(own.lon_deg[start]), float(own.alt_m[start])
         self.start_s = float(times[start])
         #: Where the ownship's nose points at its start, clockwise from north.
         self.start_yaw_rad = float(own.yaw_rad[start])

@@ -14,8 +14,8 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
+from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.estimation.frame import place_in_frame
-from components.export.recorded import OWNSHIP, RecordedTables
 from components.geometry.ellipsoid import north_east_up
 from components.geometry.normals import local_axes
 from components.stone_soup.objects import (
@@ -97,22 +97,7 @@ class StoneSoupRun:
 def recorded_run(
     run: RecordedTables, origin: Origin | None = None, range_rates: bool = False
 ) -> StoneSoupRun:
-    """Return a run's detections, poses and truth.
-
-    Parameters
-    ----------
-    run : RecordedTables
-    origin : tuple, optional
-        Latitude and longitude (deg) and height (m) of the frame; by default that of the run's
-        tracks, or where the ownship was first.
-    range_rates : bool
-        Whether range rates are part of measurements, where the ownship's velocity is recorded.
-
-    Raises
-    ------
-    UsageError
-        The run has no detections, no poses, or detections without an error.
-    """
+    """Return a run's detections, poses and truth."""
     flights = run.flights() if "truth" in run.tables else {}
     columns = _detections(run)
     pose = _poses(run, columns, flights)

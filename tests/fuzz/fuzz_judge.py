@@ -195,7 +195,7 @@ def import_everything() -> None:
         "components.encounters.convert_command", "components.encounters.show_command",
         "components.encounters.risk_table", "components.encounters.generate_command",
         "components.encounters.split_command", "components.export.exported", "scipy.io",
-        "components.view.make", "pyarrow.parquet", "pyarrow.csv",
+        "components.view.run_picture", "pyarrow.parquet", "pyarrow.csv",
     ):  # fmt: skip
         with contextlib.suppress(ImportError):
             importlib.import_module(module)

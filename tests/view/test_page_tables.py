@@ -12,8 +12,7 @@ import pytest
 from components.display.symbols import sensor_marks
 from components.messages.guidance_bands import BAND_REGIONS
 from components.sensor import marks
-from components.view.encounter_scenes import encounter_picture
-from components.view.run_scenes import run_picture
+from components.view.run_picture import encounter_picture, run_picture
 
 SCENE = """
 title = "By hand"

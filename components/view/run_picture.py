@@ -1,4 +1,4 @@
-"""What a run's folder holds, brought into one plane for the page."""
+"""Runs and recorded encounters as the page shows them: all in one plane and one time."""
 
 import json
 import tomllib
@@ -9,50 +9,86 @@ from typing import Any
 
 import numpy as np
 
+from components.display.picture import TangentPlane, offset_positions, sights
+from components.display.recorded_run import RecordedTables, read_table
 from components.display.symbols import sensor_marks
-from components.geometry.attitude import body_to_ned
-from components.geometry.enu import enu_to_geodetic
 from components.messages.guidance_bands import BAND_REGIONS
-from components.view.picture import RunPicture, TangentPlane
+from components.traffic.daa_file import read_daa_samples
+from components.traffic.traffic_file import TrafficFileError
+from components.view.page import RunPicture, page_text
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.mark import Mark
-from dsa_des.errors import UsageError
+from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_names import named
+from dsa_des.terminal.terminal import say
 
 _NO_TARGET = -1
 _OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
         "own_roll_rad")  # fmt: skip
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
-Table = Mapping[str, Any]
+#: What the page shows of a run; the first two are in every run.
+_SHOWN = ("detections", "scans", "truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres",
+          "bands")  # fmt: skip
 
 
-class _TableColumns(dict[str, Any]):
-    """A table's columns; one that is asked for and not there is said with the file."""
+class _RunColumns(dict[str, Any]):
+    """A table's columns, as they are asked for."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, run: RecordedTables, table: str) -> None:
         super().__init__()
-        self._path = path
+        self._run, self._table = run, table
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._run.tables[self._table].column_names
 
     def __missing__(self, name: str) -> Any:
-        raise UsageError(f"{self._path}: there is no column {name!r}")
+        self[name] = self._run.values(self._table, name)
+        return self[name]
+
+
+def make_view(run: str, out: str | None) -> None:
+    """Write the page of a run's folder or of a ``.daa`` file; ``dsa-des view``."""
+    source = Path(run)
+    if source.is_dir():
+        try:
+            with np.errstate(invalid="ignore", over="ignore"):
+                page = page_text(run_picture(source))
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+            # Any of its files may be another program's: what they lack is met anywhere.
+            raise UsageError(
+                f"{run}: its tables are not those of a run ({str(error)[:200]})"
+            ) from error
+        target = source.resolve().with_name(f"{source.resolve().name}.html")
+    elif source.suffix == ".daa" and source.is_file():
+        page = page_text(encounter_picture(source))
+        target = source.with_suffix(".html")
+    elif source.exists():
+        raise UsageError(f"{run}: is neither a run's folder nor a .daa file")
+    else:
+        raise UsageError(f"{run}: there is no such folder or file")
+    if out is not None:
+        target = named(out)
+    check_file(target)
+    try:
+        write_file(target, page.encode("utf-8"))
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
+    say(f"wrote {target}")
 
 
 def run_picture(folder: Path) -> RunPicture:
-    """Return the page's picture of a run.
-
-    Raises
-    ------
-    UsageError
-        The folder holds no run, or one without detections.
-    """
+    """Return the page's picture of a run; `UsageError` where the folder holds none."""
     info = _json(folder / "run.json")
     scene = _toml(folder / "scene.toml")
-    tables = {name: _table(folder / f"{name}.parquet") for name in ("detections", "scans")}
-    if tables["scans"] is None or tables["detections"] is None:
+    paths = {name: folder / f"{name}.parquet" for name in _SHOWN}
+    if not all(paths[name].is_file() for name in _SHOWN[:2]):
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
-    for name in ("truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres", "bands"):
-        tables[name] = _table(folder / f"{name}.parquet")
-    found: dict[str, Table] = {name: table for name, table in tables.items() if table is not None}
+    tables = {name: read_table(path) for name, path in paths.items() if path.is_file()}
+    run = RecordedTables(folder, tables)
+    found = {name: _RunColumns(run, name) for name in tables}
     detections = found["detections"]
     names = _names(found)
     own = _own(found)
@@ -67,7 +103,7 @@ def run_picture(folder: Path) -> RunPicture:
     blocks = {name: scene.get("blocks", {}).get(name, {}) for name in sensors}
     marks = sensor_marks({name: str(block.get("type", "")) for name, block in blocks.items()})
     picture.sensors = [_sensor(name, blocks[name], marks[name]) for name in sensors]
-    targets = {name: place for place, name in enumerate(names)}
+    targets = {name: number for number, name in enumerate(names)}
     picture.tables["own"] = _own_columns(own, plane)
     if "truth" in found:
         picture.tables["truth"] = _truth(found["truth"], plane, targets)
@@ -76,7 +112,7 @@ def run_picture(folder: Path) -> RunPicture:
         "sensor": _codes(found["scans"]["block"], sensors),
         "detected": found["scans"]["detected"],
     }
-    seen = _seen(detections, {name: detections[name] for name in _OWN}, plane)
+    seen = _seen(detections, detections, plane)
     picture.tables["detections"] = {
         "time_s": detections["time_s"],
         "sensor": _codes(detections["block"], sensors),
@@ -137,32 +173,11 @@ def _toml(path: Path) -> dict[str, Any]:
         raise UsageError(f"{path}: is not TOML ({error})") from error
 
 
-def _table(path: Path) -> Table | None:
-    """Return a table's columns, text as Python's; None where there is no such file."""
-    if not path.is_file():
-        return None
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
-    found = _TableColumns(path)
-    for name in table.column_names:
-        column = table[name]
-        if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
-            found[name] = column.to_pylist()
-        else:
-            found[name] = column.to_numpy(zero_copy_only=False)
-    return found
-
-
 def _text(column: list[str | None]) -> list[str]:
     return [text for text in column if text is not None]
 
 
-def _names(tables: Mapping[str, Table]) -> list[str]:
+def _names(tables: Mapping[str, _RunColumns]) -> list[str]:
     """Return the targets of all tables, sorted."""
     found: set[str] = set()
     for name in ("truth", "detections", "alerts"):
@@ -172,9 +187,9 @@ def _names(tables: Mapping[str, Table]) -> list[str]:
 
 
 def _codes(column: list[str | None], names: Any) -> AnyArray:
-    """Return the place of each text among names, -1 for none."""
-    place = names if isinstance(names, dict) else {name: i for i, name in enumerate(names)}
-    codes = (_NO_TARGET if text is None else place.get(text, _NO_TARGET) for text in column)
+    """Return the number of each text among names, -1 for none."""
+    known = names if isinstance(names, dict) else {name: i for i, name in enumerate(names)}
+    codes = (_NO_TARGET if text is None else known.get(text, _NO_TARGET) for text in column)
     return np.fromiter(codes, dtype=np.int64, count=len(column))
 
 
@@ -205,7 +220,7 @@ def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     return found
 
 
-def _own(tables: Mapping[str, Table]) -> dict[str, FloatArray]:
+def _own(tables: Mapping[str, _RunColumns]) -> dict[str, FloatArray]:
     """Return where the ownship was and how it lay, in order of time: the truth, or its belief."""
     found: dict[str, FloatArray]
     truth = tables.get("truth")
@@ -243,7 +258,9 @@ def _own_columns(own: Mapping[str, FloatArray], plane: TangentPlane) -> dict[str
     }
 
 
-def _truth(truth: Table, plane: TangentPlane, targets: Mapping[str, int]) -> dict[str, AnyArray]:
+def _truth(
+    truth: _RunColumns, plane: TangentPlane, targets: Mapping[str, int]
+) -> dict[str, AnyArray]:
     """Return the targets' true positions, by target and then by time."""
     code = _codes(truth["target"], targets)
     keep = np.flatnonzero((code >= 0) & np.isfinite(truth["lat_deg"]))
@@ -260,7 +277,7 @@ def _truth(truth: Table, plane: TangentPlane, targets: Mapping[str, int]) -> dic
 
 
 def _estimates(
-    table: Table, own: Mapping[str, FloatArray], plane: TangentPlane
+    table: _RunColumns, own: Mapping[str, FloatArray], plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live; their frames are turned like the plane."""
     keep = np.flatnonzero(np.array([status != "deleted" for status in table["track_status"]]))
@@ -269,21 +286,12 @@ def _estimates(
         return np.asarray(table[name], dtype=float)[keep]
 
     time_s = column("time_s")
-    ends = np.full((3, len(keep)), np.nan)
-    known = np.isfinite(column("north_m"))
-    if known.any():
-        ends[:, known] = enu_to_geodetic(
-            column("east_m")[known],
-            column("north_m")[known],
-            -column("down_m")[known],
-            reference_lat_deg=column("origin_lat_deg")[known],
-            reference_lon_deg=column("origin_lon_deg")[known],
-            reference_alt_m=column("origin_alt_m")[known],
-        )
+    ned_m = np.stack([column(name) for name in ("north_m", "east_m", "down_m")])
+    ends = offset_positions(ned_m, [column(name) for name in _ORIGIN])
     east, north = plane.east_north_m(*ends)
     pose = _pose_at(own, time_s)
     from_east, from_north = plane.east_north_m(*(pose[name] for name in _OWN[:3]))
-    statuses = [table["track_status"][place] for place in keep.tolist()]
+    statuses = [table["track_status"][row] for row in keep.tolist()]
     return {
         "time_s": time_s,
         "number": np.asarray(table["track"])[keep],
@@ -312,40 +320,17 @@ def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, Flo
     return found
 
 
-def _seen(table: Table, pose: Mapping[str, Any], plane: TangentPlane) -> dict[str, AnyArray]:
+def _seen(table: _RunColumns, pose: Mapping[str, Any], plane: TangentPlane) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
-    Returns
-    -------
-    dict
-        ``from_east_m`` and ``from_north_m``, ``bearing_rad`` from north, ``range_m``, and of the
-        end ``east_m``, ``north_m`` and ``alt_m``; what is not known is NaN.
+    Bearings are from north; what is not known is NaN.
     """
-    lat, lon, alt, heading, pitch, roll = (np.asarray(pose[name], dtype=float) for name in _OWN)
-    azimuth = np.asarray(table["azimuth_rad"], dtype=float)
-    elevation = np.asarray(table["elevation_rad"], dtype=float)
-    range_m = np.asarray(table["range_m"], dtype=float)
-    from_east, from_north = plane.east_north_m(lat, lon, alt)
-    level = np.cos(elevation)
-    known = np.isfinite(lat) & np.isfinite(azimuth)
-    bearing = np.full(len(azimuth), np.nan)
-    end = np.full((3, len(azimuth)), np.nan)
-    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
-    if known.any():
-        north, east, down = (np.full(len(azimuth), np.nan) for _ in range(3))
-        forward, right, below = (part[known] for part in body)
-        parts = body_to_ned(forward, right, below, heading[known], pitch[known], roll[known])
-        north[known], east[known], down[known] = parts
-        bearing = np.arctan2(east, north)
-        ranged = known & np.isfinite(range_m)
-        if ranged.any():
-            offsets = (r[ranged] * range_m[ranged] for r in (east, north, -down))
-            end[:, ranged] = enu_to_geodetic(
-                *offsets,
-                reference_lat_deg=lat[ranged],
-                reference_lon_deg=lon[ranged],
-                reference_alt_m=alt[ranged],
-            )
+    at = [np.asarray(pose[name], dtype=float) for name in _OWN]
+    azimuth, elevation, range_m = (
+        np.asarray(table[name], dtype=float) for name in ("azimuth_rad", "elevation_rad", "range_m")
+    )
+    from_east, from_north = plane.east_north_m(*at[:3])
+    bearing, end = sights(azimuth, elevation, range_m, at)
     east_m, north_m = plane.east_north_m(*end)
     return {
         "from_east_m": from_east,
@@ -357,3 +342,30 @@ def _seen(table: Table, pose: Mapping[str, Any], plane: TangentPlane) -> dict[st
         "north_m": north_m,
         "alt_m": end[2],
     }
+
+
+def encounter_picture(path: Path) -> RunPicture:
+    """Return the page's picture of a recorded encounter (``.daa``), the ownship first."""
+    try:
+        samples = read_daa_samples(path)
+    except TrafficFileError as error:
+        raise UsageError(str(error)) from error
+    own, *others = samples
+    first, last = (float(samples[own]["time"][end]) for end in (0, -1))
+    plane = TangentPlane(float(samples[own]["lat"][0]), float(samples[own]["lon"][0]))
+    picture = RunPicture(path.name, {"ownship": own}, last - first, first, targets=others)
+    columns = []
+    for number, table in enumerate(samples.values()):
+        east, north = plane.east_north_m(table["lat"], table["lon"], table["alt"])
+        track = np.unwrap(np.arctan2(table["ve"], table["vn"]))
+        common = {"time_s": table["time"] - first, "east_m": east, "north_m": north}
+        if number == 0:
+            picture.tables["own"] = {**common, "alt_m": table["alt"], "heading_rad": track}
+            continue
+        target = np.full(len(east), number - 1)
+        columns.append({**common, "alt_m": table["alt"], "target": target})
+    if columns:
+        picture.tables["truth"] = {
+            name: np.concatenate([part[name] for part in columns]) for name in columns[0]
+        }
+    return picture

@@ -1,4 +1,4 @@
-"""The tables of a run's folder, for those who write them otherwise."""
+"""The tables of a run's folder, for pages and for files of other programs."""
 
 import os
 from collections.abc import Mapping
@@ -23,13 +23,7 @@ _LARGEST = 1e10
 
 @dataclass(frozen=True)
 class RecordedTables:
-    """A run's tables by name, as Arrow holds them.
-
-    Parameters
-    ----------
-    folder : Path
-    tables : mapping
-    """
+    """A run's tables by name, as Arrow holds them; what they lack is a `UsageError`."""
 
     folder: Path
     tables: Mapping[str, Any]
@@ -37,17 +31,8 @@ class RecordedTables:
     def flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.
 
-        Returns
-        -------
-        dict
-            ``time_s``, ``lat_deg``, ``lon_deg``, ``alt_m``, ``velocity_north_m_s``,
-            ``velocity_east_m_s``, ``velocity_down_m_s``, ``heading_rad``, ``pitch_rad`` and
-            ``roll_rad``, in order of time.
-
-        Raises
-        ------
-        UsageError
-            The run has no truth, or a target is called as the ownship is here.
+        The columns of `_STATE` in order of time; refused without truth, or if a target is called as
+        the ownship is here.
         """
         if "truth" not in self.tables:
             raise UsageError(
@@ -60,9 +45,9 @@ class RecordedTables:
         found: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
         self.refuse_large("truth", columns)
-        who = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
+        aircraft = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
         for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
-            mine = np.flatnonzero(who == name)
+            mine = np.flatnonzero(aircraft == name)
             mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
             time_s, first = np.unique(columns["time_s"][mine], return_index=True)
             if len(time_s):
@@ -70,12 +55,7 @@ class RecordedTables:
         return found
 
     def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
-        """Refuse what is no number, or greater than any of a run, by name and row.
-
-        Raises
-        ------
-        UsageError
-        """
+        """Refuse what is no number, or greater than any of a run, by name and row."""
         for name, values in columns.items():
             large = ~(np.abs(values) <= _LARGEST)
             if large.any():
@@ -86,13 +66,7 @@ class RecordedTables:
                 )
 
     def numbers(self, table: str, name: str) -> FloatArray:
-        """Return a column as numbers, NaN where nothing stands.
-
-        Raises
-        ------
-        UsageError
-            If it is missing, or holds something else.
-        """
+        """Return a column as numbers, NaN where nothing stands; refuse any other."""
         try:
             column = self._column(table, name).to_numpy(zero_copy_only=False)
             return np.asarray(column, dtype=np.float64)
@@ -108,6 +82,15 @@ class RecordedTables:
             )
         return found
 
+    def values(self, table: str, name: str) -> Any:
+        """Return a column of texts as a list, any other as an array of its own type."""
+        import pyarrow as pa
+
+        column = self._column(table, name)
+        if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
+            return column.to_pylist()
+        return column.to_numpy(zero_copy_only=False)
+
     def _column(self, table: str, name: str) -> Any:
         columns = self.tables[table]
         if columns.column_names.count(name) != 1:
@@ -116,39 +99,29 @@ class RecordedTables:
 
 
 def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
-    """Return the tables of a run: a folder's path, or what `dsa_des.run` returns.
-
-    Raises
-    ------
-    UsageError
-        It is no such folder, or a table cannot be read.
-    """
+    """Return the tables of a run: a folder's path, or what `dsa_des.run` returns."""
     if isinstance(run, Run):
         return RecordedTables(run.path or Path("the run"), run.tables)
     return read_tables(os.fspath(run))
 
 
 def read_tables(run: str) -> RecordedTables:
-    """Read all tables of a run's folder.
-
-    Raises
-    ------
-    UsageError
-        It is no such folder, or a table cannot be read.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+    """Read all tables of a run's folder; `UsageError` where it is none or one cannot be read."""
     folder = Path(run)
     if not folder.is_dir():
         raise UsageError(f"{run}: there is no such folder")
     paths = sorted(folder.glob("*.parquet"))
     if not (folder / "run.json").is_file() or not paths:
         raise UsageError(f"{run}: holds no run: run.json or its tables are missing")
-    tables = {}
-    for path in paths:
-        try:
-            tables[path.stem] = pq.read_table(path)
-        except (pa.ArrowException, OSError) as error:
-            raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
-    return RecordedTables(folder, tables)
+    return RecordedTables(folder, {path.stem: read_table(path) for path in paths})
+
+
+def read_table(path: Path) -> Any:
+    """Read a table of a run; `UsageError` where it cannot be read."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error
