@@ -1,40 +1,88 @@
-"""Contacts: what the operator is shown of other aircraft, as the tracker or the fusion has them."""
+"""Contacts as the tracker or the fusion has them, and where the ownship was when it saw them."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from components.cdti.own_flight import OwnFlight, OwnNow
-from components.display.picture import offset_positions
+from components.display.picture import TangentPlane, offset_positions
 from components.geometry.attitude import body_to_ned, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
+from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: A range that was measured counts for so long when only directions follow, s.
 RANGE_HELD_S = 3.0
+_KEPT = 600
+_SPEED_OVER_S = 0.5
+
+
+@dataclass(frozen=True)
+class OwnNow:
+    """The ownship at the latest instant that is known."""
+
+    east_m: float
+    north_m: float
+    alt_m: float
+    heading_rad: float
+    pitch_rad: float
+    roll_rad: float
+    speed_mps: float
+    climb_mps: float
+
+
+class OwnFlight:
+    """The ownship's latest positions and attitudes, in order of time."""
+
+    def __init__(self) -> None:
+        self.now: OwnNow | None = None
+        self.plane: TangentPlane | None = None
+        self._tick: IntArray = np.empty(0, dtype=np.int64)
+        # East, north, altitude, yaw, pitch, roll.
+        self._pose: FloatArray = np.empty((0, 6))
+
+    def take(self, states: TrafficStates, ticks_per_s: int) -> None:
+        """Take in new positions."""
+        if self.plane is None:
+            self.plane = TangentPlane(float(states.own_lat_deg[0]), float(states.own_lon_deg[0]))
+        east, north = self.plane.east_north_m(
+            states.own_lat_deg, states.own_lon_deg, states.own_alt_m
+        )
+        new = np.stack([
+            east, north, states.own_alt_m, states.own_yaw_rad, states.own_pitch_rad,
+            states.own_roll_rad,
+        ], axis=1)  # fmt: skip
+        keep = self._tick < states.tick[0]
+        self._tick = np.concatenate([self._tick[keep], states.tick])[-_KEPT:]
+        self._pose = np.concatenate([self._pose[keep], new])[-_KEPT:]
+        then = int(np.searchsorted(self._tick, self._tick[-1] - _SPEED_OVER_S * ticks_per_s))
+        then = min(then, max(len(self._tick) - 2, 0))
+        apart_s = (self._tick[-1] - self._tick[then]) / ticks_per_s
+        moved = self._pose[-1] - self._pose[then]
+        speed, climb = 0.0, 0.0
+        if apart_s > 0.0:
+            speed, climb = math.hypot(moved[0], moved[1]) / apart_s, float(moved[2]) / apart_s
+        east_m, north_m, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
+        self.now = OwnNow(east_m, north_m, alt_m, yaw, pitch, roll, speed, climb)
+
+    def poses(self, tick: IntArray) -> FloatArray:
+        """Return the last poses not after some instants, (n, 6); the first one before it."""
+        place = np.searchsorted(self._tick, tick, side="right") - 1
+        return self._pose[np.maximum(place, 0)]
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts at one instant.
+    """Contacts at one instant, (n,) each.
 
-    Parameters
-    ----------
-    number : (n,) of int
-        Of the target, -1 for none, or `TRACKS_FROM` and the tracker's number.
-    seen_s : (n,)
-        When it was seen last.
-    ranged : (n,) of bool
-    range_m, range_s : (n,)
-        The range, and when it was measured; NaN without one.
-    place_m : (n, 3)
-        East and north in the plane, and altitude; NaN without a range.
-    toward : (n, 2)
-        Bearing from north and elevation of the line of sight, rad.
+    The number is that of the target, -1 for none, or `TRACKS_FROM` and the tracker's number. Of one
+    that was seen last at `seen_s` the range and when it was measured are NaN without one, as is the
+    place (n, 3): east and north in the plane, and altitude. The line of sight is `toward` (n, 2):
+    bearing from north and elevation, rad.
     """
 
     number: IntArray
@@ -48,10 +96,8 @@ class Contacts:
     def shown(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
         """Return the contacts as the page has them, ranged ones first.
 
-        Returns
-        -------
-        list of [number, east_m, north_m, up_m, bearing_deg, age_s]
-            From the ownship as it is now; the three are None without a range.
+        [number, east_m, north_m, up_m, bearing_deg, age_s] from the ownship as it is now; the three
+        are None without a range.
         """
         fresh = np.flatnonzero(time_s - self.seen_s < forgotten_s)
         fresh = fresh[np.argsort(~self.ranged[fresh], kind="stable")]

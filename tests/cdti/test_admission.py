@@ -1,6 +1,6 @@
 """One page decides, the others watch, and who does not know the address is not let in."""
 
-from components.cdti.admission import OPERATOR, WATCHER, Admission
+from components.cdti.page import OPERATOR, WATCHER, Admission
 
 
 def test_the_first_page_decides_and_the_second_watches():

@@ -7,13 +7,12 @@ import time
 import pytest
 
 from components.cdti import server as server_module
-from components.cdti.admission import Admission
-from components.cdti.connection_limit import MOST_CONNECTIONS
-from components.cdti.server import DisplayServer
+from components.cdti.page import Admission
+from components.cdti.server import MOST_CONNECTIONS, DisplayServer
 
 
-class NoCrew:
-    def operators(self, count):
+class NoControl:
+    def on_operators(self, count):
         pass
 
 
@@ -22,7 +21,7 @@ def served(monkeypatch):
     said = []
     monkeypatch.setattr(server_module, "say", lambda text, err=False: said.append(text))
     admission = Admission()
-    server = DisplayServer("127.0.0.1", 0, admission, NoCrew())
+    server = DisplayServer("127.0.0.1", 0, admission, NoControl())
     server.start()
     yield server, admission, said
     server.close({"type": "over"})

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from components.cdti.page_messages import (
+from components.cdti.page import (
     LARGEST_BYTES,
     Chosen,
     Climbed,

@@ -62,11 +62,11 @@ FAULTS = [
          "body_to_ned(*body, pose[:, 3], 0.0 * pose[:, 3], 0.0 * pose[:, 3])"),
     ),
     *in_file(
-        _GROUP, "components/cdti/lost_area.py", _PICTURE,
+        _GROUP, "components.cdti.scope.py", _PICTURE,
         ("loss-as-if-the-ownship-stood", "- own_mps[0]\n", "\n"),
     ),
     *in_file(
-        _GROUP, "components/cdti/camera_picture.py", _PICTURE,
+        _GROUP, "components.cdti.camera.py", _PICTURE,
         ("picture-that-does-not-roll", "_body_to_ned(own_attitude_rad).T",
          "_body_to_ned(own_attitude_rad * np.array([1.0, 1.0, 0.0])).T"),
         ("plate-as-deep-as-wide", "areas.horizontal_m2 * PLATE_ASPECT_RATIO",
@@ -132,7 +132,7 @@ FAULTS = [
          "aircraft.eo if camera.areas"),
     ),
     *in_file(
-        _GROUP, "components/cdti/camera_picture.py", _CAMERA,
+        _GROUP, "components.cdti.camera.py", _CAMERA,
         ("horizon-of-a-bank-to-the-other-side", "-_body_to_ned(own_attitude_rad)[2]",
          "-_body_to_ned(own_attitude_rad * np.array([1.0, 1.0, -1.0]))[2]"),
         ("horizon-above-the-level", "missing = -math.sin(dip_rad)",
@@ -151,7 +151,7 @@ FAULTS = [
          "stays = np.zeros(len(before.number), dtype=bool)"),
     ),
     *in_file(
-        _GROUP, "components/cdti/own_flight.py", _SHOWN,
+        _GROUP, "components.cdti.contacts.py", _SHOWN,
         ("flight-before-this-message-forgotten", "keep = self._tick < states.tick[0]",
          "keep = self._tick < -1"),
     ),

@@ -1,15 +1,25 @@
-"""What goes on between the pages of a session and its simulation: decisions, and who waits."""
+"""Between the pages of a session and its simulation: decisions, and the pace at which it runs."""
 
 import math
+import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from components.cdti.admission import OPERATOR, Admission
-from components.cdti.live_pace import LivePacer
-from components.cdti.page_messages import Chosen, Climbed, Judged, PageMessage, Ready, Turned
+from components.cdti.page import (
+    OPERATOR,
+    Admission,
+    Chosen,
+    Climbed,
+    Judged,
+    PageMessage,
+    Ready,
+    Turned,
+)
 from components.cdti.scope import Scope
 from components.messages.decisions import CLIMB, KINDS, TURN, OperatorDecision
 from components.operator.desk import Desk, Laid
+from dsa_des.running.pacing import Pacer
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import printable
@@ -25,20 +35,80 @@ _SHARE = 0.2
 #: A page that is gone for so long is not being reloaded, s.
 GONE_S = 3.0
 _LOG = 200
+#: Wall time that a window stands for, s: so long, at most, a decision waits to be taken in.
+WINDOW_S = 0.02
+_LOOK_AGAIN_S = 0.25
 
 
-class SessionCrew:
-    """Answers the pages of one session.
+class LivePacer(Pacer):
+    """A pacer that waits while `holds()`, and tells how far the run has come, with the lag, s.
 
-    Parameters
-    ----------
-    scene : Scene
-    desk : Desk
-    console : str or None
-        The block at which the operator sits; None where all only watch.
-    factor : float
-    waits : bool
-        Whether the run begins when an operator is ready.
+    Simulated time runs at `factor` seconds per second of the clock.
+    """
+
+    def __init__(
+        self,
+        factor: float,
+        holds: Callable[[], bool],
+        came_to: Callable[[float, float], None],
+    ) -> None:
+        super().__init__(factor)
+        self._holds, self._came_to = holds, came_to
+        self._changed = threading.Event()
+        self.paused_s = 0.0
+
+    @property
+    def longest_window_s(self) -> float:
+        """Simulated time that a window may hold, s."""
+        return WINDOW_S * self.factor
+
+    def wake(self) -> None:
+        """Look again whether to wait: something has changed. Any thread may call it."""
+        self._changed.set()
+
+    def stop(self) -> None:
+        """End the run after the window that is under way."""
+        self.stopped = True
+        self._changed.set()
+
+    def start(self) -> None:
+        """Let simulated time 0 be when nothing holds the run any more."""
+        self._hold()
+        super().start()
+
+    def __call__(self, time_s: float) -> None:
+        """Wait for the instant up to which the simulation has come, and while the run is held."""
+        self.time_s = time_s
+        due = self._started + time_s / self.factor
+        while not self.stopped and (ahead_s := due - self.now()) > 0.0:
+            self._changed.wait(min(ahead_s, _LOOK_AGAIN_S))
+            self._changed.clear()
+        lag_s = max(0.0, self.now() - due)
+        self.windows += 1
+        self.max_lag_s = max(self.max_lag_s, lag_s)
+        self.total_lag_s += lag_s
+        self._came_to(time_s, lag_s)
+        self._hold()
+
+    def _hold(self) -> None:
+        """Wait while the run is held; its clock stands still meanwhile."""
+        began = self.now()
+        while not self.stopped and self._holds():
+            self._changed.wait(_LOOK_AGAIN_S)
+            self._changed.clear()
+        held_s = self.now() - began
+        self._started += held_s
+        self.paused_s += held_s
+
+    def report(self) -> dict[str, float]:
+        """Return the factor, the lag, and for how long the run was held."""
+        return {**super().report(), "paused_s": self.paused_s}
+
+
+class SessionControl:
+    """Answers the pages of one session, and holds its run until an operator is ready if it `waits`.
+
+    All pages only watch without a console, the block at which the operator sits.
     """
 
     def __init__(
@@ -100,7 +170,7 @@ class SessionCrew:
 
     # -- the thread of the server ------------------------------------------------------------------
 
-    def operators(self, count: int) -> None:
+    def on_operators(self, count: int) -> None:
         """Take note of how many pages are there that may decide."""
         if self._operators and not count:
             self._gone_at = time.monotonic()
@@ -147,8 +217,8 @@ class SessionCrew:
         self._made_s = time.thread_time() - began
         return content
 
-    async def said(self, page: "Page", message: PageMessage) -> None:
-        """Take in what a page said."""
+    async def on_message(self, page: "Page", message: PageMessage) -> None:
+        """Take in a message of a page."""
         if isinstance(message, Chosen):
             page.chosen = message.target
             self._server.show()
@@ -179,13 +249,13 @@ class SessionCrew:
             why = "there is no such target"
         elif isinstance(message, Climbed) and self.scope.alt_m + message.value < 0.0:
             why = "that leads below the ground"
-        elif not self._lay(message, name):
+        elif not self._submit(message, name):
             why = "the run is over, or too much was decided at once"
         if why:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
-    def _lay(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Lay a decision on the desk; the page is told when the simulation has it."""
+    def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
+        """Hand a decision to the simulation; the page learns when it was taken in."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(
@@ -195,7 +265,7 @@ class SessionCrew:
             climb_m=value if kind == CLIMB else 0.0,
             wall_time_s=round(time.time(), 6),
         )
-        said = {
+        content = {
             "id": message.id,
             "decision": message.decision,
             "target": message.target,
@@ -204,7 +274,7 @@ class SessionCrew:
         self._answers[message.id] = {"type": "waits"}
 
         def taken(time_s: float) -> None:
-            answer = {"type": "taken", **said, "time": round(time_s, 6)}
+            answer = {"type": "taken", **content, "time": round(time_s, 6)}
             self._answers[message.id] = answer
             self._log.append(answer)
             self._server.tell(answer)
