@@ -13,10 +13,9 @@ import numpy as np
 from components.alert_configuration.configuration import Alerter, Configuration
 from components.cdti.camera import CameraSights
 from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines, contacts_of_states
-from components.messages.alerts import AlertLevels, contact_name
+from components.messages.alerts import BAND_REGIONS, AlertLevels, GuidanceBands, contact_name
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
-from components.messages.guidance_bands import BAND_REGIONS, GuidanceBands
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks

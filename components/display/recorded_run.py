@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
-from dsa_des.record.run_folder import Run
+from dsa_des.record.run_folder import Run, with_columns_of_rows
 
 _STATE = (
     "time_s", "lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
@@ -27,6 +28,14 @@ class RecordedTables:
 
     folder: Path
     tables: Mapping[str, Any]
+
+    @cached_property
+    def _with_pose(self) -> Any:
+        return with_columns_of_rows(self.tables, "detections")
+
+    def table(self, name: str) -> Any:
+        """Return a table; detections have with them where the ownship was at each."""
+        return self._with_pose if name == "detections" else self.tables[name]
 
     def flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.
@@ -92,7 +101,7 @@ class RecordedTables:
         return column.to_numpy(zero_copy_only=False)
 
     def _column(self, table: str, name: str) -> Any:
-        columns = self.tables[table]
+        columns = self.table(table)
         if columns.column_names.count(name) != 1:
             raise UsageError(f"{self.folder}: {table}.parquet: there is no column {name!r}")
         return columns[name]

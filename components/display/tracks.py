@@ -11,7 +11,7 @@ import numpy as np
 
 from components.display.summary import NEAR_M, TABLE, distances
 from components.display.symbols import Labels
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray

@@ -21,7 +21,7 @@ import numpy as np
 import dsa_des
 from components.estimation.motion import CoordinatedTurn, Motion
 from components.geometry.enu import enu_to_geodetic
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_of
 from components.metrics.true_states import states_in_frame
 from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary

@@ -122,9 +122,9 @@ def recorded_run(
 
 def _detections(run: RecordedTables) -> dict[str, Any]:
     """Return columns of the detections in order of their instants, and what each look is."""
-    table = run.tables.get("detections")
-    if table is None or table.num_rows == 0:
+    if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         raise UsageError(f"{run.folder}: has no detections")
+    table = run.table("detections")
     names = (*_MEASURED, *_VARIANCES, *(f"own_{name}" for name in _POSE), "illuminated_s", "time_s")
     columns: dict[str, Any] = {
         name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=float) for name in names

@@ -12,7 +12,7 @@ import numpy as np
 from components.display.picture import TangentPlane, offset_positions, sights
 from components.display.recorded_run import RecordedTables, read_table
 from components.display.symbols import sensor_marks
-from components.messages.guidance_bands import BAND_REGIONS
+from components.messages.alerts import BAND_REGIONS
 from components.traffic.daa_file import read_daa_samples
 from components.traffic.traffic_file import TrafficFileError
 from components.view.page import RunPicture, page_text
@@ -24,14 +24,15 @@ from dsa_des.files.output_names import named
 from dsa_des.terminal.terminal import say
 
 _NO_TARGET = -1
+#: What the page shows of a run; the first two are in every run.
+_TABLES = (
+    "detections", "scans", "truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres",
+    "bands",
+)  # fmt: skip
 _OWN = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_heading_rad", "own_pitch_rad",
         "own_roll_rad")  # fmt: skip
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
-
-#: What the page shows of a run; the first two are in every run.
-_SHOWN = ("detections", "scans", "truth", "fused", "tracks", "state_tracks", "alerts", "manoeuvres",
-          "bands")  # fmt: skip
 
 
 class _RunColumns(dict[str, Any]):
@@ -42,7 +43,7 @@ class _RunColumns(dict[str, Any]):
         self._run, self._table = run, table
 
     def __contains__(self, name: object) -> bool:
-        return name in self._run.tables[self._table].column_names
+        return name in self._run.table(self._table).column_names
 
     def __missing__(self, name: str) -> Any:
         self[name] = self._run.values(self._table, name)
@@ -83,8 +84,8 @@ def run_picture(folder: Path) -> RunPicture:
     """Return the page's picture of a run; `UsageError` where the folder holds none."""
     info = _json(folder / "run.json")
     scene = _toml(folder / "scene.toml")
-    paths = {name: folder / f"{name}.parquet" for name in _SHOWN}
-    if not all(paths[name].is_file() for name in _SHOWN[:2]):
+    paths = {name: folder / f"{name}.parquet" for name in _TABLES}
+    if not all(paths[name].is_file() for name in _TABLES[:2]):
         raise UsageError(f"{folder}: holds no run: scans.parquet or detections.parquet is missing")
     tables = {name: read_table(path) for name, path in paths.items() if path.is_file()}
     run = RecordedTables(folder, tables)

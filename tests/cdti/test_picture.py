@@ -79,8 +79,9 @@ def test_a_range_is_held_for_a_while_along_the_new_direction():
 
     def after(tick):
         tracks = Tracks(
-            np.array([tick]), np.array([0, 2]), np.array([3, 4]), np.array([math.pi / 2, 0.0]),
-            np.zeros(2), np.full(2, np.nan), np.zeros(2), np.zeros(2, dtype=int), None, ("eo",),
+            np.array([tick]), np.array([0, 2]), np.array([3, 4]), np.zeros(2),
+            np.zeros(2, dtype=int), None, ("eo",), azimuth_rad=np.array([math.pi / 2, 0.0]),
+            elevation_rad=np.zeros(2), range_m=np.full(2, np.nan),
         )  # fmt: skip
         return contacts_of_lines(tracks, own, 1, before)
 

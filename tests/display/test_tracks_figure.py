@@ -6,7 +6,7 @@ import pytest
 import dsa_des
 from components.display.summary import distances
 from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
 
 EKF = "blocks.tracker.type='tracking.ekf'"

@@ -155,7 +155,7 @@ FAULTS = [
          '10.0 ** (0.05 * extras["snr_db"][found])'),
     ),
     *in_file(
-        _GROUP, "components/messages/every_look.py", "wiring/test_looks.py",
+        _GROUP, "components/messages/looks.py", "wiring/test_looks.py",
         ("looks-by-the-horizon", '"true_elevation_rad": cells.body_elevation_rad',
          '"true_elevation_rad": cells.elevation_rad'),
     ),

@@ -144,8 +144,8 @@ FAULTS = [
     ),
     *in_file(
         _GROUP, "components/tracking/gated_pairs.py", "wiring/test_range_rates_in_tracks.py",
-        ("rates-open-every-gate", "_picked(scans.variance, rows, cells),",
-         "_picked(scans.variance, rows, cells) + 1e6 * (len(rows) > 3),"),
+        ("rates-open-every-gate", "variance = whole(track, cells, rows)",
+         "variance = whole(track, cells, rows) + 1e6 * (len(rows) > 3)"),
     ),
     *in_file(
         _GROUP, "components/tracking/gated_pairs.py", "wiring/test_tracks_without_range.py",

@@ -10,7 +10,7 @@ import pymap3d
 import pytest
 
 from components.display.symbols import sensor_marks
-from components.messages.guidance_bands import BAND_REGIONS
+from components.messages.alerts import BAND_REGIONS
 from components.sensor import marks
 from components.view.run_picture import encounter_picture, run_picture
 

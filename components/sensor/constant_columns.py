@@ -9,7 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.recorded_columns import nothing_in
 
 _SMALLEST = 64
 
@@ -29,11 +28,6 @@ def constant_column(value: float, count: int) -> FloatArray:
     """
     size = _SMALLEST if count <= _SMALLEST else 1 << (count - 1).bit_length()
     return _whole(value, size)[:count]
-
-
-def not_measured(count: int) -> FloatArray:
-    """Return a read-only column of NaN: recorded as null."""
-    return nothing_in(count)
 
 
 @lru_cache(maxsize=256)
