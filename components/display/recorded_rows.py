@@ -4,9 +4,7 @@ Detections are thinned where they are many; of scans each sensor's count, times 
 kept, and single scans of a part of the run.
 """
 
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,45 +23,21 @@ _SCANS = ("block", "time_s", "detected")
 _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 
 
-class RowGroups:
-    """The row groups of a Parquet file; of no file a table without rows."""
+def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Give columns of each row group that has rows, in order; a table that is not there has none.
 
-    def __init__(self, file: Any) -> None:
-        self._file = file
-
-    def __len__(self) -> int:
-        return 0 if self._file is None else int(self._file.num_row_groups)
-
-    def read(self, number: int, columns: Sequence[str]) -> dict[str, Any]:
-        """Return columns of a row group as arrays, text as codes (-1 is null) and names."""
-        table = self._file.read_row_group(number, columns=list(columns))
-        return {name: _array(table[name], name in TEXT) for name in columns}
-
-    def last(self, number: int, column: str) -> Any:
-        """Return the last value of a column in a row group."""
-        return self.read(number, [column])[column][-1]
-
-
-@contextmanager
-def row_groups(path: Path, columns: Sequence[str]) -> Iterator[RowGroups]:
-    """Open a table, to read some of its columns; one that is not there has no rows."""
+    They are arrays, text is codes (-1 is null) and names.
+    """
     if not path.is_file():
-        yield RowGroups(None)
         return
     import pyarrow.parquet as pq
 
     text = [name for name in columns if name in TEXT]
     with pq.ParquetFile(path, read_dictionary=text) as file:
-        yield RowGroups(file)
-
-
-def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Give columns of each row group that has rows, in order; see `RowGroups.read`."""
-    with row_groups(path, columns) as groups:
-        for number in range(len(groups)):
-            rows = groups.read(number, columns)
-            if len(rows["time_s"]):
-                yield rows
+        for number in range(file.num_row_groups):
+            table = file.read_row_group(number, columns=list(columns))
+            if table.num_rows:
+                yield {name: _array(table[name], name in TEXT) for name in columns}
 
 
 def _array(column: Any, text: bool) -> Any:
@@ -73,8 +47,6 @@ def _array(column: Any, text: bool) -> Any:
         column = column.unify_dictionaries()
     chunks = column.chunks
     codes = [chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False) for chunk in chunks]
-    if not codes:
-        return np.empty(0, dtype=np.int64), []
     return np.concatenate(codes).astype(np.int64), chunks[0].dictionary.to_pylist()
 
 
@@ -246,50 +218,28 @@ def read_scans(folder: Path) -> dict[str, SensorScans]:
 
 
 def scans_between(
-    folder: Path, start_s: float, end_s: float, scans: Mapping[str, SensorScans]
+    folder: Path, start_s: float, end_s: float, scans: Iterable[str]
 ) -> dict[str, ScansShown]:
-    """Return the scans of each sensor of `read_scans` in [start_s, end_s]."""
+    """Return the scans of some sensors in [start_s, end_s]."""
     times: dict[str, list[FloatArray]] = {name: [] for name in scans}
-    hits: dict[str, list[FloatArray]] = {name: [] for name in scans}
-    with row_groups(folder / "scans.parquet", _SCANS) as groups:
-        first = bisect_left(
-            range(len(groups)), start_s, key=lambda number: groups.last(number, "time_s")
-        )
-        for number in range(first, len(groups)):
-            rows = groups.read(number, _SCANS)
-            if float(rows["time_s"][0]) > end_s:
-                break
-            for name, (time_s, hit_s) in _by_sensor(rows).items():
-                times[name].append(time_s[(time_s >= start_s) & (time_s <= end_s)])
-                hits[name].append(hit_s[(hit_s >= start_s) & (hit_s <= end_s)])
-        before = _last_hits_before(groups, min(first, len(groups) - 1), start_s, scans)
+    hits: dict[str, list[FloatArray]] = {name: [] for name in times}
+    before: dict[str, FloatArray] = {}
+    for rows in each_row_group(folder / "scans.parquet", _SCANS):
+        if float(rows["time_s"][0]) > end_s:
+            break
+        for name, (time_s, hit_s) in _by_sensor(rows).items():
+            first, last = np.searchsorted(hit_s, start_s), np.searchsorted(hit_s, end_s, "right")
+            before[name] = hit_s[:first][-1:] if first else before.get(name, hit_s[:0])
+            hits[name].append(hit_s[first:last])
+            times[name].append(time_s[(time_s >= start_s) & (time_s <= end_s)])
+    nothing = np.empty(0)
     return {
         name: ScansShown(
-            np.concatenate([*times[name], np.empty(0)]),
-            np.concatenate([before.get(name, np.empty(0)), *hits[name]]),
+            np.concatenate([*times[name], nothing]),
+            np.concatenate([before.get(name, nothing), *hits[name]]),
         )
-        for name in scans
+        for name in times
     }
-
-
-def _last_hits_before(
-    groups: RowGroups, number: int, start_s: float, scans: Mapping[str, SensorScans]
-) -> dict[str, FloatArray]:
-    """Return the last scan with a detection before a time, searched backwards from a row group."""
-    wanted = {
-        name
-        for name, scan in scans.items()
-        if scan.first_hit_s is not None and scan.first_hit_s < start_s
-    }
-    found: dict[str, FloatArray] = {}
-    while wanted and number >= 0:
-        for name, (_, hit_s) in _by_sensor(groups.read(number, _SCANS)).items():
-            earlier = hit_s[hit_s < start_s]
-            if name in wanted and len(earlier):
-                found[name] = earlier[-1:]
-                wanted.remove(name)
-        number -= 1
-    return found
 
 
 def _by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:

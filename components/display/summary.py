@@ -6,7 +6,7 @@ whatever the length of the run.
 
 import math
 from collections.abc import Collection, Iterable
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -267,14 +267,13 @@ class _Sensor:
         return found
 
 
-class _Sighting:
+class _Sighting(NamedTuple):
     """One detection."""
 
-    def __init__(self, tick: int, time_s: float, range_m: float, target: str) -> None:
-        self.tick = tick
-        self.time_s = time_s
-        self.range_m = range_m
-        self.target = target
+    tick: int
+    time_s: float
+    range_m: float
+    target: str
 
     @classmethod
     def nearest(cls, columns: Columns, rows: IntArray) -> "_Sighting":
