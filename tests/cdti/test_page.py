@@ -1,4 +1,4 @@
-"""Of what a page says, only what it may say is heard."""
+"""Which page decides, and which of its messages are accepted."""
 
 import json
 
@@ -6,6 +6,9 @@ import pytest
 
 from components.cdti.page import (
     LARGEST_BYTES,
+    OPERATOR,
+    WATCHER,
+    Admission,
     Chosen,
     Climbed,
     Drawn,
@@ -14,6 +17,36 @@ from components.cdti.page import (
     Turned,
     read_message,
 )
+
+
+def test_the_first_page_decides_and_the_second_watches():
+    door = Admission()
+    role, key = door.role(door.token, "")
+    assert role == OPERATOR and len(key) >= 32
+    assert door.role(door.token, "") == (WATCHER, "")
+    assert door.role(door.token, "guess") == (WATCHER, "")
+    assert door.role(door.token, key) == (OPERATOR, key)  # the same page, loaded again
+
+
+def test_a_token_is_of_one_run_and_not_to_be_guessed():
+    door, other = Admission(), Admission()
+    assert door.knows(door.token) and not door.knows(other.token)
+    assert not door.knows("") and not door.knows(door.token[:-1]) and not door.knows("\udcff")
+    assert len(door.token) >= 32
+
+
+def test_a_new_address_decides_where_the_old_one_no_longer_does():
+    door = Admission()
+    old = door.token
+    assert door.renew() == old  # nobody has come yet
+    _, key = door.role(old, "")
+    new = door.renew()
+    assert new != old and door.renew() == new
+    assert door.role(old, "") == (WATCHER, "")
+    assert door.role(new, "")[0] == OPERATOR
+    assert door.role(old, key) == (WATCHER, "")  # who comes back late has lost its place
+    assert door.knows(old) and door.knows(new)
+
 
 ID = "0123456789abcdef"
 

@@ -1,4 +1,7 @@
-"""What the summary of a run says of tracks, alerts and manoeuvres, against the recorded tables."""
+"""Running summaries, against columns written by hand and against the recorded tables."""
+
+import json
+import math
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -6,11 +9,142 @@ import pymap3d
 import pytest
 
 import dsa_des
-from components.display.summary import ManoeuvreSummary, TrackSummary
+from components.display.summary import FusedSummary, ManoeuvreSummary, SensorSummary, TrackSummary
 from components.display.terminal import outcome_lines, unseen_lines
 from components.messages.state_tracks import STATUSES
 from dsa_des.block.message import Text
 from dsa_des.running.recorded_run import record_run
+
+NAMES = ("eo", "radar")
+TARGETS = ("a", "b", "c")
+
+
+def text(names, all_names):
+    codes = [-1 if name is None else all_names.index(name) for name in names]
+    return Text(np.array(codes, dtype=np.int32), all_names)
+
+
+def scans(rows):
+    """Columns from rows of (block, tick, evaluated, skipped_range)."""
+    return {
+        "block": text([row[0] for row in rows], NAMES),
+        "tick": np.array([row[1] for row in rows], dtype=np.int64),
+        "evaluated": np.array([row[2] for row in rows], dtype=np.int64),
+        "skipped_range": np.array([row[3] for row in rows], dtype=np.int64),
+    }
+
+
+def detections(rows):
+    """Columns from rows of (block, tick, target, true range); ten ticks are a second."""
+    tick = np.array([row[1] for row in rows], dtype=np.int64)
+    return {
+        "block": text([row[0] for row in rows], NAMES),
+        "tick": tick,
+        "time_s": tick / 10,
+        "target": text([row[2] for row in rows], TARGETS),
+        "true_range_m": np.array([row[3] for row in rows], dtype=np.float64),
+    }
+
+
+SEEN = [
+    ("eo", 10, "b", 500.0),
+    ("radar", 10, "a", 900.0),
+    ("radar", 10, "b", 500.0),
+    ("radar", 10, "c", 700.0),
+    ("radar", 20, "a", 800.0),
+    ("eo", 30, "c", 300.0),
+    ("eo", 30, "a", 700.0),
+    ("radar", 30, "a", 700.0),
+]
+
+
+def sensors_of(pieces, sensors=NAMES):
+    observer = SensorSummary(sensors)
+    for table, columns in pieces:
+        observer.update(table, columns)
+    return observer.result()["sensors"]
+
+
+def test_first_and_last_are_the_nearest_of_their_instant():
+    result = sensors_of([("detections", detections(SEEN))])
+    assert result["radar"]["detections"] == 5
+    assert result["radar"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
+    assert result["radar"]["last_detection"] == {"time_s": 3.0, "range_m": 700.0, "target": "a"}
+    assert result["eo"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
+    assert result["eo"]["last_detection"] == {"time_s": 3.0, "range_m": 300.0, "target": "c"}
+
+
+def test_scans_are_counted_with_what_was_skipped():
+    rows = [("eo", 0, 2, 1), ("radar", 0, 3, 0), ("eo", 5, 1, 2), ("eo", 10, 0, 3)]
+    result = sensors_of([("scans", scans(rows))])
+    assert (result["eo"]["scans"], result["eo"]["evaluated"]) == (3, 3)
+    assert (result["radar"]["scans"], result["radar"]["evaluated"]) == (1, 3)
+    assert result["eo"]["skipped"] == {
+        "absent": 0,
+        "off": 0,
+        "field_of_view": 0,
+        "range": 6,
+        "culled": 0,
+    }
+
+
+@pytest.mark.parametrize("cut", range(1, len(SEEN)))
+def test_the_same_however_the_rows_arrive(cut):
+    whole = sensors_of([("detections", detections(SEEN))])
+    parts = [("detections", detections(SEEN[:cut])), ("detections", detections(SEEN[cut:]))]
+    assert sensors_of(parts) == whole
+    row_by_row = [("detections", detections([row])) for row in SEEN]
+    assert sensors_of(row_by_row) == whole
+
+
+def test_a_sensor_that_saw_nothing_is_there():
+    result = sensors_of([], sensors=("radar", "ir"))
+    assert list(result) == ["ir", "radar"]
+    assert result["ir"] == {
+        "scans": 0,
+        "evaluated": 0,
+        "detections": 0,
+        "false_alarms": 0,
+        "skipped": {"absent": 0, "off": 0, "field_of_view": 0, "range": 0, "culled": 0},
+        "first_detection": None,
+        "last_detection": None,
+    }
+
+
+def test_an_unknown_range_is_null_and_never_the_nearest():
+    rows = [("radar", 10, "a", math.nan), ("radar", 10, "b", 900.0), ("radar", 20, "a", math.nan)]
+    for pieces in ([rows], [rows[:1], rows[1:]]):
+        result = sensors_of([("detections", detections(piece)) for piece in pieces])["radar"]
+        assert result["first_detection"]["target"] == "b"
+        assert result["last_detection"] == {"time_s": 2.0, "range_m": None, "target": "a"}
+
+
+def test_results_are_plain_json():
+    result = sensors_of([("detections", detections(SEEN)), ("scans", scans([("eo", 0, 2, 1)]))])
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_fused_rows_are_counted_by_combination():
+    names = ("radar", "radar+eo", "eo")
+    observer = FusedSummary()
+    assert observer.result() == {"fused": {}}
+    observer.update("fused", {"sensors": text(["radar", "radar+eo", "radar"], names)})
+    observer.update("fused", {"sensors": text(["eo", "radar", None], names)})
+    result = observer.result()["fused"]
+    assert result == {"eo": 1, "radar": 3, "radar+eo": 1}
+    assert list(result) == sorted(result)
+
+
+def test_sightings_at_the_first_and_the_last_scan_are_marked():
+    rows = [("radar", 10, 1, 0), ("radar", 20, 1, 0), ("radar", 30, 1, 0)]
+    early = [("eo", 5, 1, 0), ("eo", 30, 1, 0), ("eo", 40, 1, 0)]
+    pieces = [("scans", scans(rows)), ("scans", scans(early)), ("detections", detections(SEEN))]
+    found = sensors_of(pieces)
+    assert found["radar"]["first_detection"]["at"] == "the start"
+    assert found["radar"]["last_detection"]["at"] == "the end of the run"
+    assert "at" not in found["eo"]["first_detection"]
+    assert "at" not in found["eo"]["last_detection"]
+
 
 ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
