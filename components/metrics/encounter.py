@@ -41,12 +41,15 @@ _WELL_CLEAR, _NMAC = PRESETS["astm_f3442"], PRESETS["nmac"]
 
 #: Of metrics of losses; ``step_s`` of None looks between samples too.
 STEP: Any = Field(
-    default=None,
-    gt=0,
-    le=10,
+    default=None, gt=0, le=10,
     description="Take distances at this spacing only, s. By default entries are found between "
     "samples too, to 1 ms.",
-)
+)  # fmt: skip
+
+
+def size(default_m: float, description: str) -> Any:
+    """Return the field of a distance that counts as a loss, m."""
+    return Field(default=default_m, gt=0, le=1e6, description=description)
 
 
 class EncounterParameters(DeclarationParameters):
@@ -60,36 +63,22 @@ class EncounterParameters(DeclarationParameters):
 class SizeParameters(Parameters):
     """What counts as a loss of well clear, and as a near mid-air collision."""
 
-    horizontal_m: float = Field(
-        default=_WELL_CLEAR.horizontal_m,
-        gt=0,
-        le=1e6,
-        description="Horizontal distance below which well clear is lost, m.",
+    horizontal_m: float = size(
+        _WELL_CLEAR.horizontal_m, "Horizontal distance below which well clear is lost, m."
     )
-    vertical_m: float = Field(
-        default=_WELL_CLEAR.vertical_m,
-        gt=0,
-        le=1e6,
-        description="Difference in height below which well clear is lost, m.",
+    vertical_m: float = size(
+        _WELL_CLEAR.vertical_m, "Difference in height below which well clear is lost, m."
     )
     tau_s: float = Field(
-        default=0.0,
-        ge=0,
-        le=600,
+        default=0.0, ge=0, le=600,
         description="Modified tau below which well clear is lost too, s (DO-365: 35). 0: distances "
         "alone.",
+    )  # fmt: skip
+    nmac_horizontal_m: float = size(
+        _NMAC.horizontal_m, "Horizontal distance of a near mid-air collision, m."
     )
-    nmac_horizontal_m: float = Field(
-        default=_NMAC.horizontal_m,
-        gt=0,
-        le=1e6,
-        description="Horizontal distance of a near mid-air collision, m.",
-    )
-    nmac_vertical_m: float = Field(
-        default=_NMAC.vertical_m,
-        gt=0,
-        le=1e6,
-        description="Difference in height of a near mid-air collision, m.",
+    nmac_vertical_m: float = size(
+        _NMAC.vertical_m, "Difference in height of a near mid-air collision, m."
     )
 
     @property

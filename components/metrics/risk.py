@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.encounter import STEP, SizeParameters
+from components.metrics.encounter import STEP, SizeParameters, size
 from components.metrics.flown_flights import RecordedManoeuvres, each_alone, read_flights
 from components.metrics.rows import TargetMetric, TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
@@ -80,24 +80,14 @@ class Mitigated(Metric):
 class SeverityParameters(TargetParameters):
     """Sizes of the boundary, and whose altimeters are which."""
 
-    horizontal_m: float = Field(
-        default=4000 * FOOT_M, gt=0, le=1e6, description="Horizontal size of well clear, m."
-    )
-    vertical_m: float = Field(
-        default=450 * FOOT_M, gt=0, le=1e6, description="Vertical size of well clear, m."
-    )
+    horizontal_m: float = size(4000 * FOOT_M, "Horizontal size of well clear, m.")
+    vertical_m: float = size(450 * FOOT_M, "Vertical size of well clear, m.")
     tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
-    nmac_horizontal_m: float = Field(
-        default=500 * FOOT_M,
-        gt=0,
-        le=1e6,
-        description="Horizontal distance of a near mid-air collision, m.",
+    nmac_horizontal_m: float = size(
+        500 * FOOT_M, "Horizontal distance of a near mid-air collision, m."
     )
-    nmac_vertical_m: float = Field(
-        default=100 * FOOT_M,
-        gt=0,
-        le=1e6,
-        description="Difference in height of a near mid-air collision, m.",
+    nmac_vertical_m: float = size(
+        100 * FOOT_M, "Difference in height of a near mid-air collision, m."
     )
     mode_c_own: bool = Field(
         default=False,

@@ -18,9 +18,6 @@ from dsa_des.studies.metric import TRIALS, Group, Metric, recorded_by
 FUSED = "fused"
 #: Columns of the sensors' scans that `scan_time_s` needs.
 SCANS = {"scans": ("block", "time_s")}
-# Rows of a replica among which its scan is sought first.
-_FIRST_LOOK = 64
-_SIDES: Any = ("left", "right")
 
 
 class TargetParameters(Parameters):
@@ -142,26 +139,20 @@ def name_ranks(column: Any) -> IntArray:
 
 def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
     """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
-    return group.once(("scan_time_s", name, number), lambda: _scan_time_s(group, name, number))
-
-
-def _scan_time_s(group: Group, name: str, number: int) -> FloatArray:
-    columns: Any = group.tables["scans"]
-    start, end = (np.searchsorted(columns["replica"], np.arange(len(group)), s) for s in _SIDES)
+    time_s, start, end = group.once(("scans_of", name), lambda: _scans_of(group, name))
+    at = start + number - 1
     found = np.full(len(group), np.nan)
-    of_sensor = is_named(columns["block"], name)
-    left, width = np.flatnonzero(end > start), _FIRST_LOOK
-    while len(left):  # farther, where a replica has not so many scans among its first rows
-        rows = start[left, np.newaxis] + np.arange(width)
-        inside = rows < end[left, np.newaxis]
-        rows = np.where(inside, rows, 0)
-        mine = inside & of_sensor[rows]
-        there = mine & (np.cumsum(mine, axis=1) == number)
-        seen = there.any(axis=1)
-        found[left[seen]] = columns["time_s"][rows[there]]
-        left = left[~seen & inside[:, -1]]
-        width *= 8
+    found[at < end] = time_s[at[at < end]]
     return found
+
+
+def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the times of a sensor's scans, and where those of each replica start and end."""
+    columns: Any = group.tables["scans"]
+    rows = np.flatnonzero(is_named(columns["block"], name))
+    replica, numbers = columns["replica"][rows], np.arange(len(group))
+    ends = np.searchsorted(replica, numbers), np.searchsorted(replica, numbers, side="right")
+    return columns["time_s"][rows], *ends
 
 
 def at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:

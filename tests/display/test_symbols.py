@@ -133,38 +133,6 @@ def test_rows_by_target():
     assert by_target(np.empty(0, dtype=np.int64)) == []
 
 
-class PretendAxes:
-    def __init__(self):
-        self.places = []
-
-    def text(self, x, y, text, **kwargs):
-        self.places.append((x, y))
-
-
-def test_labels_of_one_place_do_not_share_it():
-    axes = PretendAxes()
-    labels = Labels(axes, (0.0, 500.0), (0.0, 500.0), 1.0, np.full((1, 2), np.nan))
-    for name in ("one", "two", "three", "four"):
-        labels.add(name, 250.0, 250.0)
-    boxes = labels._taken
-    for i, one in enumerate(boxes):
-        for other in boxes[i + 1 :]:
-            apart = (
-                one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
-            )
-            assert apart
-
-
-def test_labels_keep_off_tracks_and_inside_the_map():
-    axes = PretendAxes()
-    # A track that leaves the point to the right, where a label would go first.
-    track = np.column_stack((np.linspace(480.0, 500.0, 50), np.full(50, 250.0)))
-    labels = Labels(axes, (0.0, 500.0), (0.0, 500.0), 1.0, track)
-    labels.add("name", 480.0, 250.0)
-    left, _, right, _ = labels._taken[0]
-    assert 0.0 <= left < right <= 480.0
-
-
 KINDS = [marks.RADAR, marks.EO, marks.IR, marks.FUSION, marks.TRACKER]
 
 
