@@ -360,10 +360,10 @@ def _recorded_targets(simulation: "Simulation") -> Any:
     return lambda origin: TargetsInFrame(targets, origin)
 
 
-def distances(columns: Columns, rows: Any, place: FloatArray) -> FloatArray:
+def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
     """Return how far rows of tracks are from targets (targets, 3, rows) at the same times, m."""
     estimate = np.stack([columns[name][rows] for name in _PLACE])
-    return np.asarray(np.sqrt(((place - estimate) ** 2).sum(axis=1)))
+    return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
 
 
 def senders(simulation: "Simulation", message: type) -> list[str]:

@@ -74,8 +74,8 @@ def _sensor_rows(sensors: dict[str, Any]) -> list[tuple[str, ...]]:
             continue
         for which in ("first", "last"):
             seen = entry[f"{which}_detection"]
-            place = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
-            rows.append((*start, which + ("*" if seen.get("at") else ""), *place))
+            values = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
+            rows.append((*start, which + ("*" if seen.get("at") else ""), *values))
             start = ("", "", "")
     return rows
 
@@ -129,36 +129,36 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
 
 def outcome_lines(summary: dict[str, Any]) -> list[str]:
     """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do."""
-    lines = [f"{name}: {_tracks_text(told)}" for name, told in summary.get("tracks", {}).items()]
+    lines = [f"{name}: {_tracks_text(entry)}" for name, entry in summary.get("tracks", {}).items()]
     lines += [
-        f"{name}: {told['left_out']:,} of {told['looks']:,} looks of {sensor} "
-        f"({told['share']:.0%}) came too late and were left out"
+        f"{name}: {entry['left_out']:,} of {entry['looks']:,} looks of {sensor} "
+        f"({entry['share']:.0%}) came too late and were left out"
         for name, late in summary.get("late_looks", {}).items()
-        for sensor, told in late.items()
+        for sensor, entry in late.items()
     ]
     for name, first_s in summary.get("alerts", {}).items():
         times = ", ".join(f"level {level} from {when:.1f} s" for level, when in first_s.items())
         lines.append(f"{name}: {'alerts of ' + times if times else 'no alert'}")
-    for name, told in summary.get("manoeuvres", {}).items():
+    for name, entry in summary.get("manoeuvres", {}).items():
         text = "no manoeuvre"
-        if told["count"] == 1:
-            text = f"1 manoeuvre, at {told['first_s']:.1f} s"
-        elif told["count"]:
-            text = f"{told['count']:,} manoeuvres, from {told['first_s']:.1f} s to "
-            text += f"{told['last_s']:.1f} s"
+        if entry["count"] == 1:
+            text = f"1 manoeuvre, at {entry['first_s']:.1f} s"
+        elif entry["count"]:
+            text = f"{entry['count']:,} manoeuvres, from {entry['first_s']:.1f} s to "
+            text += f"{entry['last_s']:.1f} s"
         lines.append(f"{name}: {text}")
     return lines
 
 
-def _tracks_text(told: dict[str, Any]) -> str:
-    count = told["confirmed"]
+def _tracks_text(entry: dict[str, Any]) -> str:
+    count = entry["confirmed"]
     if not count:
         return "no confirmed track"
     text = f"{count:,} confirmed track{'s' if count > 1 else ''}"
-    if told.get("false") is not None:
-        text += f", {format(told['false'], ',') if told['false'] else 'none'} of them false"
-    if told.get("position_error_m") is not None:
-        text += f"; position error {distance_text(told['position_error_m'])} rms"
+    if entry.get("false") is not None:
+        text += f", {format(entry['false'], ',') if entry['false'] else 'none'} of them false"
+    if entry.get("position_error_m") is not None:
+        text += f"; position error {distance_text(entry['position_error_m'])} rms"
     return text
 
 

@@ -132,12 +132,12 @@ def _read(source: Path) -> dict[str, Any] | None:
 def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
     """Draw tracks with their 95 % ellipses on the plan and by height, and write the PNG."""
     grid = np.linspace(*drawn.time_s, _MOST_POINTS)
-    places, own = drawn.targets.at(grid), drawn.targets.place(drawn.own, grid)
+    positions, own = drawn.targets.at(grid), drawn.targets.position(drawn.own, grid)
     with drawing(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
         _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
-        for place in places:
-            _flight(plan, height, grid, place, drawn.origin[2], {"color": _TRUTH})
+        for position in positions:
+            _flight(plan, height, grid, position, drawn.origin[2], {"color": _TRUTH})
         for one in drawn.tracks:
             _draw_one(plan, height, one, drawn.origin[2])
         plan.set_aspect("equal", adjustable="datalim")
@@ -153,15 +153,15 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         _legend(figure, false > 0)
         tight(figure)
         figure.subplots_adjust(top=0.93)
-        _names(figure, plan, drawn, places, own)
+        _names(figure, plan, drawn, positions, own)
     return path
 
 
 def _flight(
-    plan: Any, height: Any, time_s: FloatArray, place: FloatArray, alt_m: float, style: Any
+    plan: Any, height: Any, time_s: FloatArray, ned_m: FloatArray, alt_m: float, style: Any
 ) -> None:
-    plan.plot(place[1] / 1e3, place[0] / 1e3, linewidth=0.7, zorder=1, **style)
-    height.plot(time_s, alt_m - place[2], linewidth=0.7, zorder=1, **style)
+    plan.plot(ned_m[1] / 1e3, ned_m[0] / 1e3, linewidth=0.7, zorder=1, **style)
+    height.plot(time_s, alt_m - ned_m[2], linewidth=0.7, zorder=1, **style)
 
 
 def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) -> None:
@@ -207,13 +207,15 @@ def _legend(figure: Any, false: bool) -> None:
     figure.legend(handles=entries, loc="upper center", ncols=len(entries), frameon=False)
 
 
-def _names(figure: Any, plan: Any, drawn: DrawnTracks, places: FloatArray, own: FloatArray) -> None:
+def _names(
+    figure: Any, plan: Any, drawn: DrawnTracks, positions: FloatArray, own: FloatArray
+) -> None:
     """Write names of aircraft at their ends and numbers of tracks at their beginnings."""
     plan.apply_aspect()
     x, y = plan.get_xlim(), plan.get_ylim()
     plan.set(xlim=x, ylim=y)
     per_px = (x[1] - x[0]) / plan.get_window_extent().width
-    lines = [place[[1, 0]].T / 1e3 for place in (*places, own)]
+    lines = [ned_m[[1, 0]].T / 1e3 for ned_m in (*positions, own)]
     lines += [
         np.column_stack([one.columns["east_m"], one.columns["north_m"]]) / 1e3
         for one in drawn.tracks
@@ -227,7 +229,7 @@ def _names(figure: Any, plan: Any, drawn: DrawnTracks, places: FloatArray, own: 
     if len(drawn.tracks) > _MOST_NAMED:
         return
     blocks = {one.block for one in drawn.tracks}
-    for one, line in zip(drawn.tracks, lines[len(places) + 1 :], strict=True):
+    for one, line in zip(drawn.tracks, lines[len(positions) + 1 :], strict=True):
         text = f"{one.number}" if len(blocks) == 1 else f"{figure_text(one.block)} {one.number}"
         labels.add(text, float(line[0][0]), float(line[0][1]), one.colour, "bold")
 

@@ -21,7 +21,7 @@ SCANS = {"scans": ("block", "time_s")}
 
 
 class TargetParameters(Parameters):
-    """What most metrics can be told."""
+    """Parameters of most metrics."""
 
     target: str | None = Field(
         default=None, description="Name of the target that counts; by default any of them."
@@ -37,7 +37,7 @@ class SensorMetricParameters(TargetParameters):
 
 
 class TargetMetric(Metric):
-    """A metric that can be told which target counts."""
+    """A metric of one target, or of any."""
 
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Refuse a target that the traffic does not have."""
@@ -96,18 +96,18 @@ def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
         return np.full(count, -1, dtype=np.int64)
     replica = table["replica"][rows]
     starts = np.flatnonzero(np.append(True, replica[1:] != replica[:-1]))
-    tick, place, found_at = table["tick"], starts, [starts]
-    while len(place := place[place + 1 < len(rows)]):  # those of the same instant follow
-        ahead = rows[place + 1]
-        same = (replica[place + 1] == replica[place]) & (tick[ahead] == tick[rows[place]])
-        place = place[same] + 1
-        found_at.append(place)
-    rows = rows[np.sort(np.concatenate(found_at))]
+    tick, index, together = table["tick"], starts, [starts]
+    while len(index := index[index + 1 < len(rows)]):  # those of the same instant follow
+        ahead = rows[index + 1]
+        same = (replica[index + 1] == replica[index]) & (tick[ahead] == tick[rows[index]])
+        index = index[same] + 1
+        together.append(index)
+    rows = rows[np.sort(np.concatenate(together))]
     ranges = table["true_range_m"][rows]
     order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
-    numbers, place = np.unique(table["replica"][rows][order], return_index=True)
+    numbers, first = np.unique(table["replica"][rows][order], return_index=True)
     found = np.full(count, -1, dtype=np.int64)
-    found[numbers] = rows[order][place]
+    found[numbers] = rows[order][first]
     return found
 
 

@@ -228,7 +228,7 @@ def mean_states(
 
     def apart(at_s: FloatArray) -> FloatArray:
         mine, theirs = map(position_of, flight.states(at_s))
-        own, other = (north_east_up(*origin, *place) for place in (mine, theirs))
+        own, other = (north_east_up(*origin, *position) for position in (mine, theirs))
         return np.stack([own[1] - other[1], own[0] - other[0], mine[2] - theirs[2]])
 
     now = apart(time_s)

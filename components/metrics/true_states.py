@@ -57,7 +57,7 @@ class TargetsInFrame:
         self._flights, self._origin = flights, np.array(origin)
         self.names = [flight.name for flight in flights]
 
-    def place(self, flight: Any, time_s: FloatArray) -> FloatArray:
+    def position(self, flight: Any, time_s: FloatArray) -> FloatArray:
         """Return where an aircraft is, (3, n), m."""
         origin = np.repeat(self._origin[:, np.newaxis], len(time_s), axis=1)
         position, there = position_in_frame(flight, time_s, origin)
@@ -65,7 +65,7 @@ class TargetsInFrame:
 
     def at(self, time_s: FloatArray) -> FloatArray:
         """Return where the targets are, (targets, 3, n), m."""
-        found = [self.place(flight, time_s) for flight in self._flights]
+        found = [self.position(flight, time_s) for flight in self._flights]
         return np.array(found).reshape(len(found), 3, len(time_s))
 
     def states(self, time_s: FloatArray) -> FloatArray:

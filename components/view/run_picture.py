@@ -266,14 +266,14 @@ def _truth(
     code = _codes(truth["target"], targets)
     keep = np.flatnonzero((code >= 0) & np.isfinite(truth["lat_deg"]))
     keep = keep[np.lexsort((truth["time_s"][keep], code[keep]))]
-    place = [truth[name][keep] for name in ("lat_deg", "lon_deg", "alt_m")]
-    east, north = plane.east_north_m(*place)
+    position = [truth[name][keep] for name in ("lat_deg", "lon_deg", "alt_m")]
+    east, north = plane.east_north_m(*position)
     return {
         "time_s": truth["time_s"][keep],
         "target": code[keep],
         "east_m": east,
         "north_m": north,
-        "alt_m": place[2],
+        "alt_m": position[2],
     }
 
 
@@ -313,11 +313,11 @@ def _estimates(
 
 def _pose_at(own: Mapping[str, FloatArray], time_s: FloatArray) -> dict[str, FloatArray]:
     """Return the ownship's latest pose at some times, NaN before the first."""
-    place = np.searchsorted(own["time_s"], time_s, side="right") - 1
+    row = np.searchsorted(own["time_s"], time_s, side="right") - 1
     found = {}
     for name in _OWN:
         values = np.append(own[name], np.nan)
-        found[name] = values[place]
+        found[name] = values[row]
     return found
 
 
