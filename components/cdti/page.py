@@ -120,30 +120,29 @@ class Chosen(_FromPage):
     target: int = Field(ge=-1, le=10**7)
 
 
-class Judged(_FromPage):
-    """An alert is on screen, was looked at, or was judged."""
-
+class _Decided(_FromPage):
     type: Literal["decide"]
     id: str = Field(pattern=r"^[0-9a-f]{8,40}$")
+
+
+class Judged(_Decided):
+    """An alert is on screen, was looked at, or was judged."""
+
     decision: Literal["shown", "looked", "verified", "rejected"]
     target: int = Field(ge=0, le=10**7)
 
 
-class Turned(_FromPage):
+class Turned(_Decided):
     """The ownship is told to turn, deg to the right."""
 
-    type: Literal["decide"]
-    id: str = Field(pattern=r"^[0-9a-f]{8,40}$")
     decision: Literal["turn"]
     target: int = Field(ge=-1, le=10**7)
     value: float = Field(ge=-_MOST_DEG, le=_MOST_DEG, allow_inf_nan=False)
 
 
-class Climbed(_FromPage):
+class Climbed(_Decided):
     """The ownship is told to climb, m upward."""
 
-    type: Literal["decide"]
-    id: str = Field(pattern=r"^[0-9a-f]{8,40}$")
     decision: Literal["climb"]
     target: int = Field(ge=-1, le=10**7)
     value: float = Field(ge=-_MOST_M, le=_MOST_M, allow_inf_nan=False)

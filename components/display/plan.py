@@ -15,7 +15,7 @@ from components.display.map_view import (
     reach_text,
 )
 from components.display.recorded_rows import Detected
-from components.display.symbols import Labels, evenly, mark_of, staggered
+from components.display.symbols import Labels, draw_marks, in_turns, mark_of
 from components.display.terminal import distance_text
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
@@ -34,8 +34,6 @@ _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
 _OWN = "#000000"
 _TARGET = "#777777"
 
-_SPACING_PX = 9.0  # between marks of different sensors on one track
-_MOST_MARKS = 5000
 #: Least span of altitudes that is shown, m: level flights are level lines.
 _LEAST_SPAN_M = 40.0
 
@@ -157,21 +155,11 @@ def _draw_marks(
     """Mark a sensor's detections, as far as they can be told apart, and return how many."""
     if not paths:
         return 0
-    sensors = list(styles)
-    kept_east, kept_north = [], []
+    points = []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
-        keep = staggered(along_px, _SPACING_PX * len(sensors), sensors.index(name) / len(sensors))
-        kept_east.append(east[keep])
-        kept_north.append(north[keep])
-    east, north = np.concatenate(kept_east), np.concatenate(kept_north)
-    few = evenly(len(east), _MOST_MARKS)
-    style = styles[name]
-    axes.plot(
-        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
-        scalex=False, scaley=False,
-    )  # fmt: skip
-    return len(few)
+        points.append(np.column_stack((east, north))[in_turns(along_px, styles, name)])
+    return draw_marks(axes, styles[name], np.concatenate(points))
 
 
 def _draw_altitudes(
@@ -193,17 +181,13 @@ def _draw_altitudes(
             linewidths=[0.6 if many else 1.0] * (len(tracks) - 1) + [2.0], zorder=1.0,
         ), autolim=False,
     )  # fmt: skip
-    names = list(styles)
-    for number, (name, style) in enumerate(styles.items()):
+    for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
-            phase = number / len(names)
-            kept = time_s[staggered(time_s * px_per_s, _SPACING_PX * len(names), phase)]
+            kept = time_s[in_turns(time_s * px_per_s, styles, name)]
             points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
         if points:
-            where = np.concatenate(points)
-            where = where[evenly(len(where), _MOST_MARKS)]
-            axes.plot(where[:, 0], where[:, 1], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt)
+            draw_marks(axes, style, np.concatenate(points))
     every = np.concatenate([track.alt_m for track in tracks])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)

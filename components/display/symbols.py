@@ -15,6 +15,8 @@ _LINE_PX = FONT_SIZE * 1.9
 _LETTER_PX = FONT_SIZE * 0.95
 _GAP_PX = 8.0
 _CELL_PX = 6.0
+# Between marks of different sensors on one path, and how many are drawn of one sensor.
+_SPACING_PX, _MOST_MARKS = 9.0, 5000
 
 #: How far the second and the third of a kind are from its colour towards white, or black if minus;
 #: of a light colour the other way round.
@@ -95,6 +97,24 @@ def evenly(count: int, most: int) -> IntArray:
     if count <= most:
         return np.arange(count)
     return np.linspace(0, count - 1, most).astype(np.int64)
+
+
+def in_turns(
+    along_px: FloatArray, styles: Mapping[str, Mark], name: str, shift: float = 0.0
+) -> IntArray:
+    """Return the indices of the marks of a sensor whose turn it is among all on a path."""
+    phase = list(styles).index(name) / len(styles) + shift
+    return staggered(along_px, _SPACING_PX * len(styles), phase)
+
+
+def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
+    """Mark a sensor's detections (n, 2) on axes of given limits, and return how many."""
+    few = points[evenly(len(points), _MOST_MARKS)]
+    axes.plot(
+        few[:, 0], few[:, 1], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
+        scalex=False, scaley=False,
+    )  # fmt: skip
+    return len(few)
 
 
 def by_target(target: IntArray) -> list[tuple[int, IntArray]]:

@@ -17,7 +17,7 @@ from components.display.recorded_rows import (
     read_scans,
     scans_between,
 )
-from components.display.symbols import by_target, evenly, mark_of, staggered
+from components.display.symbols import by_target, draw_marks, in_turns, mark_of
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
@@ -30,7 +30,6 @@ MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
 _LEFT, _WIDTH = 0.105, 0.87
-_SPACING_PX = 9.0
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 
@@ -217,9 +216,9 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     top_km = max(1.05 * top_km, 0.1)
     width_px = _SIZE_IN[0] * _WIDTH * DPI
     for name in detected.sensors:
-        style = detected.styles[name]
-        _draw_detections(axes, style, detected, name, width_px / duration_s)
-        handles.append(Line2D([], [], **mark_of(style), label=figure_text(name, 16)))
+        _draw_detections(axes, detected, name, width_px / duration_s)
+        label = figure_text(name, 16)
+        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=label))
     axes.set_ylim(0.0, top_km)
     axes.set_ylabel("true slant range [km]")
     axes.grid(color="#DDDDDD", linewidth=0.5)
@@ -231,26 +230,14 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     )  # fmt: skip
 
 
-def _draw_detections(
-    axes: Any,
-    style: Mark,
-    detected: Detected,
-    name: str,
-    px_per_s: float,
-) -> None:
-    spacing_px = _SPACING_PX * len(detected.sensors)
-    phase = detected.sensors.index(name) / len(detected.sensors)
-    time_s, range_km = detected.time_s[name], detected.range_m[name] / 1000
+def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) -> None:
+    points = np.column_stack((detected.time_s[name], detected.range_m[name] / 1000))
     kept = [
-        rows[staggered(time_s[rows] * px_per_s, spacing_px, phase + _GOLDEN * target)]
+        rows[in_turns(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
         for target, rows in by_target(detected.target[name])
     ]
     if kept:
-        rows = np.concatenate(kept)
-        rows = rows[evenly(len(rows), 5000)]
-        axes.plot(
-            time_s[rows], range_km[rows], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
-        )  # fmt: skip
+        draw_marks(axes, detected.styles[name], points[np.concatenate(kept)])
 
 
 def _time_axis(axes: Any, start_s: float, end_s: float) -> None:
