@@ -31,8 +31,8 @@ MOST_NAMED = 8
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
 # The panel of altitudes below it, and what is between the two.
 _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
-_OWN = "#000000"
-_TARGET = "#777777"
+_OWN, _TARGET = "#000000", "#777777"
+_MANY = 20
 
 #: Least span of altitudes that is shown, m: level flights are level lines.
 _LEAST_SPAN_M = 40.0
@@ -102,29 +102,35 @@ def draw_plan(
     return path
 
 
+def _draw_lines(axes: Any, lines: list[FloatArray]) -> None:
+    """Draw lines of targets, and last that of the ownship."""
+    from matplotlib.collections import LineCollection
+
+    targets = len(lines) - 1
+    widths = [0.6 if targets >= _MANY else 1.0] * targets + [2.0]
+    colours = [_TARGET] * targets + [_OWN]
+    axes.add_collection(
+        LineCollection(lines, colors=colours, linewidths=widths, zorder=1.0), autolim=False
+    )
+
+
 def _draw_tracks(axes: Any, view: MapView, flights: Flights) -> None:
     from matplotlib.collections import LineCollection
 
     tracks = [*flights.targets, flights.own]
-    many = len(tracks) > 20
-    widths = [0.6 if many else 1.0] * (len(tracks) - 1) + [2.0]
-    colours = [_TARGET] * (len(tracks) - 1) + [_OWN]
+    many = len(flights.targets) >= _MANY
     lines = [np.column_stack((track.east_km, track.north_km)) for track in tracks]
+    _draw_lines(axes, lines)
     # Drawn with their gaps; ends are sought without them.
     known = [line[np.isfinite(line).all(axis=1)] for line in lines]
     starts = np.array([line[0] for line in known if len(line)])
+    arrows = [_arrow_head(line, (5.0 if many else 8.0) * view.km_per_px) for line in known]
+    colours = [_TARGET] * len(flights.targets) + [_OWN]
+    shown = [(arrow, c) for arrow, c in zip(arrows, colours, strict=True) if arrow is not None]
     axes.add_collection(
-        LineCollection(lines, colors=colours, linewidths=widths, zorder=1.0), autolim=False
-    )
-    arrows, arrow_colours = [], []
-    for line, colour in zip(known, colours, strict=True):
-        arrow = _arrow_head(line, (5.0 if many else 8.0) * view.km_per_px)
-        if arrow is not None:
-            arrows.append(arrow)
-            arrow_colours.append(colour)
-    axes.add_collection(
-        LineCollection(arrows, colors=arrow_colours, linewidths=1.5, zorder=1.1), autolim=False
-    )
+        LineCollection([arrow for arrow, _ in shown], colors=[colour for _, colour in shown],
+                       linewidths=1.5, zorder=1.1), autolim=False,
+    )  # fmt: skip
     if len(starts):
         axes.plot(
             starts[:, 0], starts[:, 1], linestyle="none", marker="o", markersize=3 if many else 5,
@@ -170,17 +176,8 @@ def _draw_altitudes(
     px_per_s: float,
 ) -> None:
     """Draw altitude above the ellipsoid over time, and where each sensor detected what."""
-    from matplotlib.collections import LineCollection
-
     tracks = [*flights.targets, flights.own]
-    many = len(tracks) > 20
-    lines = [np.column_stack((track.time_s, track.alt_m)) for track in tracks]
-    axes.add_collection(
-        LineCollection(
-            lines, colors=[_TARGET] * (len(tracks) - 1) + [_OWN],
-            linewidths=[0.6 if many else 1.0] * (len(tracks) - 1) + [2.0], zorder=1.0,
-        ), autolim=False,
-    )  # fmt: skip
+    _draw_lines(axes, [np.column_stack((track.time_s, track.alt_m)) for track in tracks])
     for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
