@@ -101,7 +101,8 @@ def tracks_of(**changes):
     none, some = np.zeros(3), np.ones(3, dtype=int)
     columns = {
         "replica": 0 * some, "tracker": np.arange(3), "number": some, "system": 7 * some,
-        "status": some, "existence": np.ones(3), "ranged": np.ones(3, dtype=bool), "state": np.zeros((6, 3)),
+        "status": some, "existence": np.ones(3), "ranged": np.ones(3, dtype=bool),
+        "state": np.zeros((6, 3)),
         "covariance": np.eye(6)[..., None] * np.array([4.0, 9.0, 9.0]), "azimuth_rad": none,
         "elevation_rad": none, "azimuth_variance_rad2": none, "elevation_variance_rad2": none,
         "own_m": np.zeros((3, 3)), "turn": np.eye(3)[..., None] * np.ones(3), "time_s": none,
