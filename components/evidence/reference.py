@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from components.traffic.columns import csv_columns, daa_columns
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find

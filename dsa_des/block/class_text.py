@@ -2,21 +2,10 @@
 
 import importlib
 import sys
-from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from dsa_des.block.component import SourcedText
-
-#: The group of block types.
-COMPONENTS = "dsa_des.components"
-
-
-@lru_cache(maxsize=16)
-def registered(group: str = COMPONENTS) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name, sorted."""
-    found = {point.name: point for point in entry_points(group=group)}
-    return dict(sorted(found.items()))
+from dsa_des.block.entry_points import registered
 
 
 class ClassText(str):

@@ -5,8 +5,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import ClassText, registered
+from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
+from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import (
     NotAllowed,
     NotImportable,

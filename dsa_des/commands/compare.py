@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
     check_workers,

@@ -7,8 +7,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from dsa_des.block.class_text import registered
 from dsa_des.block.component import Component
+from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.commands.parameter_rows import parameter_rows

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find

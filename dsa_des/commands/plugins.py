@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.commands.plain_errors import plain_output
 from dsa_des.errors import UsageError
 from dsa_des.terminal.interruption import plain_ending

@@ -309,7 +309,7 @@ def _progress(study: Study) -> Iterator[Any]:
 def _list_metrics() -> None:
     from rich.table import Table
 
-    from dsa_des.block.class_text import registered
+    from dsa_des.block.entry_points import registered
     from dsa_des.commands.parameter_rows import parameter_rows
     from dsa_des.studies.metric import METRICS, find_metric
 

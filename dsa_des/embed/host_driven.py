@@ -17,7 +17,7 @@ import numpy as np
 from networkx import ancestors
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.message import Message

@@ -79,7 +79,10 @@ class Run:
     def __getitem__(self, table: str) -> "pa.Table":
         if table not in self.tables:
             raise KeyError(f"the run has no table {table!r}; it has {', '.join(self.tables)}")
-        return with_columns_of_rows(self.tables, table)
+        joined: dict[str, Any] = self.__dict__.setdefault("_joined", {})
+        if table not in joined:
+            joined[table] = with_columns_of_rows(self.tables, table)
+        return joined[table]
 
     def __getattr__(self, table: str) -> "pa.Table":
         if table.startswith("__") or table not in self.__dict__.get("tables", {}):

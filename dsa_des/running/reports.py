@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.record.sinks import Observer, attempt
 

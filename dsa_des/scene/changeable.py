@@ -8,8 +8,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
 
-from dsa_des.block.class_text import COMPONENTS, sourced, type_text
+from dsa_des.block.class_text import sourced, type_text
 from dsa_des.block.component import Component, as_written
+from dsa_des.block.entry_points import COMPONENTS
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.scene.overrides import set_value, swap_type
 from dsa_des.scene.scene_file import SceneFile

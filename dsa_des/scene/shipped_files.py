@@ -7,7 +7,7 @@ the folder of its scenes and studies.
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.errors import UsageError

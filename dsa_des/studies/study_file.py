@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from dsa_des.block.class_text import registered
 from dsa_des.block.component import SourcedText
+from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS

@@ -1,47 +1,17 @@
-"""A console of Rich on which text is text: no markup, no control characters, no emoji codes."""
+"""The one place that prints: everything shown goes through here and is printable.
+
+No other file prints, echoes, makes a console or writes to the standard streams; a test sees to
+that. Rich is imported only when it is asked for.
+"""
 
 import os
 import sys
-from collections.abc import Iterable
 from typing import Any
 
 import click
-from rich.console import Console, ConsoleOptions, RenderableType
-from rich.segment import Segment
-from rich.text import Text
 
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable
-
-
-class SafeConsole(Console):
-    """Prints every ``str`` as it is, on one line and with its control characters escaped.
-
-    Text of several lines is given as `rich.text.Text`, whose line feeds stay; all else that is
-    not printable is escaped in it as well. Parameters are those of `rich.console.Console`.
-    """
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options, markup=False, emoji=False)
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Return a ``str`` as text to be printed as it is; see `rich.console.Console`."""
-        options |= {"markup": False, "emoji": False}
-        return super().render_str(printable(text), **options)
-
-    def render(
-        self, renderable: RenderableType, options: ConsoleOptions | None = None
-    ) -> Iterable[Segment]:
-        """Render as Rich does; whatever text comes of it is printable."""
-        encoding = self.encoding or "utf-8"
-        for segment in super().render(renderable, options):
-            text = segment.text
-            if segment.control or (text.isascii() and text.isprintable()):
-                yield segment
-                continue
-            # A stream may know fewer letters than Unicode has.
-            known = printable(text, lines=True).encode(encoding, "backslashreplace")
-            yield Segment(known.decode(encoding), segment.style)
 
 
 def say(line: object = "", *, err: bool = False) -> None:
@@ -84,7 +54,7 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     err : bool
         On standard error.
     """
-    from dsa_des.terminal.terminal import SafeConsole
+    from dsa_des.terminal.safe_console import SafeConsole
 
     found = SafeConsole(stderr=err)
     known = width is None or found.is_terminal or os.environ.get("COLUMNS", "").isdecimal()

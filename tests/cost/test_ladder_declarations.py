@@ -3,7 +3,7 @@
 import pytest
 from click.testing import CliRunner
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.registry import find
 from dsa_des.cli import main

@@ -6,9 +6,9 @@ from click.testing import CliRunner
 from engine_blocks import Relay
 
 from components.radar.threshold_radar import ThresholdRadar
-from dsa_des.block.class_text import registered
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.errors import SceneError

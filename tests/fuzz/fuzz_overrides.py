@@ -7,7 +7,7 @@ import fuzz_values
 from fuzz_cases import Case
 from fuzz_scenes import base_scene, command, set_parameter
 
-from dsa_des.block.class_text import registered
+from dsa_des.block.entry_points import registered
 from dsa_des.files.toml_files import to_toml
 
 KEYS = (

@@ -12,8 +12,8 @@ from typing import Any
 import fuzz_values
 from fuzz_cases import Case
 
-from dsa_des.block.class_text import registered
 from dsa_des.block.component import Parameters
+from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
