@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from components.evidence.benchmark.other_trackers import (
+from components.benchmark.other_trackers import (
     _looks,
     _started,
     by_stone_soup,
     plain_looks,
     plainly,
 )
-from components.evidence.benchmark.plain_tracker import track_plainly
-from components.evidence.benchmark.track_updates import LOOKS, heard
+from components.benchmark.plain_tracker import track_plainly
+from components.benchmark.track_updates import LOOKS, heard
 from components.messages.columns import COVARIANCE
 
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from components.evidence.benchmark.pairs import PAIRS, measured
-from components.evidence.benchmark.rates import RATES
-from components.evidence.benchmark.rates import measured as measured_rate
+from components.benchmark.pairs import PAIRS, measured
+from components.benchmark.rates import RATES
+from components.benchmark.rates import measured as measured_rate
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from components.evidence.thesis import flight_tests, project_files, scene_run
-from components.evidence.thesis.project_files import configs
+from components.thesis import flight_tests, project_files, scene_run
+from components.thesis.project_files import configs
 from dsa_des.scene.scene import load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 
@@ -47,7 +47,7 @@ def change(monkeypatch: Any, inputs: tuple[str, ...]) -> None:
         if "." in file:
             keys.setdefault(file, []).append(key)
         else:
-            module = __import__(f"components.evidence.thesis.{file}", fromlist=["_"])
+            module = __import__(f"components.thesis.{file}", fromlist=["_"])
             monkeypatch.setattr(module, key, changed(getattr(module, key)))
 
     def apply(path: Path, scene_file: SceneFile) -> None:

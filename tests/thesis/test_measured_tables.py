@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from components.aircraft.silhouette_table import read_aspect_table
-from components.evidence.silhouettes.comparison import AXES, compare_silhouettes
-from components.evidence.thesis.measured_tables import ERRORS, MEASURED_ON, TABLES
-from components.evidence.thesis.project_files import aircraft
 from components.optical.silhouette import visible_area
+from components.thesis.measured_tables import ERRORS, MEASURED_ON, TABLES
+from components.thesis.project_files import aircraft
+from components.thesis.silhouette_comparison import AXES, compare_silhouettes
 
 SHARED = Path(os.environ.get("DSA_DES_SHARED", Path(__file__).parents[3] / "shared"))
 FOLDER = SHARED / "data" / "projected_area"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from components.evidence.thesis import eo_ranges
-from components.evidence.thesis.row import Row
+from components.thesis import eo_ranges
+from components.thesis.row import Row
 
 
 def half_a_digit(row: Row) -> float:

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.evidence.thesis.basis import predicted
-from components.evidence.thesis.document import line, short
-from components.evidence.thesis.made import Made
-from components.evidence.thesis.registry import ITEMS, Item, chosen
-from components.evidence.thesis.row import Row
+from components.thesis.basis import predicted
+from components.thesis.document import line, short
+from components.thesis.made import Made
+from components.thesis.registry import ITEMS, Item, chosen
+from components.thesis.row import Row
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from dsa_des.scene.scene import load_scene
@@ -151,7 +151,7 @@ def test_page_holds_every_row_with_its_verdict(results):
 
 def test_help_does_not_import_the_simulator():
     code = (
-        "import sys; from components.evidence.thesis.command import reproduce; "
+        "import sys; from components.thesis.command import reproduce; "
         "print([m for m in ('numpy', 'scipy', 'matplotlib', 'simpy') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from components.evidence.thesis import printed as printed_numbers
-from components.evidence.thesis import registry
-from components.evidence.thesis.basis import calibrated, configured, predicted
-from components.evidence.thesis.project_files import configs, read_csv
-from components.evidence.thesis.row import VERDICTS, Row
-from components.evidence.thesis.tally import tally
+from components.thesis import printed as printed_numbers
+from components.thesis import registry
+from components.thesis.basis import calibrated, configured, predicted
+from components.thesis.project_files import configs, read_csv
+from components.thesis.row import VERDICTS, Row
+from components.thesis.tally import tally
 from dsa_des.scene.scene_file import read_scene_file
 from tests.thesis.changed_inputs import FACTOR, change, changed, found, rewrite
 
@@ -140,7 +140,7 @@ def test_every_input_exists(results) -> None:
             elif file.endswith(".toml"):
                 found(read_scene_file(configs() / file).data, key)
             else:
-                module = importlib.import_module(f"components.evidence.thesis.{file}")
+                module = importlib.import_module(f"components.thesis.{file}")
                 assert hasattr(module, key), (item, name)
 
 
@@ -246,7 +246,7 @@ def test_calibrated_and_configured_numbers_move_with_their_inputs(
 
 def test_what_is_set_from_several_numbers_at_once_says_so() -> None:
     """No parameter file holds the four cells of Table 4.4; three constants were set from them."""
-    from components.evidence.thesis import eo_ranges
+    from components.thesis import eo_ranges
 
     beech = tomllib.loads((configs() / "aircraft/beech_99.toml").read_text(encoding="utf-8"))
     assert (beech["contrast"], beech["eo"]["front_m2"], eo_ranges.CLIMB_DEG) == (1.0, 12.0, 1.4)

@@ -1,0 +1,142 @@
+"""Time two forms of one scene in turn: what something costs that ought to cost little.
+
+``python -m components.benchmark.pairs PAIR ...`` prints one JSON object; the command
+starts it anew for every pair.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from statistics import median
+from typing import Any
+
+from components.benchmark.cases import CLOCKED, chosen, scene_of
+from components.benchmark.measure import engine_run, pin
+from components.examples import folder
+from dsa_des.record.recording import MemorySink
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.terminal.terminal import say_json
+
+#: A processor that the three sensors of a scene share, and that is busy a third of the time.
+_SHARED = (
+    "processors.shared.service_s=0.01",
+    *(f"blocks.{name}.processor=shared" for name in CLOCKED),
+)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two forms of one benchmark scene.
+
+    Parameters
+    ----------
+    name, what : str
+    wanted : float
+        At most so many times the CPU time of the plain form.
+    case : str
+        The benchmark scene.
+    forms : callable
+        From the case's overrides to the form in question and the plain one.
+    """
+
+    name: str
+    what: str
+    wanted: float
+    case: str
+    forms: Callable[[str, bool], tuple[Scene, Scene]]
+
+
+def without_unused_effects(scene: Scene) -> Scene:
+    """Return a scene whose blocks declare no effects but those that it calls for."""
+    used: dict[str, set[str]] = {}
+    for item in Simulation(scene).plan:
+        if item.built:
+            used.setdefault(item.block, set()).add(item.effect.name)
+    blocks = dict(scene.blocks)
+    for name, block in blocks.items():
+        kept = tuple(e for e in block.cls.effects if e.name in used.get(name, ()))
+        cls: Any = type(block.cls.__name__, (block.cls,), {})
+        cls.effects = kept  # afterwards: what makes a class of sensors adds its own
+        blocks[name] = replace(block, cls=cls)
+    return replace(scene, blocks=blocks)
+
+
+def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
+    scene = scene_of(chosen([case])[0], quick=quick)
+    return scene, without_unused_effects(scene)
+
+
+def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
+    (found,) = chosen([case])
+    return scene_of(found, quick=quick, sets=_SHARED), scene_of(found, quick=quick)
+
+
+def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
+    duration_s = "40" if quick else None
+    with_it, plain = folder() / "alerting" / f"{case}.toml", folder() / f"{case}.toml"
+    return load_scene(with_it, duration_s=duration_s), load_scene(plain, duration_s=duration_s)
+
+
+PAIRS = (
+    Pair(
+        "unused_effects",
+        "effects that the scene does not call for: declared, or not there at all",
+        1.03,
+        "hundred",
+        _effects,
+    ),
+    Pair(
+        "shared_processor",
+        "three sensors queue for one processor, or do not",
+        5.0,
+        "clocks",
+        _processor,
+    ),
+    Pair(
+        "alerting",
+        "first light with alert levels of its tracks at 1 Hz, or without",
+        2.0,
+        "first_light",
+        _alerting,
+    ),
+)
+
+
+def measured(pair: Pair, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return by how much the CPU time of building and running grows; medians of pairs in turn."""
+    forms = pair.forms(pair.case, quick)
+    for scene in forms:
+        engine_run(scene, [], MemorySink())
+    ratios, times = [], []
+    for number in range(4 * repeats):
+        order = forms if number % 2 else forms[::-1]
+        spent = {id(scene): sum(engine_run(scene, [], MemorySink())[:2]) for scene in order}
+        ratios.append(spent[id(forms[0])] / spent[id(forms[1])])
+        times.append(spent[id(forms[0])])
+    simulated_s = float(Simulation(forms[0]).duration_s)
+    return {
+        "scene": pair.name,
+        "times": median(ratios),
+        "times_quartiles": [sorted(ratios)[repeats], sorted(ratios)[3 * repeats]],
+        "wanted": pair.wanted,
+        "simulated_s_per_s": simulated_s / median(times),
+    }
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure one pair and print what was found."""
+    parser = argparse.ArgumentParser(prog="python -m components.benchmark.pairs")
+    parser.add_argument("pair", choices=[pair.name for pair in PAIRS])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--repeats", type=int, default=5)
+    options = parser.parse_args(arguments)
+    pin()
+    (pair,) = (pair for pair in PAIRS if pair.name == options.pair)
+    say_json(measured(pair, options.quick, options.repeats))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

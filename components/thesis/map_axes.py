@@ -1,0 +1,78 @@
+"""Scenes from above, as the thesis draws them: a star, lines, and circles where sensors detect."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from components.display.fields_of_view import outline_of
+from components.display.styles import styles_of
+from components.thesis.plotting import GREY, RADAR
+from components.thesis.scene_run import SceneRun
+from dsa_des.arrays.types import AnyArray, FloatArray
+
+
+def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) -> None:
+    """Draw the flights, the ownship's place and sensors' fields of view.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    run : SceneRun
+    fields_of_view : tuple of str
+        Names of sensors.
+    """
+    from matplotlib.patches import Polygon
+
+    flights = run.flights
+    styles = styles_of(fields_of_view, run.simulation.components)
+    for name in fields_of_view:
+        sensor: Any = run.simulation.components[name]
+        colour = styles[name].colour
+        outline = outline_of(flights.start_yaw_rad, sensor.stated_reach, sensor.axes)
+        if outline.closed:
+            shape: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15}
+            axes.add_patch(
+                Polygon(
+                    outline.corners_km,
+                    **shape,
+                    zorder=0.5,
+                    label="field of view" + (f" of {name}" if len(fields_of_view) > 1 else ""),
+                )
+            )
+    for number, track in enumerate(flights.targets):
+        label = "intruder" if number == 0 else None
+        axes.plot(track.east_km, track.north_km, color=GREY, linewidth=1.0, label=label)
+    axes.plot([0.0], [0.0], "*", color="#000000", markersize=11, label="ownship", zorder=3)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlabel("east [km]")
+    axes.set_ylabel("north [km]")
+
+
+def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> None:
+    """Mark where targets were when they were detected: the rows of a recorded table."""
+    east, north = true_places(run, rows)
+    defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
+                "color": RADAR, "zorder": 2}  # fmt: skip
+    axes.plot(east, north, **{**defaults, **style})
+
+
+def true_places(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+    """Return east and north in km of each row's target at its time."""
+    east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
+    for name in np.unique(rows["target"].astype(str)):
+        here = np.flatnonzero(rows["target"] == name)
+        east[here], north[here] = run.flights.at(str(name), rows["time_s"][here])
+    return east, north
+
+
+def reported_places(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+    """Return east and north in km of what a sensor reports, from a level ownship heading north."""
+    ground_km = rows["range_m"] / 1000.0 * np.cos(rows["elevation_rad"])
+    return ground_km * np.sin(rows["azimuth_rad"]), ground_km * np.cos(rows["azimuth_rad"])
+
+
+def ray(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
+    """Return the ends of a line from the ownship's place, east and north."""
+    angle = math.radians(azimuth_deg)
+    return [0.0, length_km * math.sin(angle)], [0.0, length_km * math.cos(angle)]
