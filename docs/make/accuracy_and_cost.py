@@ -41,15 +41,7 @@ _HEAD = """1. **Geometry**: take the exact ellipsoid. Flat Earth saves {flat_sav
 
 
 def head_lines(costs: Sequence[Any], cut_off: str) -> str:
-    """Return the four sentences.
-
-    Parameters
-    ----------
-    costs : list of RungCost
-        Of all ladders of one scene.
-    cut_off : str
-        What cuts off the radar's first detection there, as `radar_sees_from` says it.
-    """
+    """Return the four sentences."""
     of = {(cost.block, cost.rung): cost for cost in costs}
 
     def us(block: str, rung: str) -> float:
@@ -117,16 +109,7 @@ def radar_sees_from(scene: Scene) -> str:
 
 
 def cut_off(time_s: float, range_m: float, scans_s: Any, reach_m: float) -> str:
-    """Return the end of the sentence for a first detection at a time and a range.
-
-    Parameters
-    ----------
-    time_s, range_m : float
-    scans_s : array
-        Times of the radar's scans.
-    reach_m : float
-        How far the radar looks.
-    """
+    """Return the end of the sentence for a first detection at a time and a range."""
     if time_s <= scans_s[1]:
         return f", at least: the exact radar sees it where the scene begins, at {range_m / 1000:.1f} km"
     if range_m > 0.97 * reach_m:
@@ -147,13 +130,7 @@ _RANGES_M = np.geomspace(100.0, 200e3, 1200)
 
 
 def error_map_section(images: Path) -> str:
-    """Draw the map of errors in direction and return the Markdown around it.
-
-    Parameters
-    ----------
-    images : Path
-        Folder that receives the figure.
-    """
+    """Draw the map of errors in direction and return the Markdown around it."""
     with tempfile.TemporaryDirectory() as folder:
         drawn = {path.name: path for path in draw_error_map(Path(folder))}
         write_file(images / FIGURE, drawn[FIGURE].read_bytes())

@@ -33,17 +33,8 @@ OWN_MPS, HEIGHT_M, BELOW_M, AWAY_M = 50.0, 600.0, 500.0, 9000.0
 def scene(
     radar: Mapping[str, Any], gamma_db: float | None, target_mps: float, *, seed: int = 1
 ) -> dict[str, Any]:
-    """Return an encounter head-on: the intruder flies low, the ownship at 50 m/s above it.
-
-    Parameters
-    ----------
-    radar : mapping
-        Keys of the radar that differ from `RADAR`; None leaves one out.
-    gamma_db : float or None
-        Reflectivity of the ground; none by default.
-    target_mps : float
-        Towards the ownship.
-    """
+    """Return an encounter head-on: the intruder flies low, the ownship at 50 m/s above it."""
+    # A key of None leaves out one of RADAR's.
     table = {key: value for key, value in {**RADAR, **radar}.items() if value is not None}
     own = {
         "lat_deg": 52.0, "lon_deg": 4.4, "alt_m": HEIGHT_M, "heading_deg": 0.0,
@@ -226,15 +217,7 @@ Detections of such an encounter, {seeds} runs each:
 
 
 def page(images: Path, *, seeds: int = 10) -> str:
-    """Run the scenes, draw the figure and return the page.
-
-    Parameters
-    ----------
-    images : Path
-        Folder that receives the figure.
-    seeds : int
-        Runs of each line of the table.
-    """
+    """Run the scenes, draw the figure and return the page."""
     draw(images / FIGURE)
     found = MovingTargetFilter("filter_bank", RADAR["prf_hz"], wavelength_m())
     speeds = [(i + 0.5) / 500 * found.blind_speed_m_s for i in range(500)]

@@ -35,34 +35,18 @@ BANK = FilterBank(
 
 @dataclass(frozen=True)
 class Endured:
-    """What became of covariances.
+    """What became of covariances."""
 
-    Parameters
-    ----------
-    least : float
-        Least eigenvalue of any correlation matrix.
-    asymmetry : float
-        Largest difference of two mirrored elements.
-    nees_median : float
-        Over tracks, at the end.
-    """
-
+    #: Least eigenvalue of any correlation matrix.
     least: float
+    #: Largest difference of two mirrored elements.
     asymmetry: float
+    #: Over tracks, at the end.
     nees_median: float
 
 
 def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
-    """Update tracks of targets that stand still so many times within 30 days.
-
-    Parameters
-    ----------
-    name : {"ekf", "ukf", "imm", "polar"}
-    updates : int
-    count : int
-        Tracks, at ranges that grow from 1 m to 300 km.
-    seed : int
-    """
+    """Update tracks of targets that stand still so many times within 30 days."""
     rng = np.random.default_rng(seed)
     distance = np.geomspace(1.0, 3e5, count)
     line = rng.normal(size=(3, count))

@@ -21,21 +21,13 @@ _PHASES = 32
 
 @dataclass(frozen=True)
 class HeadOn:
-    """Describe a head-on encounter and the one look whose Pd is known.
+    """Describe a head-on encounter and the one look whose Pd is known."""
 
-    Parameters
-    ----------
-    snr_at_1_m : float
-        Linear SNR of the known look, times the fourth power of its range in metres.
-    pulses : int
-        Pulses of that look.
-    closing_m_s, from_m, to_m : float
-        The target comes from the one range to the other.
-    false_alarm_probability : float
-    """
-
+    #: Linear SNR of the known look, times the fourth power of its range in metres.
     snr_at_1_m: float
+    #: Pulses of that look.
     pulses: int
+    #: The target comes from the one range to the other.
     closing_m_s: float
     from_m: float
     to_m: float
@@ -45,12 +37,8 @@ class HeadOn:
 def known_snr_at_1_m(
     *, rcs_dbsm: float, range_m: float, pd: float, false_alarm_probability: float, of_dbsm: float
 ) -> float:
-    """Return the SNR of a Swerling I target of `of_dbsm` at 1 m, where Pd of another is known.
-
-    Notes
-    -----
-    Pd = Pfa^(1 / (1 + SNR)) of one look, and SNR goes with σ / R⁴.
-    """
+    """Return the SNR of a Swerling I target of `of_dbsm` at 1 m, where Pd of another is known."""
+    # Pd = Pfa^(1 / (1 + SNR)) of one look, and SNR goes with σ / R⁴.
     known = math.log(false_alarm_probability) / math.log(pd) - 1.0
     return float(known * 10.0 ** (0.1 * (of_dbsm - rcs_dbsm)) * range_m**4)
 
@@ -58,23 +46,9 @@ def known_snr_at_1_m(
 def ranges_of_declaration(
     approach: HeadOn, scan_rate_hz: float, m: int, n: int, *, pulses: int, summed: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ranges of the looks of all phases, and the probability of a first declaration there.
+    """Return ranges of all phases' looks (phases, looks) and the chance of a first declaration.
 
-    Parameters
-    ----------
-    approach : HeadOn
-    scan_rate_hz : float
-    m, n : int
-        Detections that declare, of so many looks; 1 and 1 for the first detection.
-    pulses : int
-        Pulses of a look.
-    summed : bool
-        Whether they are summed in power; else in amplitude.
-
-    Returns
-    -------
-    range_m, probability : (phases, looks) arrays
-        The probabilities add up to that of being declared at all.
+    Pulses are `summed` in power, or else in amplitude; m = n = 1 is the first detection.
     """
     a = approach
     per_scan_m = a.closing_m_s / scan_rate_hz
@@ -149,27 +123,11 @@ def declared_by_recursion(
     correlation_s: float,
     trials: int = TRIALS,
 ) -> FloatArray:
-    """Return the ranges of declaration of many approaches, drawn look after look.
+    """Return the ranges of declaration of many approaches, NaN for none, drawn look after look.
 
     Swerling I with pulses added in amplitude: echo and noise are complex Gaussian, and detected is
     what exceeds -ln Pfa in power. The echo goes on from look to look by
     ρ = exp(-1 / (rate · τ)) of itself and sqrt(1 - ρ²) of a new draw.
-
-    Parameters
-    ----------
-    approach : HeadOn
-    scan_rate_hz : float
-    m, n : int
-    pulses : int
-        Of a look.
-    correlation_s : float
-        τ of the amplitude.
-    trials : int
-
-    Returns
-    -------
-    (trials,) array, m
-        NaN where there is no declaration.
     """
     a = approach
     draw = np.random.default_rng(20)
@@ -196,17 +154,7 @@ def declared_by_recursion(
 
 
 def fading_section(images: Path, approach: HeadOn, m: int, n: int, certain: float) -> str:
-    """Run the study of fades that last, draw its figure and return the section.
-
-    Parameters
-    ----------
-    images : Path
-        Folder that receives the figure.
-    approach : HeadOn
-    m, n : int
-    certain : float
-        Share that is declared by the range that is told.
-    """
+    """Run the study of fades that last, draw its figure and return the section."""
     found = _simulated()
     cells = {
         key: (ranges, declared_by_recursion(

@@ -28,24 +28,8 @@ def fitted_areas(
     """Find the bodies whose union shows the given totals from three sides.
 
     From the nose only the sphere is seen; abeam the cylinder with its two half spheres, the plate
-    on its edge; from above all three, where cylinder and plate overlap.
-
-    Parameters
-    ----------
-    front_m2, abeam_m2, above_m2 : float
-        Totals from the nose, abeam and from above.
-    back_m2 : float, optional
-        Total from behind, for infrared: abeam the sphere is then the mean of front and back.
-
-    Returns
-    -------
-    dict
-        front_m2, side_m2, horizontal_m2 (and back_m2), as `visible_area` takes them.
-
-    Raises
-    ------
-    ValueError
-        If no bodies show that: abeam less than the sphere, or from above less than the fuselage.
+    on its edge; from above all three, where cylinder and plate overlap. With `back_m2`, for
+    infrared, the sphere abeam is the mean of front and back.
     """
     ball_m2 = front_m2 if back_m2 is None else 0.5 * (front_m2 + back_m2)
     for name, value, least, why in (

@@ -20,28 +20,19 @@ DIGITS = 12
 
 @dataclass(frozen=True)
 class NumericalCase:
-    """One hard case with three results.
+    """One hard case with three results."""
 
-    Parameters
-    ----------
-    what : str
-        The case and the quantity with its unit.
-    formula : str
-        The naive way.
-    naive, ours, reference : float
-    source : str
-        Where the reference comes from.
-    digits : int
-        Significant digits shown. Our last digits may depend on the machine's mathematical library:
-        show fewer than are exact.
-    """
-
+    #: The case and the quantity with its unit.
     what: str
+    #: The naive way.
     formula: str
     naive: float
     ours: float
     reference: float
+    #: Where the reference comes from.
     source: str
+    #: Significant digits shown. Our last digits may depend on the machine's mathematical library:
+    #: show fewer than are exact.
     digits: int = DIGITS
 
     def text(self, value: float) -> str:

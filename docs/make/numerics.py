@@ -43,13 +43,7 @@ def _cells(case: NumericalCase) -> tuple[str, ...]:
 
 
 def markdown() -> str:
-    """Return the page.
-
-    Raises
-    ------
-    ImportError
-        If mpmath is not installed.
-    """
+    """Return the page."""
     lines = [_HEAD]
     for title, cases in SECTIONS:
         lines += [f"## {title}", "", _row(_COLUMNS), _row(["---"] * len(_COLUMNS))]
@@ -59,13 +53,7 @@ def markdown() -> str:
 
 
 def differences(page: str) -> list[str]:
-    """Return a line for each case whose result of ours, or reference, the page does not have.
-
-    Raises
-    ------
-    ImportError
-        If mpmath is not installed.
-    """
+    """Return a line for each case whose result of ours, or reference, the page does not have."""
     written = {cells[0]: cells for cells in map(_split, page.splitlines()) if len(cells) == 6}
     found = []
     computed = set()

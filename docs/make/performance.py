@@ -187,13 +187,7 @@ TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
 
 
 def filled(page: str, rows: Mapping[str, Any]) -> str:
-    """Return the page with every table made of the rows.
-
-    Raises
-    ------
-    ValueError
-        If the page has not each of the tables once.
-    """
+    """Return the page with every table made of the rows."""
     for name, make in TABLES.items():
         block = re.compile(_BLOCK.format(name=name, body=".*?"), re.DOTALL)
         text = _BLOCK.format(name=name, body=make(rows))

@@ -69,13 +69,7 @@ longer look, so that the best rate is higher.
 
 
 def page(images: Path) -> str:
-    """Run the study, draw the figure and return the page.
-
-    Parameters
-    ----------
-    images : Path
-        Folder that receives the figure.
-    """
+    """Run the study, draw the figure and return the page."""
     result = study(STUDY)
     found = simulated(result)
     approach = approach_of(study_scene())

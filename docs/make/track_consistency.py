@@ -109,27 +109,17 @@ class MissingCamera(_Missing, CameraBoundary):
 
 @dataclass(frozen=True)
 class Case:
-    """Scenes whose tracks are to be honest.
-
-    Parameters
-    ----------
-    says : str
-    tracker : dict
-        Keys of its block.
-    targets : list
-        Flights; empty where they are drawn.
-    drawn : Motion, optional
-        The model that flights are drawn from, ten in a scene.
-    sensors : dict
-    wire : dict
-        Keys of every sensor's wire to the fusion.
-    """
+    """Scenes whose tracks are to be honest."""
 
     says: str
+    #: Keys of its block.
     tracker: dict[str, Any]
+    #: Flights; empty where they are drawn.
     targets: list[dict[str, Any]] = field(default_factory=lambda: [STRAIGHT])
+    #: The model that flights are drawn from, ten in a scene.
     drawn: Motion | None = None
     sensors: dict[str, Any] = field(default_factory=lambda: SENSORS)
+    #: Keys of every sensor's wire to the fusion.
     wire: dict[str, Any] = field(default_factory=dict)
 
 
@@ -318,9 +308,7 @@ def _tracks(scenes: list[Any]) -> list[Any]:
 def nees_of(case: Case, replicas: int) -> FloatArray:
     """Return the NEES of every target's track, (targets of all replicas, instants).
 
-    It is NaN where no confirmed track with a range lies within 300 m, now and 5 s ahead in the
-    mean. A track is taken as it is
-    told by the first message at or after the instant.
+    NaN where no confirmed track with a range lies within 300 m, now and 5 s ahead in the mean.
     """
     found: list[FloatArray] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -334,6 +322,7 @@ def nees_of(case: Case, replicas: int) -> FloatArray:
 def _of_run(table: Any, truth: RecordedTruth) -> FloatArray:
     columns: Callable[[str], Any] = lambda name: table[name].to_numpy(zero_copy_only=False)  # noqa: E731
     time_s = columns("time_s")
+    # A track is taken as it is told by the first message at or after the instant.
     firsts = np.searchsorted(time_s, INSTANTS_S)
     status, ranged = columns("track_status"), columns("has_range")
     nees = np.full((len(truth.names), len(INSTANTS_S)), np.nan)
