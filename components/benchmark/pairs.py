@@ -1,23 +1,18 @@
-"""Time two forms of one scene in turn: what something costs that ought to cost little.
+"""What costs little or ought to: two forms of a scene in turn, and ways to share a processor."""
 
-``python -m components.benchmark.pairs PAIR ...`` prints one JSON object; the command
-starts it anew for every pair.
-"""
-
-import argparse
-import sys
+import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from statistics import median
 from typing import Any
 
-from components.benchmark.cases import CLOCKED, chosen, scene_of
-from components.benchmark.measure import engine_run, pin
+from components.benchmark.scenes import CLOCKED, chosen, engine_run, scene_of
 from components.examples import folder
-from dsa_des.record.recording import MemorySink
+from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
-from dsa_des.terminal.terminal import say_json
 
 #: A processor that the three sensors of a scene share, and that is busy a third of the time.
 _SHARED = (
@@ -28,23 +23,15 @@ _SHARED = (
 
 @dataclass(frozen=True)
 class Pair:
-    """Two forms of one benchmark scene.
-
-    Parameters
-    ----------
-    name, what : str
-    wanted : float
-        At most so many times the CPU time of the plain form.
-    case : str
-        The benchmark scene.
-    forms : callable
-        From the case's overrides to the form in question and the plain one.
-    """
+    """Two forms of one benchmark scene."""
 
     name: str
     what: str
+    #: At most so many times the CPU time of the plain form.
     wanted: float
+    #: The benchmark scene.
     case: str
+    #: From the case's overrides to the form in question and the plain one.
     forms: Callable[[str, bool], tuple[Scene, Scene]]
 
 
@@ -80,32 +67,19 @@ def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
 
 
 PAIRS = (
-    Pair(
-        "unused_effects",
-        "effects that the scene does not call for: declared, or not there at all",
-        1.03,
-        "hundred",
-        _effects,
-    ),
-    Pair(
-        "shared_processor",
-        "three sensors queue for one processor, or do not",
-        5.0,
-        "clocks",
-        _processor,
-    ),
-    Pair(
-        "alerting",
-        "first light with alert levels of its tracks at 1 Hz, or without",
-        2.0,
-        "first_light",
-        _alerting,
-    ),
-)
+    Pair("unused_effects",
+         "effects that the scene does not call for: declared, or not there at all",
+         1.03, "hundred", _effects),
+    Pair("shared_processor", "three sensors queue for one processor, or do not",
+         5.0, "clocks", _processor),
+    Pair("alerting", "first light with alert levels of its tracks at 1 Hz, or without",
+         2.0, "first_light", _alerting),
+)  # fmt: skip
 
 
-def measured(pair: Pair, quick: bool, repeats: int) -> dict[str, Any]:
+def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return by how much the CPU time of building and running grows; medians of pairs in turn."""
+    (pair,) = (pair for pair in PAIRS if pair.name == name)
     forms = pair.forms(pair.case, quick)
     for scene in forms:
         engine_run(scene, [], MemorySink())
@@ -125,18 +99,49 @@ def measured(pair: Pair, quick: bool, repeats: int) -> dict[str, Any]:
     }
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Measure one pair and print what was found."""
-    parser = argparse.ArgumentParser(prog="python -m components.benchmark.pairs")
-    parser.add_argument("pair", choices=[pair.name for pair in PAIRS])
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--repeats", type=int, default=5)
-    options = parser.parse_args(arguments)
-    pin()
-    (pair,) = (pair for pair in PAIRS if pair.name == options.pair)
-    say_json(measured(pair, options.quick, options.repeats))
-    return 0
+@dataclass(frozen=True)
+class Variant:
+    """First light with some of its blocks on one processor."""
+
+    name: str
+    what: str
+    #: Which share it.
+    blocks: tuple[str, ...] = ()
+    #: Further overrides.
+    more: tuple[str, ...] = ()
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+_SPREAD = ("processors.cpu.service_spread_s=0.002",)
+_SKIP = ("processors.cpu.when_busy=skip",)
+VARIANTS = (
+    Variant("none", "none"),
+    Variant("wait", "three sensors wait", CLOCKED),
+    Variant("skip", "three sensors, `skip`", CLOCKED, _SKIP),
+    Variant("skip_spread", "the same with `service_spread_s`", CLOCKED, (*_SKIP, *_SPREAD)),
+    Variant("chain", "radar and fusion, a chain", ("radar", "fusion")),
+    Variant("chain_spread", "the same with `service_spread_s`", ("radar", "fusion"), _SPREAD),
+    Variant(
+        "whole_chain",
+        "sensors, fusion and tracker, all in one chain",
+        (*CLOCKED, "fusion", "tracker"),
+    ),
+)
+
+
+def measured_queue(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return how many seconds are simulated and recorded in one of CPU, without building."""
+    from dsa_des.record.arrow import ParquetSink
+
+    (variant,) = (variant for variant in VARIANTS if variant.name == name)
+    sets = [f"blocks.{name}.processor=cpu" for name in variant.blocks]
+    if sets:
+        sets += ["processors.cpu.service_s=0.005", *variant.more]
+    scene = load_scene(folder() / "first_light.toml", sets=sets, duration_s="120")
+    rates = []
+    for _ in range(2 if quick else 2 + 2 * repeats):
+        with tempfile.TemporaryDirectory() as place:
+            simulation = Simulation(scene, recorder=Recorder([ParquetSink(Path(place))]))
+            started = time.process_time()
+            simulation.run()
+            rates.append(120.0 / (time.process_time() - started))
+    return {"scene": variant.name, "simulated_s_per_s": median(rates[2:] or rates)}

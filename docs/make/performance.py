@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from components.benchmark.cases import CASES
-from components.benchmark.command import fresh
-from components.benchmark.pairs import PAIRS
-from components.benchmark.processors import VARIANTS
+from components.benchmark.pairs import PAIRS, VARIANTS
 from components.benchmark.rates import RATES
+from components.benchmark.run_benchmark import fresh
+from components.benchmark.scenes import CASES
 from docs.make import performance_growth
 from dsa_des.files.input_files import read_input_text
 from dsa_des.files.output_file import write_file
@@ -55,7 +54,6 @@ def commit() -> str:
 def measured(repeats: int, quick: bool) -> dict[str, Any]:
     """Measure everything and return the rows by kind."""
     started = time.monotonic()
-    options = [f"--repeats={repeats}", *(["--quick"] if quick else [])]
     found: dict[str, Any] = {
         "commit": commit(),
         "date": datetime.now(UTC).date().isoformat(),
@@ -65,17 +63,16 @@ def measured(repeats: int, quick: bool) -> dict[str, Any]:
         "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "repeats": repeats,
     }
-    kinds: tuple[tuple[str, str, tuple[Any, ...]], ...] = (
-        ("cases", "measure", CASES), ("pairs", "pairs", PAIRS), ("rates", "rates", RATES),
-        ("queues", "processors", VARIANTS),
-    )  # fmt: skip
-    for kind, module, items in kinds:
-        found[kind] = {}
+    kinds: dict[str, tuple[Any, ...]] = {
+        "scenes": CASES, "pairs": PAIRS, "rates": RATES, "queues": VARIANTS,
+    }  # fmt: skip
+    for kind, items in kinds.items():
+        # The scenes' rows have been kept under another name from the first on.
+        rows = found["cases" if kind == "scenes" else kind] = {}
         for item in items:
             say(f"{time.monotonic() - started:4.0f} s: {item.name}", err=True)
-            found[kind][item.name] = fresh(module, [item.name, *options])
-    calls = "--calls=300" if quick else "--calls=1800"
-    found["calls"] = fresh("embedded", [f"--repeats={repeats}", calls])
+            rows[item.name] = fresh(kind, item.name, quick, repeats)
+    found["calls"] = fresh("calls", "embed", quick, repeats)
     found["took_s"] = round(time.monotonic() - started)
     return found
 

@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from components.benchmark.cases import CASES, replicas_of, scene_of
-from components.benchmark.measure import engine_run, peak_mb, pin
+from components.benchmark.measure import pin
+from components.benchmark.scenes import CASES, engine_run, peak_mb, replicas_of, scene_of
 from dsa_des.record.recording import MemorySink
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.interruption import plain_ending

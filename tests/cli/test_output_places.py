@@ -216,7 +216,9 @@ def test_pages_and_rows_are_checked_beforehand(
     places: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("components.thesis.reproduce.make", lambda *a: pytest.fail("it ran"))
-    monkeypatch.setattr("components.benchmark.command.fresh", lambda *a: pytest.fail("it ran"))
+    monkeypatch.setattr(
+        "components.benchmark.run_benchmark.fresh", lambda *a: pytest.fail("it ran")
+    )
     before = everything_in(places)
     for name in ("run", "pipe", "loop", "no/x", "a" * 300, ""):
         for words in (["reproduce", "--page", name], ["benchmark", "--quick", "--json", name]):

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from components.benchmark.cases import CASES
-from components.benchmark.pairs import PAIRS
-from components.benchmark.processors import VARIANTS
+from components.benchmark.pairs import PAIRS, VARIANTS
 from components.benchmark.rates import RATES
+from components.benchmark.scenes import CASES
 from docs.make import performance as made
 
 PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
@@ -17,8 +16,8 @@ def measured(monkeypatch):
     """Rows as `measured` gathers them, where each process gives numbers of its own."""
     asked = []
 
-    def fresh(module, arguments):
-        asked.append((module, *arguments))
+    def fresh(*arguments):
+        asked.append(arguments)
         k = float(len(asked))
         calls = {key: {"p50": 10 * k, "p99": 20 * k} for key in ("wall_us", "undisturbed_us",
                                                                 "fixed_us")}  # fmt: skip
@@ -39,9 +38,9 @@ def block(page, name):
 
 def test_every_table_has_a_row_of_each_thing_that_was_measured(monkeypatch):
     rows, asked = measured(monkeypatch)
-    things = [("measure", CASES), ("pairs", PAIRS), ("rates", RATES), ("processors", VARIANTS)]
-    wanted = [(module, item.name, "--repeats=3") for module, items in things for item in items]
-    assert asked == [*wanted, ("embedded", "--repeats=3", "--calls=1800")]
+    things = [("scenes", CASES), ("pairs", PAIRS), ("rates", RATES), ("queues", VARIANTS)]
+    wanted = [(kind, item.name, False, 3) for kind, items in things for item in items]
+    assert asked == [*wanted, ("calls", "embed", False, 3)]
     page = made.filled(PAGE.read_text(encoding="utf-8"), rows)
     assert f"at commit {rows['commit']} on {rows['date']}" in block(page, "measured")[0]
     scenes = block(page, "scenes")[2:]

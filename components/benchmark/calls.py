@@ -1,35 +1,18 @@
-"""Times of single calls of the embedding interface: how long a host waits for an answer.
+"""Times of single calls of the embedding interface: how long a host waits for an answer."""
 
-``python -m components.benchmark.embedded`` prints one JSON object;
-``dsa-des benchmark --embed`` starts it anew, so that nothing is warm from elsewhere.
-"""
-
-import argparse
-import sys
 import time
 from typing import Any
 
 import numpy as np
 
-from components.benchmark.cases import SCENES
+from components.benchmark.scenes import SCENES
 from dsa_des.embed import Simulator
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
-from dsa_des.terminal.terminal import say_json
 
 #: What a call may take at its 99th percentile, us.
 WANTED_US = 1000.0
 _SCENE = "thesis"
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Measure and print what was found."""
-    parser = argparse.ArgumentParser(prog="python -m components.benchmark.embedded")
-    parser.add_argument("--calls", type=int, default=1800)
-    parser.add_argument("--repeats", type=int, default=5)
-    options = parser.parse_args(arguments)
-    say_json(measured(options.calls, options.repeats))
-    return 0
 
 
 def measured(calls: int, repeats: int) -> dict[str, Any]:
@@ -101,7 +84,3 @@ def _percentiles(values: list[float]) -> dict[str, float]:
         "p99": float(np.percentile(values, 99)),
         "max": max(values),
     }
-
-
-if __name__ == "__main__":
-    sys.exit(main())
