@@ -1,15 +1,14 @@
-"""``dsa-des reproduce``: make items, write figures and data, compare with the thesis."""
+"""``dsa-des reproduce``: make items, and write rows, figures, data and the page about them."""
 
+import csv
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from components.thesis.document import markdown, short
-from components.thesis.files import write_csv, write_rows
-from components.thesis.made import Made
-from components.thesis.registry import ITEMS, Item, chosen
-from components.thesis.tally import tally
+from components.thesis.rows import Columns, Made, Row, tally
+from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
@@ -21,6 +20,7 @@ from dsa_des.terminal.terminal import say, say_json
 Results = list[tuple[Item, Made]]
 
 _FOLDERS = ("figures", "data")
+_PAGE = Path(__file__).with_name("page.md")
 
 
 def reproduce_items(
@@ -81,9 +81,9 @@ def write(folder: Path, results: Results, failures: list[str], wall_s: float) ->
         for picture in made.pictures:
             picture.draw(folder / "figures" / f"{picture.name}.png")
         for name, columns in made.data.items():
-            write_csv(folder / "data" / f"{name}.csv", columns)
+            _write_csv(folder / "data" / f"{name}.csv", columns)
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
-    write_rows(folder / "rows.csv", rows)
+    _write_rows(folder / "rows.csv", rows)
     (folder / "thesis.md").write_text(markdown(results, "figures"), encoding="utf-8")
     content: dict[str, Any] = {
         "title": "The thesis, figure by figure",
@@ -130,3 +130,71 @@ def _show(results: Results, target: Path) -> None:
     rows = [row for _, made in results for row in made.rows]
     console.print(tally(rows), highlight=False, soft_wrap=True)
     console.print(f"{target}: figures, data, rows.csv, thesis.md", highlight=False, soft_wrap=True)
+
+
+def _write_csv(path: Path, columns: Columns) -> None:
+    """Write columns of equal length; numbers with nine significant digits."""
+    lines = [[_text(value) for value in line] for line in zip(*columns.values(), strict=True)]
+    _write_lines(path, [list(columns), *lines])
+
+
+def _write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write compared rows as they are in JSON; what does not exist is an empty field."""
+    names = list(rows[0]) if rows else []
+    _write_lines(path, [names, *([_text(row[name]) for name in names] for row in rows)])
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    return f"{float(value):.9g}"
+
+
+def _write_lines(path: Path, lines: Sequence[Sequence[str]]) -> None:
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(lines)
+
+
+def short(value: float, sign: bool = False) -> str:
+    """Return a number with four significant digits."""
+    text = f"{value:+.4g}" if sign else f"{value:.4g}"
+    if "e" in text and 1e-4 < abs(value) < 1e9:
+        return f"{value:+.0f}" if sign else f"{value:.0f}"
+    return text
+
+
+def markdown(results: Results, images: str) -> str:
+    """Return the page; `images` is the folder of the figures, as seen from it."""
+    rows = [row for _, made in results for row in made.rows]
+    head = _PAGE.read_text(encoding="utf-8").format(tally=tally(rows, "*"))
+    return "\n".join([head, *(_section(item, made, images) for item, made in results)])
+
+
+def _section(item: Item, made: Made, images: str) -> str:
+    lines = [f"## {item.title} ({_label(item)})", ""]
+    derived = any(row.derived for row in made.rows)
+    extra = (" derived |", " ---: |") if derived else ("", "")
+    lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
+    lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
+    lines += [line(row, derived) for row in made.rows]
+    lines.append("")
+    if made.note:
+        lines += [made.note, ""]
+    for picture in made.pictures:
+        lines += [f"![{picture.caption}]({images}/{picture.name}.png)", "", picture.caption, ""]
+    return "\n".join(lines)
+
+
+def line(row: Row, derived: bool) -> str:
+    """Return a row as a line of its table, with or without the column of derived numbers."""
+    difference = "" if row.difference is None else short(row.difference, sign=True)
+    cells = (row.quantity, row.printed or "", *((row.derived,) if derived else ()),
+             short(row.ours), difference, row.unit, row.said, row.source)  # fmt: skip
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _label(item: Item) -> str:
+    kind, _, number = item.name.partition("-")
+    return {"fig": "Fig. ", "table": "Table ", "sec": "§", "eq": "eq. "}[kind] + number

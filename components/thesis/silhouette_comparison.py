@@ -54,23 +54,15 @@ _STYLES: list[dict[str, Any]] = [
 
 @dataclass(frozen=True, eq=False)
 class RotationComparison:
-    """Hold one model against one reference over a half turn about one body axis.
+    """Hold one model against one reference over a half turn about one body axis."""
 
-    Parameters
-    ----------
-    axis : {"x", "y", "z"}
-    model, reference : str
-        Names of the two.
-    angle_deg : (n,) array, degrees
-        Camera angle about the axis.
-    model_share, reference_share : (n,) arrays
-        Signatures as a share of the maximum (see `compare_silhouettes`).
-    """
-
+    #: One of `AXES`.
     axis: str
     model: str
     reference: str
+    #: (n,)
     angle_deg: FloatArray
+    #: (n,), signatures as a share of the maximum (see `compare_silhouettes`).
     model_share: FloatArray
     reference_share: FloatArray
 
@@ -98,24 +90,6 @@ def camera_rotation(
     x: from the right wing over the top to the left wing. y: from the nose over the top to the
     tail. z: from the nose past the right wing to the tail. The target stays level; only the line
     of sight turns.
-
-    Parameters
-    ----------
-    axis : {"x", "y", "z"}
-    step_deg : float
-        Divides 180.
-
-    Returns
-    -------
-    angle_deg : (n,) array
-        0 ... 180.
-    (relative_heading_rad, pitch_rad, roll_rad, elevation_rad) : (n,) arrays
-        As `visible_area` takes them. An elevation beyond -pi/2 goes on round the circle.
-
-    Raises
-    ------
-    ValueError
-        If the axis is unknown or the step does not divide 180.
     """
     if axis not in AXES:
         raise ValueError(f"axis is {axis!r}: it must be one of {', '.join(AXES)}")
@@ -140,29 +114,7 @@ def compare_silhouettes(
     step_deg: float = 10.0,
     scale: str = "own_maximum",
 ) -> list[RotationComparison]:
-    """Compare every model with every reference over half turns about the three body axes.
-
-    Parameters
-    ----------
-    models, references : mapping of name to function
-        Functions of (relative heading, pitch, roll, elevation) in radians giving m².
-    step_deg : float
-        Camera step, 10 degrees in the thesis.
-    scale : {"own_maximum", "reference_maximum"}
-        ``own_maximum`` divides each signature by its own maximum over the three rotations, as the
-        thesis does with its pixel counts: shapes are compared, not sizes. ``reference_maximum``
-        divides both by the reference's maximum: an error in size counts as well.
-
-    Returns
-    -------
-    list of RotationComparison
-        For each model and reference, axes x, y, z.
-
-    Raises
-    ------
-    ValueError
-        If the scale is unknown, or a signature is nowhere above 0.
-    """
+    """Compare every model with every reference over half turns about the three body axes."""
     if scale not in SCALES:
         raise ValueError(f"scale is {scale!r}: it must be one of {', '.join(SCALES)}")
     cameras = {axis: camera_rotation(axis, step_deg) for axis in AXES}
@@ -195,17 +147,7 @@ def compare_silhouettes(
 
 
 def comparison_table(comparisons: Sequence[RotationComparison]) -> str:
-    """Lay the mean and maximum errors out as a text table like Table 4.3.
-
-    Parameters
-    ----------
-    comparisons : sequence of RotationComparison
-
-    Returns
-    -------
-    str
-        One line per model, reference and axis; errors in per cent of the maximum signature.
-    """
+    """Lay the mean and maximum errors out as a text table like Table 4.3."""
     names = [("model", "reference"), *((one.model, one.reference) for one in comparisons)]
     first, second = (max(len(pair[column]) for pair in names) for column in (0, 1))
     lines = [f"{'model':<{first}}  {'reference':<{second}}  axis  mean error  max error"]
@@ -220,17 +162,7 @@ def comparison_table(comparisons: Sequence[RotationComparison]) -> str:
 def draw_comparison(
     comparisons: Sequence[RotationComparison], path: str | PathLike[str], *, title: str = ""
 ) -> None:
-    """Draw three panels like figs 4.8-4.10, one per axis of rotation, into an image file.
-
-    Parameters
-    ----------
-    comparisons : sequence of RotationComparison
-        Of one aircraft.
-    path : path
-        PNG to write.
-    title : str
-        The aircraft's name, for example.
-    """
+    """Draw three panels like figs 4.8-4.10, one per axis of rotation, into an image file."""
     with drawing(7.0, 9.0, Path(path), dpi=150) as figure:
         figure.set_layout_engine("constrained")
         panels = figure.subplots(3, 1, sharex=True, sharey=True)
@@ -271,16 +203,6 @@ def turned_table_warning(areas: Mapping[str, float], table: SilhouetteTable) -> 
 
     A fuselage shows more abeam than from the nose. Where the three bodies say so by more than a
     quarter and the table says the opposite by as much, its azimuths most likely count from a wing.
-
-    Parameters
-    ----------
-    areas : mapping
-        front_m2 and side_m2 of the model.
-    table : SilhouetteTable
-
-    Returns
-    -------
-    str or None
     """
     from_nose = float(np.mean(table.area(np.radians([0.0, 180.0]), 0.0)))
     abeam = float(np.mean(table.area(np.radians([90.0, 270.0]), 0.0)))

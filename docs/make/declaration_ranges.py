@@ -12,7 +12,7 @@ import numpy as np
 from components.arguments.checks import FloatArray
 from components.radar.cumulative_detection import first_declared
 from components.radar.detection import detection_probability
-from components.thesis.plotting import BLUE, GREEN, GREY, legend_below, panels
+from components.thesis.drawing import BLUE, GREEN, GREY, legend_below, panels
 from dsa_des.library.study import study
 
 # Phases of the scan clock against the encounter; more change no digit that is shown.

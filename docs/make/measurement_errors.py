@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import dsa_des
-from components.thesis.plotting import EO, RADAR, panels
+from components.thesis.drawing import EO, RADAR, panels
 from dsa_des.terminal.interruption import plain_ending
 
 FIGURE = "measurement_errors.png"

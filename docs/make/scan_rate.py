@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.thesis.plotting import BLUE, GREY, PINK, RADAR, legend_below, panels
+from components.thesis.drawing import BLUE, GREY, PINK, RADAR, legend_below, panels
 from docs.make.declaration_ranges import (
     HeadOn,
     certain_range_m,

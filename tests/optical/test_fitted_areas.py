@@ -7,7 +7,7 @@ import pytest
 
 from components.aircraft.silhouette_table import read_aspect_table, table_from_nodes
 from components.optical.silhouette import visible_area
-from components.thesis.project_files import aircraft
+from components.thesis.scenes import aircraft
 from components.thesis.silhouette_comparison import main
 from docs.make.fitted_areas import fitted_areas
 from docs.make.fitted_areas import main as fit

@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.thesis.basis import predicted
-from components.thesis.document import line, short
-from components.thesis.made import Made
-from components.thesis.registry import ITEMS, Item, chosen
-from components.thesis.row import Row
+from components.thesis.reproduce import line, short
+from components.thesis.rows import Made, Row, predicted
+from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from dsa_des.scene.scene import load_scene
@@ -45,7 +43,7 @@ def test_json_rows_figures_and_data(tmp_path):
     assert {row["item"] for row in rows} == {"fig-3.11", "fig-4.22"}
     first = rows[0]
     assert (first["printed"], first["ours"], first["difference"]) == (1.0, 1.0, 0.0)
-    assert (first["verdict"], first["inputs"]) == ("configured", "front_and_back:BACK_M2")
+    assert (first["verdict"], first["inputs"]) == ("configured", "silhouettes:BACK_M2")
     silent = next(row for row in rows if row["verdict"] == "no value printed")
     assert silent["printed"] is None and silent["difference"] is None
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))["rows"] == rows

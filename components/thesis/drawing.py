@@ -1,27 +1,61 @@
-"""Scenes from above, as the thesis draws them: a star, lines, and circles where sensors detect."""
+"""What figures share: panels, colours, and scenes from above as the thesis draws them."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from components.display.fields_of_view import outline_of
 from components.display.styles import styles_of
-from components.thesis.plotting import GREY, RADAR
-from components.thesis.scene_run import SceneRun
+from components.sensor import marks
+from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.record.drawing import drawing
+
+#: Half a page.
+WIDTH_IN, HEIGHT_IN = 6.6, 3.9
+
+#: By kind, as in every other figure.
+RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
+#: For whatever is no kind of sensor.
+BLUE, ORANGE, RED, GREEN, PINK, SKY = (
+    "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#56B4E9",
+)  # fmt: skip
+GREY = "#777777"
+
+
+def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
+    """Put the legend of one of a figure's axes below all of them; `without` names an entry."""
+    entries = zip(*axes.get_legend_handles_labels(), strict=True)
+    shown = [entry for entry in entries if entry[1] != without]
+    axes.figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=columns)
+
+
+@contextmanager
+def panels(
+    path: Path,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    width_in: float = WIDTH_IN,
+    height_in: float = HEIGHT_IN,
+    **shared: Any,
+) -> Iterator[list[Any]]:
+    """Give the axes of a figure, row by row, and write it as PNG when the block is done."""
+    with drawing(width_in, height_in, path) as figure:
+        figure.set_layout_engine("constrained")
+        axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
+        for one in axes:
+            one.grid(color="#DDDDDD", linewidth=0.5)
+            one.set_axisbelow(True)
+        yield axes
 
 
 def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) -> None:
-    """Draw the flights, the ownship's place and sensors' fields of view.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    run : SceneRun
-    fields_of_view : tuple of str
-        Names of sensors.
-    """
+    """Draw the flights, the ownship's place and sensors' fields of view."""
     from matplotlib.patches import Polygon
 
     flights = run.flights
