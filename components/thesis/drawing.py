@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from components.display.fields_of_view import outline_of
-from components.display.styles import styles_of
+from components.display.map_view import outline_of
+from components.display.symbols import styles_of
 from components.sensor import marks
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray

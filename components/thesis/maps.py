@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.styles import styles_of
+from components.display.symbols import styles_of
 from components.thesis.drawing import (
     BLUE,
     EO,

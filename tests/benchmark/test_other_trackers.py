@@ -13,7 +13,7 @@ from components.benchmark.track_updates import (
     plainly,
     track_plainly,
 )
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():
