@@ -8,8 +8,7 @@ from components.alert_configuration.margins import Deviations, largest
 from components.estimation.frame import ned_axes
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
 from components.geometry.enu import enu_to_geodetic
-from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")

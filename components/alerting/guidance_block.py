@@ -7,8 +7,7 @@ from pydantic import Field
 
 from components.alert_configuration.conf_parameters import ConfParameters
 from components.guidance.way_out import bands_around
-from components.messages.alerts import AlertLevels
-from components.messages.guidance_bands import BAND_KINDS, BAND_REGIONS, GuidanceBands
+from components.messages.alerts import BAND_KINDS, BAND_REGIONS, AlertLevels, GuidanceBands
 from dsa_des.block.component import Component
 from dsa_des.block.message import offsets_of
 from dsa_des.block.ports import Input, Output

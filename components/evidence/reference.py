@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from components.messages.columns import COLUMNS, LEADING
 from components.traffic.columns import csv_columns, daa_columns
 from dsa_des.block.entry_points import registered
-from dsa_des.block.message import Message
+from dsa_des.block.message import Column, Message
+from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find
 from dsa_des.commands.parameter_rows import parameter_rows
 from dsa_des.commands.scene_tables import scene_tables
@@ -31,13 +31,13 @@ scenes that extend others (`[blocks.traffic.intruders.head_on]`).
 """
 
 
-def recorded_tables() -> dict[str, dict[str, str]]:
-    """Return table → column → type of all that registered blocks and processors record."""
+def recorded_tables() -> dict[str, dict[str, Column]]:
+    """Return table → column of all that registered blocks and processors record."""
     messages: list[type[Message]] = [Processing]
     for name in registered():
         messages += [output.message for output in find(name).outputs.values()]
         messages += find(name).also_records
-    found: dict[str, dict[str, str]] = {}
+    found: dict[str, dict[str, Column]] = {}
     for message in messages:
         for table, columns in sorted(message.recorded.items()):
             found.setdefault(table, {}).update(columns)
@@ -57,14 +57,14 @@ def page() -> str:
         parts += [f"### {name}\n", f"{doc}\n", _table(heads, parameter_rows(cls.Parameters))]
     parts.append("## Tables of a run folder\n")
     kinds = recorded_tables()
-    every = [(name, "", *LEADING[name]) for name in LEADING]
+    every = [(name, "", *column[:3]) for name, column in LEADING.items()]
     heads = ("column", "type", "unit", "frame", "meaning")
     parts += [
         "Every table is a Parquet file and begins with these columns:\n",
         _table(heads, every),
     ]
     for table, columns in sorted(kinds.items()):
-        rows_of = [(name, kind, *COLUMNS[table][name]) for name, kind in columns.items()]
+        rows_of = [(name, column.kind, *column[:3]) for name, column in columns.items()]
         parts += [f"### {table}\n", _table(heads, rows_of)]
     parts += ["## Traffic files\n", "### CSV (`traffic.csv`)\n"]
     names = ("quantity", "accepted names")

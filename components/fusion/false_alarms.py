@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from components.fusion.fusion_block import poses, velocities
+from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
-from components.messages.detections import MEASURED, OWN_VELOCITY, POSE
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import IntArray

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.contributors import mask_type
-from components.messages.detections import OWN_VELOCITY, POSE, Detections, SensorOffer
+from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.effects import navigation_errs
 from components.sensor.marks import FUSION
@@ -207,9 +208,10 @@ def poses(message: Detections) -> FloatArray:
 
 def velocities(message: Detections) -> FloatArray:
     """Return the ownship's velocity at each entry, (3, entries); NaN where none is told."""
-    if message.own_velocity is None:
+    velocity = message.velocity_columns()
+    if velocity is None:
         return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)
-    return np.stack(list(message.own_velocity.values()))
+    return np.stack(list(velocity.values()))
 
 
 def _copy(

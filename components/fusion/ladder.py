@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry.directions import unit_vectors
-from components.messages.true_entries import true_entries
+from components.messages.false_detections import true_entries
 from components.sensor.ladder_values import angle_apart_mrad
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.fusion.fusion_block import Fusion
-from components.messages.detections import POSE
+from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from components.messages.looks import Looks
 from dsa_des.arrays.types import IntArray

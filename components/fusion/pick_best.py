@@ -10,8 +10,8 @@ from components.fusion.coincidence import latest_in_gate, same_instant
 from components.fusion.false_alarms import pass_false_alarms
 from components.fusion.fusion_block import Fusion
 from components.fusion.ladder import FUSION
+from components.messages.false_detections import true_entries
 from components.messages.fused import FusedDetections
-from components.messages.true_entries import true_entries
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters

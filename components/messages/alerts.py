@@ -1,24 +1,26 @@
-"""The message of an alerting block: the alert level of each target."""
+"""The messages of alerting: the alert level of each target, and the bands of guidance."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.columns import DESCRIBED
+from components.messages.columns import target_names
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_entry, per_row, static
+from dsa_des.block.message import Column, Message, Text, column, columns, per_entry, per_row, static
 
 #: Most levels of an alerter whose times are recorded.
 MOST_LEVELS = 4
 #: A tracker's own numbers stand above those of the scene's targets, where both name contacts.
 TRACKS_FROM = 1_000_000
-_TIMES = {f"time_to_level_{level}_s": "float64" for level in range(1, MOST_LEVELS + 1)}
-
-
-def _target_names(message: Any) -> Text:
-    return Text(message.target, message.roster.names)
+_TIMES = {
+    f"time_to_level_{level}_s": Column(
+        "s", "", f"time to the volume of level {level} in straight flight, 0 inside; null where "
+        "it is not met within the lookahead",
+    )
+    for level in range(1, MOST_LEVELS + 1)
+}  # fmt: skip
+_TRACK = {"track": Column("", "", "the tracker's number; null where tracks have none", "int64")}
 
 
 @dataclass(eq=False)
@@ -50,17 +52,21 @@ class AlertLevels(Message):
     roster : Roster
     """
 
-    described = DESCRIBED
     entry_table = "alerts"
 
     offsets: IntArray
-    target: IntArray = per_entry(column="text", value=_target_names)
-    level: IntArray = per_entry(column="int64")
-    times: dict[str, FloatArray] = per_entry(columns=_TIMES)
-    time_to_closest_s: FloatArray = per_entry(column="float64")
-    closest_horizontal_m: FloatArray = per_entry(column="float64")
-    closest_vertical_m: FloatArray = per_entry(column="float64")
-    numbers: dict[str, IntArray] = per_entry(columns={"track": "int64"})
+    target: IntArray = column(
+        "", "", "name of the target; of a track, the nearest one, null if far from all", "text",
+        value=target_names,
+    )  # fmt: skip
+    level: IntArray = column("", "", "alert level, 0 without an alert", "int64")
+    times: dict[str, FloatArray] = columns(_TIMES)
+    time_to_closest_s: FloatArray = column(
+        "s", "", "time to the horizontal closest approach, 0 if past"
+    )
+    closest_horizontal_m: FloatArray = column("m", "", "projected horizontal distance there")
+    closest_vertical_m: FloatArray = column("m", "", "projected least difference in height")
+    numbers: dict[str, IntArray] = columns(_TRACK)
     deviations: dict[str, FloatArray] = per_entry()
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
@@ -91,3 +97,44 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
     if contact < 0:
         return ""
     return names[contact] if contact < len(names) else None
+
+
+#: What bands are of, and the regions they are painted with.
+BAND_KINDS = ("direction", "altitude")
+BAND_REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY", "UNKNOWN")
+
+
+@dataclass(eq=False)
+class GuidanceBands(Message):
+    """Bands of guidance at each instant with an alert; stretches that are clear are left out.
+
+    Parameters
+    ----------
+    offsets : (rows + 1,)
+    band : (entries,) of int
+        Place in `BAND_KINDS`.
+    region : (entries,) of int
+        Place in `BAND_REGIONS`.
+    low_rad, high_rad : (entries,)
+        Directions over the ground from north, clockwise; NaN in bands of altitude.
+    low_m, high_m : (entries,)
+        Altitudes; NaN in bands of direction.
+    """
+
+    entry_table = "bands"
+
+    offsets: IntArray
+    band: IntArray = column(
+        "", "", "direction or altitude: what it is a stretch of", "text",
+        value=lambda m: Text(m.band, BAND_KINDS),
+    )  # fmt: skip
+    region: IntArray = column(
+        "", "", "FAR, MID or NEAR: whose volumes are met; RECOVERY: what leads out", "text",
+        value=lambda m: Text(m.region, BAND_REGIONS),
+    )  # fmt: skip
+    low_rad: FloatArray = column(
+        "rad", "", "direction over the ground from north at which it begins"
+    )
+    high_rad: FloatArray = column("rad", "", "direction, clockwise, at which it ends")
+    low_m: FloatArray = column("m", "", "altitude at which it begins")
+    high_m: FloatArray = column("m", "", "altitude at which it ends")

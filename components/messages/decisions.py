@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message, Text, per_row, static
+from dsa_des.block.message import PER_ROW, Message, Text, column, static
 
 #: What may be decided, in the order of their numbers: an alert was on screen, was looked at, was
 #: judged; the ownship is told to turn, or to climb or descend.
@@ -57,15 +56,36 @@ class Decisions(Message):
     targets : tuple of str
     """
 
-    described = DESCRIBED
     row_table = "decisions"
 
-    decision: IntArray = per_row(column="text", value=lambda m: Text(m.decision, KINDS))
-    target: IntArray = per_row(column="text", value=lambda m: Text(m.target, m.targets))
-    turn_rad: FloatArray = per_row(column="float64")
-    climb_m: FloatArray = per_row(column="float64")
-    level: IntArray = per_row(column="int64")
-    alert_s: FloatArray = per_row(column="float64")
-    response_s: FloatArray = per_row(column="float64")
-    wall_time_s: FloatArray = per_row(column="float64")
+    decision: IntArray = column(
+        "", "", "shown, looked, verified, rejected, turn or climb: an alert was on the operator's "
+        "screen, was looked at, was judged, or the ownship was told to manoeuvre",
+        "text", of=PER_ROW, value=lambda m: Text(m.decision, KINDS),
+    )  # fmt: skip
+    target: IntArray = column(
+        "", "", "name of the target it is about; null for none", "text",
+        of=PER_ROW, value=lambda m: Text(m.target, m.targets),
+    )  # fmt: skip
+    turn_rad: FloatArray = column(
+        "rad", "", "commanded change of heading, positive to the right", of=PER_ROW
+    )
+    climb_m: FloatArray = column(
+        "m", "", "commanded change of altitude, positive upward", of=PER_ROW
+    )
+    level: IntArray = column(
+        "", "", "alert level of the target as the operator had it, 0 without an alert", "int64",
+        of=PER_ROW,
+    )  # fmt: skip
+    alert_s: FloatArray = column(
+        "s", "", "when that alert came to the operator; null without an alert", of=PER_ROW
+    )
+    response_s: FloatArray = column(
+        "s", "", "time from then to the decision; null without an alert", of=PER_ROW
+    )
+    wall_time_s: FloatArray = column(
+        "s", "", "seconds since 1970-01-01T00:00Z by the wall clock when the decision came from a "
+        "person; null where none did",
+        of=PER_ROW,
+    )  # fmt: skip
     targets: tuple[str, ...] = static()

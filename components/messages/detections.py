@@ -8,68 +8,66 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.columns import DESCRIBED
-from components.messages.constant_columns import not_measured
-from components.messages.every_look import look_columns
+from components.messages.columns import (
+    NED,
+    OWN_VELOCITY,
+    POSE,
+    MeasuredLine,
+    StatedErrors,
+    TrueLine,
+    target_names,
+)
+from components.messages.looks import look_columns
 from components.messages.reach import Reach
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import Columns, Message, Text, per_entry, per_row, static
+from dsa_des.block.message import (
+    PER_ROW,
+    Column,
+    Columns,
+    Message,
+    column,
+    columns,
+    per_entry,
+    per_row,
+    static,
+)
 from dsa_des.time.clock import ClockSpec
 
 #: Columns of ``scans`` for targets that were not evaluated, by reason.
 _SKIPPED = {
-    "skipped_absent": "int64",
-    "skipped_off": "int64",
-    "skipped_field_of_view": "int64",
-    "skipped_range": "int64",
-    "skipped_hidden": "int64",
-    "skipped_culled": "int64",
+    f"skipped_{reason}": Column("targets", "", f"left out: {why}", "int64")
+    for reason, why in {
+        "absent": "not there",
+        "off": "the sensor is off",
+        "field_of_view": "outside the field of view",
+        "range": "beyond the range",
+        "hidden": "the Earth or its ground stands before it",
+        "culled": "too far away for any sensor",
+    }.items()
 }
 #: Columns of ``detections`` that only some sensors fill. For others, a subclass has a field
-#: ``extras: dict[str, AnyArray] = per_entry(columns={**EXTRAS, "name": "float64"}, ...)``.
+#: ``extras: dict[str, AnyArray] = columns({**EXTRAS, "name": Column("m", "", "meaning")}, ...)``.
 EXTRAS = {
-    "snr_db": "float64",
-    "detection_probability": "float64",
-    "pixels": "float64",
-    "declared": "bool",
-    "illuminated_s": "float64",
-    "ned_azimuth_rad": "float64",
-    "ned_elevation_rad": "float64",
+    "snr_db": Column(
+        "dB", "", "signal-to-noise ratio that a radar measured; the mean stands in looks"
+    ),
+    "detection_probability": Column(
+        "", "", "probability of it, where a sensor of one's own says it; looks has that of all"
+    ),
+    "pixels": Column("pixels", "", "pixels that the target covers in a camera"),
+    "declared": Column("", "", "whether there are enough detections; true without a rule", "bool"),
+    "illuminated_s": Column("s", "", "when a sweeping beam lit the target"),
+    "ned_azimuth_rad": Column("rad", NED, "azimuth from north, by the believed attitude"),
+    "ned_elevation_rad": Column("rad", NED, "elevation, by the believed attitude"),
+    "cued": Column(
+        "", "", "whether the target lay in a cue cone; false where no cues come", "bool"
+    ),
 }
-#: An extra too, recorded behind all other columns.
-CUED = {"cued": "bool"}
-#: The ownship's pose as it believes it to be: columns of ``detections``, and fields of
-#: `Detections`.
-POSE = {
-    "own_lat_deg": "float64",
-    "own_lon_deg": "float64",
-    "own_alt_m": "float64",
-    "own_heading_rad": "float64",
-    "own_pitch_rad": "float64",
-    "own_roll_rad": "float64",
-}
-
-#: The ownship's velocity over ground, north, east and down of its own place: columns of
-#: ``detections``, and what `Detections.own_velocity` holds.
-OWN_VELOCITY = {
-    "own_velocity_north_m_s": "float64",
-    "own_velocity_east_m_s": "float64",
-    "own_velocity_down_m_s": "float64",
-}
-
-#: Columns of `Detections` that need not be given: NaN, not measured, where they are not.
-MEASURED = (
-    "range_rate_m_s",
-    "azimuth_variance_rad2",
-    "elevation_variance_rad2",
-    "range_variance_m2",
-    "range_rate_variance_m2_s2",
-)
 
 
 @dataclass(frozen=True)
@@ -135,6 +133,9 @@ class SensorOffer:
         chance; None where nobody says.
     unforeseen : bool
         Whether they may come later still, as they queue.
+    untold_across_m2 : float
+        Variance of the ownship's own place across the line of sight that its angles' variances
+        leave out, as it knows no range: who knows one adds it over the range squared.
     """
 
     measures_range: bool
@@ -151,27 +152,17 @@ class SensorOffer:
     latest_s: Fraction | None = None
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
+    untold_across_m2: float = 0.0
 
 
-def target_names(message: Any) -> Text:
-    """Return the names of a message's targets, entry by entry."""
-    return Text(message.target, message.roster.names)
-
-
-def measured_column() -> Any:
-    """Declare one of the columns `MEASURED`."""
-    return per_entry(column="float64", default=None, kw_only=True)
-
-
-def fill_measured(message: Any) -> None:
-    """Let columns `MEASURED` that a message was not given be those of nothing measured."""
-    for name in MEASURED:
-        if getattr(message, name) is None:
-            setattr(message, name, not_measured(len(message.target)))
+def pose_column(name: str) -> Any:
+    """Declare one of the columns `POSE`, which belong to every detection of the scan."""
+    unit, frame, meaning, _ = POSE[name]
+    return column(unit, frame, meaning, of=PER_ROW, for_entries=True, default=None, kw_only=True)
 
 
 @dataclass(eq=False)
-class Detections(Message):
+class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     """What one sensor reports, scan by scan.
 
     Parameters
@@ -186,22 +177,8 @@ class Detections(Message):
         Entries ``offsets[i]:offsets[i + 1]`` belong to row i.
     target : (entries,) of int
         Index into the roster.
-    azimuth_rad, elevation_rad : (entries,)
-        Measured, in the ownship's body axes, on the sensor's grid.
-    range_m : (entries,)
-        Measured slant range; NaN for a sensor that has none.
-    range_rate_m_s : (entries,)
-        Measured rate of the slant range, positive when it opens; NaN where it is not measured.
-    azimuth_variance_rad2, elevation_variance_rad2 : (entries,)
-        Mean square of the error of the measured angles, in body axes, as the sensor states it: a
-        grid's is step²/12. The cut at the edge of the field of view is not in it. Where the
-        ownship's navigation has noise, that of the pose they are turned by is.
-    range_variance_m2, range_rate_variance_m2_s2 : (entries,)
-        The same of range and range rate; NaN where they are not measured. A range's has that of
-        the place it is counted from.
     confidence : (entries,)
         Margin of the detection; its unit is the sensor's (dB for radar, signature for optics).
-    true_azimuth_rad, true_elevation_rad, true_range_m : (entries,)
     extras : dict of (entries,)
         Only those in `EXTRAS` are recorded; a subclass may declare more.
         What the decision rested on, where a sensor has such a thing: ``snr_db``,
@@ -213,73 +190,68 @@ class Detections(Message):
         attitude, ``ned_azimuth_rad`` and ``ned_elevation_rad``.
     own_lat_deg, own_lon_deg, own_alt_m : (rows,), or None
         Where the ownship believes to be at each scan (WGS 84); the truth where its navigation has
-        no error. None from a sensor that does not say; recorded with every detection.
+        no error. None from a sensor that does not say.
     own_heading_rad, own_pitch_rad, own_roll_rad : (rows,), or None
         How it believes to be turned, NED to body (yaw-pitch-roll).
     own_of_entries : dict of (entries,), or None
         The same six where entries were measured at instants of their own within the scan;
         `pose_columns` gives those of every entry in any case.
-    own_velocity : dict of (entries,), or None
-        How the ownship moved at each entry (`OWN_VELOCITY`), where a sensor measures range rates.
+    own_velocity : dict of (rows,), or None
+        How the ownship moved (`OWN_VELOCITY`), where a sensor measures range rates; NaN at scans
+        without detections. `velocity_columns` gives it of every entry.
+    own_velocity_of_entries : dict of (entries,), or None
+        The same at instants of their own.
     ticks_after : (entries,) of int, or None
         How long after its row's tick each entry was measured, where that differs: a beam that
         sweeps. `measured_ticks` gives the instants in any case.
     looks : dict of (rows, targets), or None
-        Every look at every target (`components.messages.every_look`), where they are recorded.
+        Every look at every target (`components.messages.looks`), where they are recorded.
     roster : Roster
     """
 
     row_table = "scans"
-    described = DESCRIBED
     entry_table = "detections"
     may_hold = frozenset({"looks"})
 
-    scan: IntArray = per_row(column="int64", in_entries=True)
-    evaluated: IntArray = per_row(column="int64")
-    offsets: IntArray = per_row(
-        column="int64", name="detected", value=lambda message: np.diff(message.offsets)
+    scan: IntArray = column("", "", "number of the scan", "int64", of=PER_ROW, in_entries=True)
+    evaluated: IntArray = column(
+        "targets", "", "targets whose physics was evaluated", "int64", of=PER_ROW
     )
-    skipped: dict[str, IntArray] = per_row(columns=_SKIPPED, value=lambda m: m.skipped_columns())
-    target: IntArray = per_entry(column="text", value=target_names)
-    azimuth_rad: FloatArray = per_entry(column="float64")
-    elevation_rad: FloatArray = per_entry(column="float64")
-    range_m: FloatArray = per_entry(column="float64")
-    confidence: FloatArray = per_entry(column="float64")
-    true_azimuth_rad: FloatArray = per_entry(column="float64")
-    true_elevation_rad: FloatArray = per_entry(column="float64")
-    true_range_m: FloatArray = per_entry(column="float64")
-    extras: dict[str, AnyArray] = per_entry(columns=EXTRAS, value=lambda m: m.extra_columns())
+    offsets: IntArray = column(
+        "", "", "detections, false alarms included", "int64",
+        of=PER_ROW, name="detected", value=lambda message: np.diff(message.offsets),
+    )  # fmt: skip
+    skipped: dict[str, IntArray] = columns(
+        _SKIPPED, of=PER_ROW, value=lambda m: m.skipped_columns()
+    )
+    target: IntArray = column(
+        "", "", "name of the target; null for a false alarm", "text", value=target_names
+    )
+    confidence: FloatArray = column(
+        "dB or signature", "", "margin of the detection, by the kind of sensor"
+    )
+    extras: dict[str, AnyArray] = columns(EXTRAS, value=lambda m: m.extra_columns())
     roster: Roster = static()
-    own_lat_deg: FloatArray | None = per_row(default=None, kw_only=True)
-    own_lon_deg: FloatArray | None = per_row(default=None, kw_only=True)
-    own_alt_m: FloatArray | None = per_row(default=None, kw_only=True)
-    own_heading_rad: FloatArray | None = per_row(default=None, kw_only=True)
-    own_pitch_rad: FloatArray | None = per_row(default=None, kw_only=True)
-    own_roll_rad: FloatArray | None = per_row(default=None, kw_only=True)
-    own_of_entries: dict[str, FloatArray] | None = per_entry(
-        columns=POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True
+    own_lat_deg: FloatArray | None = pose_column("own_lat_deg")
+    own_lon_deg: FloatArray | None = pose_column("own_lon_deg")
+    own_alt_m: FloatArray | None = pose_column("own_alt_m")
+    own_heading_rad: FloatArray | None = pose_column("own_heading_rad")
+    own_pitch_rad: FloatArray | None = pose_column("own_pitch_rad")
+    own_roll_rad: FloatArray | None = pose_column("own_roll_rad")
+    own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
+    own_velocity: dict[str, FloatArray] | None = columns(
+        OWN_VELOCITY, of=PER_ROW, for_entries=True, default=None, kw_only=True
     )
-    range_rate_m_s: FloatArray = measured_column()
-    azimuth_variance_rad2: FloatArray = measured_column()
-    elevation_variance_rad2: FloatArray = measured_column()
-    range_variance_m2: FloatArray = measured_column()
-    range_rate_variance_m2_s2: FloatArray = measured_column()
-    own_velocity: dict[str, FloatArray] | None = per_entry(
-        columns=OWN_VELOCITY, value=lambda m: m.own_velocity or {}, default=None, kw_only=True
-    )
-    cued_of_entries: dict[str, AnyArray] | None = per_entry(
-        columns=CUED, value=lambda m: m.cued_column(), default=None, kw_only=True
-    )
+    own_velocity_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     ticks_after: IntArray | None = per_entry(default=None, kw_only=True)
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
     def tables(self) -> dict[str, Columns]:
         """Return what is recorded: with the looks, where they are asked for."""
         tables = super().tables()
+        for own in (self.own_of_entries, self.own_velocity_of_entries):
+            tables["detections"].update(own or {})
         return tables if self.looks is None else {**tables, "looks": look_columns(self)}
-
-    def __post_init__(self) -> None:
-        fill_measured(self)
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""
@@ -288,12 +260,7 @@ class Detections(Message):
     def extra_columns(self) -> dict[str, AnyArray]:
         """Return the extras with ``declared``, which all detections have."""
         # A sensor without a rule declares whatever it reports: it knows of no false alarm.
-        extras = {name: values for name, values in self.extras.items() if name not in CUED}
-        return {"declared": np.ones(len(self.target), dtype=bool), **extras}
-
-    def cued_column(self) -> dict[str, AnyArray]:
-        """Return the extra that says whether each lay in a cue cone, where the sensor says so."""
-        return {name: self.extras[name] for name in CUED if name in self.extras}
+        return {"declared": np.ones(len(self.target), dtype=bool), **self.extras}
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty where none is told."""
@@ -303,7 +270,26 @@ class Detections(Message):
         pose = {name: getattr(self, name) for name in POSE}
         return {n: np.repeat(v, counts) for n, v in pose.items() if v is not None}
 
+    def velocity_columns(self) -> dict[str, FloatArray] | None:
+        """Return how the ownship moved at each entry, by column; None where none is known."""
+        if self.own_velocity is None:
+            return self.own_velocity_of_entries
+        counts = np.diff(self.offsets)
+        return {name: np.repeat(values, counts) for name, values in self.own_velocity.items()}
+
     def measured_ticks(self) -> IntArray:
         """Return the instant at which each entry was measured."""
         ticks = np.repeat(self.tick, np.diff(self.offsets))
         return ticks if self.ticks_after is None else ticks + self.ticks_after
+
+
+@dataclass(eq=False)
+class OwnOfEntries(Message):
+    """What a beam that sweeps records besides: the ownship at each entry's own instant."""
+
+    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
+        "detections": {
+            name: one._replace(meaning=f"{one.meaning}; a beam that sweeps has such a column")
+            for name, one in (POSE | OWN_VELOCITY).items()
+        }
+    }

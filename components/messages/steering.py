@@ -6,9 +6,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from components.messages.columns import DESCRIBED
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import Message, per_row
+from dsa_des.block.message import PER_ROW, Message, column
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
 SLOWEST_TURN_DEG_S = 0.1
@@ -67,17 +66,30 @@ class Manoeuvres(Message):
         Change of vertical speed, and how fast.
     """
 
-    described = DESCRIBED
     row_table = "manoeuvres"
 
-    turn_rad: FloatArray = per_row(column="float64")
-    rate_rad_s: FloatArray = per_row(column="float64")
-    climb_m: FloatArray = per_row(column="float64", default=None)
-    climb_rate_mps: FloatArray = per_row(column="float64", default=None)
-    speed_mps: FloatArray = per_row(column="float64", default=None)
-    acceleration_mps2: FloatArray = per_row(column="float64", default=None)
-    vertical_speed_mps: FloatArray = per_row(column="float64", default=None)
-    vertical_acceleration_mps2: FloatArray = per_row(column="float64", default=None)
+    turn_rad: FloatArray = column(
+        "rad", "", "commanded change of heading, positive to the right", of=PER_ROW
+    )
+    rate_rad_s: FloatArray = column("rad/s", "", "rate of that turn", of=PER_ROW)
+    climb_m: FloatArray = column(
+        "m", "", "commanded change of altitude, positive upward", of=PER_ROW, default=None
+    )
+    climb_rate_mps: FloatArray = column(
+        "m/s", "", "vertical speed of that climb or descent", of=PER_ROW, default=None
+    )
+    speed_mps: FloatArray = column(
+        "m/s", "", "commanded change of ground speed", of=PER_ROW, default=None
+    )
+    acceleration_mps2: FloatArray = column(
+        "m/s²", "", "acceleration of that change", of=PER_ROW, default=None
+    )
+    vertical_speed_mps: FloatArray = column(
+        "m/s", "", "commanded change of vertical speed, positive upward", of=PER_ROW, default=None
+    )
+    vertical_acceleration_mps2: FloatArray = column(
+        "m/s²", "", "acceleration of that change", of=PER_ROW, default=None
+    )
 
     def __post_init__(self) -> None:
         """Fill in what is not changed."""

@@ -10,23 +10,22 @@ from typing import Self
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.columns import DESCRIBED
+from components.messages.columns import ERRING_POSE, MeasuredLine, target_names
 from components.messages.contributors import contributor_names
-from components.messages.detections import POSE, target_names
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.message import Message, per_entry, per_entry_tick, static
+from dsa_des.block.message import Message, column, columns, per_entry, static
 
 
 @dataclass(eq=False)
-class Tracks(Message):
+class Tracks(MeasuredLine, Message):
     """What a tracker holds of each target, at each instant it was updated.
+
+    The held line of sight is in the ownship's body axes.
 
     Parameters
     ----------
     offsets : (rows + 1,)
     target : (entries,) of int
-    azimuth_rad, elevation_rad, range_m : (entries,)
-        Held measurement, ownship's body axes; range NaN when it had none.
     age_s : (entries,)
         Time since what is held was measured.
     contributors : (entries,) of int
@@ -39,19 +38,21 @@ class Tracks(Message):
         Whether it came at this row's instant; others were held. By default what has no age.
     """
 
-    described = DESCRIBED
     entry_table = "tracks"
 
     offsets: IntArray
-    target: IntArray = per_entry(column="text", value=target_names)
-    azimuth_rad: FloatArray = per_entry(column="float64")
-    elevation_rad: FloatArray = per_entry(column="float64")
-    range_m: FloatArray = per_entry(column="float64")
-    age_s: FloatArray = per_entry(column="float64")
-    contributors: IntArray = per_entry(column="text", name="updated_by", value=contributor_names)
+    target: IntArray = column("", "", "name of the target", "text", value=target_names)
+    age_s: FloatArray = column("s", "", "time since what is held was measured")
+    contributors: IntArray = column(
+        "", "", "sensors of that update, joined by +", "text",
+        name="updated_by", value=contributor_names,
+    )  # fmt: skip
     roster: Roster = static()
     sensors: tuple[str, ...] = static()
-    measured_tick: IntArray = per_entry_tick(name="measured_s", default=None, kw_only=True)
+    measured_tick: IntArray = column(
+        "s", "", "when it was measured", name="measured_s", instant=True, default=None,
+        kw_only=True,
+    )  # fmt: skip
     ticks_per_s: int = static(default=10**9, kw_only=True)
     updated: BoolArray = per_entry(default=None, kw_only=True)
 
@@ -66,12 +67,7 @@ class Tracks(Message):
         """Return a message without tracks; the scene's table must be empty."""
         if values:
             raise ValueError("tracks before the first message can only be an empty table, {}")
-        none, zero = np.empty(0), np.empty(0, dtype=np.int64)
-        offsets = np.zeros(2, dtype=np.int64)
-        return cls(
-            np.zeros(1, dtype=np.int64), offsets, zero, none, none, none, none, zero,
-            Roster.of([]), (),
-        )  # fmt: skip
+        return cls.empty(roster=Roster.of([]), sensors=(), measured_tick=None)
 
 
 @dataclass(eq=False)
@@ -84,4 +80,4 @@ class TracksWithPose(Tracks):
         The ownship's pose as it believed it to be when what is held was measured.
     """
 
-    own_of_entries: dict[str, FloatArray] = per_entry(columns=POSE, kw_only=True)
+    own_of_entries: dict[str, FloatArray] = columns(ERRING_POSE, kw_only=True)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from components.geometry.ellipsoid import line_of_sight_ned
-from components.messages.detections import OWN_VELOCITY, Detections
+from components.messages.columns import OWN_VELOCITY
+from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
@@ -41,15 +42,19 @@ class OwnVelocity(Effect):
         ) -> Detections:
             counts = np.diff(detections.offsets)
             after, some = detections.ticks_after, counts > 0
+            # At instants of their own, or once a scan.
             row = rows[some] if after is None else np.repeat(rows, counts)
             state = (targets.tick if targets.state_tick is None else targets.state_tick)[row]
             if block.span_ticks:
                 state = state % block.span_ticks
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = own_velocity(targets, row, time_s)
-            if after is None:
-                velocity = np.repeat(velocity, counts[some], axis=1)
-            return replace(detections, own_velocity=dict(zip(OWN_VELOCITY, velocity, strict=True)))
+            if after is not None:
+                own = dict(zip(OWN_VELOCITY, velocity, strict=True))
+                return replace(detections, own_velocity_of_entries=own)
+            of_scans = np.full((len(OWN_VELOCITY), len(rows)), np.nan)
+            of_scans[:, some] = velocity
+            return replace(detections, own_velocity=dict(zip(OWN_VELOCITY, of_scans, strict=True)))
 
         return with_velocity
 

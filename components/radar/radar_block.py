@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.geometry.attitude import body_to_ned, unit_vector
+from components.messages.detections import OwnOfEntries
 from components.messages.reach import farthest_look
 from components.messages.targets import RelativeTargets
 from components.radar.beam_effects import BeamSweep, Sweep
@@ -20,6 +21,7 @@ from components.sensor.marks import RADAR
 from components.sensor.sensor import Sensor
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect
+from dsa_des.block.message import Message
 
 _RANGE_RATE, _OWN_VELOCITY = RangeRate(), OwnVelocity()
 CellFactor = Callable[[Cells], FloatArray]
@@ -43,6 +45,7 @@ class Radar(Sensor):
     }
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
+    also_records: ClassVar[tuple[type[Message], ...]] = (*Sensor.also_records, OwnOfEntries)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -68,6 +71,10 @@ class Radar(Sensor):
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
+
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: where the beam sweeps, the ownship at each entry's instant."""
+        return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
 
     @property
     def _sweep(self) -> Sweep | None:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from components.messages.detections import POSE
+from components.messages.columns import POSE
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import IntArray
 

@@ -21,6 +21,7 @@ from dsa_des.time.gauss_markov import GaussMarkov
 Place = tuple[FloatArray, FloatArray, FloatArray]
 # Nearer to the vertical azimuths say nothing.
 _LEAST_COS = 1e-3
+_LEAST_AREA_M2 = 0.01
 
 
 class Glint(Effect):
@@ -72,6 +73,10 @@ class Wander:
         ).tolist()
         #: Mean squares of the extent across and along a level line of sight, and upward, m².
         self._level2, self._upward2 = 0.5 * (length2 + span2), height2
+        band = getattr(block, "areas", "") or "eo"
+        shown = np.concatenate([_level_area_m2(roster, band) for roster in rosters])
+        #: Area that shows on a level line of sight, from any side, m².
+        self._area_m2 = max(float(np.mean(shown)), _LEAST_AREA_M2)
 
     def __call__(
         self,
@@ -149,10 +154,18 @@ class Wander:
                 "range": np.full(len(over2), share2 * self._level2),
             }
             return added
-        # An ellipse of so many pixels, as wide and as high as an aircraft of the scene.
-        solid = 4.0 / np.pi * signal["pixels"] * pixel_rad[0] * pixel_rad[1]
-        shape = float(np.sqrt(self._level2 / self._upward2))
+        # As wide and as high as the scene's aircraft are for the area that they show: a wing seen
+        # from ahead is wide, and hardly an area.
+        solid = signal["pixels"] * pixel_rad[0] * pixel_rad[1] / self._area_m2
         return {
-            "azimuth": share2 * solid * shape / level**2,
-            "elevation": share2 * solid / shape,
+            "azimuth": share2 * solid * self._level2 / level**2,
+            "elevation": share2 * solid * self._upward2,
         }
+
+
+def _level_area_m2(roster: Roster, band: str) -> FloatArray:
+    """Return what each target's bodies show on level lines of sight, on average over its sides."""
+    front, side = (roster.column(f"{band}.{body}_m2") for body in ("front", "side"))
+    if band == "ir":
+        front = 0.5 * (front + roster.column("ir.back_m2"))
+    return front + 2.0 / np.pi * side

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from components.geometry.wrapping import wrap_pi_unchecked
-from components.messages.constant_columns import constant_column, not_measured
 from components.messages.detections import LastingError, LastingPart
+from components.sensor.constant_columns import constant_column
 from components.sensor.error_parameters import StatedError
 from components.sensor.grid import VARIANCE_OF, variance_of_step
 from components.sensor.look import Cells, Look
@@ -18,6 +18,7 @@ from components.sensor.quantity_error import QuantityError, mean_square
 from components.sensor.resolution import Grid
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.block.recorded_columns import nothing_in
 
 # A range that comes out below this, a millimetre, is no range.
 _NEAREST_M = 1e-3
@@ -192,7 +193,7 @@ class Erring:
         found = {name: grid.round(values[name]) for name, grid in self._grids.items()}
         found["azimuth"] = wrap_pi_unchecked(found["azimuth"])
         if "range" not in found:
-            found["range"] = not_measured(len(azimuth))
+            found["range"] = nothing_in(len(azimuth))
         else:
             nearest = self._steps["range"] or _NEAREST_M
             found["range"] = np.maximum(np.abs(found["range"]), nearest)

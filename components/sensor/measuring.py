@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from components.messages.constant_columns import constant_column
 from components.messages.reach import Reach
+from components.sensor.constant_columns import constant_column
 from components.sensor.grid import AZIMUTH, ELEVATION, SensorGrid
 from components.sensor.look import Cells, Look
 from components.sensor.mounting import BodyAxes

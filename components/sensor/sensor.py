@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.messages.detections import Detections, LastingError, SensorOffer
-from components.messages.every_look import EveryLook, looks_of
+from components.messages.looks import EveryLook, looks_of
 from components.messages.reach import EVALUATE, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.effects import NavigationReport, lasting_navigation, navigation_noise
@@ -64,7 +64,7 @@ class Sensor(Measuring):
     inputs = {"targets": Input(RelativeTargets, "sampled", "Targets as seen from the ownship.")}
     outputs = {"detections": Output(Detections, "What was detected, scan by scan.")}
     Parameters: ClassVar[Any] = SensorParameters
-    also_records = (EveryLook,)
+    also_records: ClassVar[tuple[type[Message], ...]] = (EveryLook,)
     windowed = True
     rewindable = True
     hooks: ClassVar[Mapping[str, str]] = {
@@ -123,12 +123,15 @@ class Sensor(Measuring):
                 parts = tuple(dict.fromkeys(part for one in angles for part in one.parts))
                 worst = LastingError(max(one.step for one in angles), parts)
                 lasting |= {"azimuth": worst, "elevation": worst}
-        if any(any(sigmas) for sigmas in navigation_noise(self.context)):  # differs with the pose
+        untold_m2 = 0.0
+        noise = navigation_noise(self.context)
+        if any(map(any, noise)):  # differs with the pose
+            untold_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
             lasting = with_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
-            lasting=lasting, clock=self.p.clock_spec, **constant,
+            lasting=lasting, clock=self.p.clock_spec, untold_across_m2=untold_m2, **constant,
         )  # fmt: skip
 
     @cached_property

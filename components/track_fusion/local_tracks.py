@@ -10,8 +10,7 @@ from components.estimation.batched import times
 from components.estimation.frame import Place
 from components.estimation.frame_change import frame_change
 from components.estimation.motion import ConstantVelocity
-from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks
+from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")

@@ -7,8 +7,7 @@ import numpy as np
 from components.estimation.batched import product, product_transposed
 from components.estimation.frame import Place
 from components.estimation.measurement import Kind, linearised
-from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import DELETED, StateTracks
+from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from components.track_fusion.fused_states import FusedStates
 from components.track_fusion.local_tracks import LocalTracks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray

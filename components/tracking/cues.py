@@ -9,9 +9,8 @@ from pydantic import Field, model_validator
 
 from components.estimation.cue_cone import half_angle_rad
 from components.estimation.frame import Place
-from components.messages.columns import COVARIANCE
 from components.messages.cues import CueCones
-from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks
+from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, NonNegativeRational, Parameters

@@ -10,7 +10,7 @@ from components.association.gates import gate_threshold
 from components.estimation.batched import is_everything, selected
 from components.estimation.frame import Place
 from components.estimation.kalman import Moments
-from components.estimation.measurement import Kind
+from components.estimation.measurement import Kind, expected
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
 from components.tracking.filter_bank import PairMeasurement, log_mixture
@@ -23,6 +23,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 _MOST_PAIRS = 1 << 20
 # The square of a box's width by that of the gate in it: who is in the gate must not depend on it.
 _WIDER = 1.1
+# Nearer to the vertical azimuths say nothing.
+_LEAST_COS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,7 @@ def gated_pairs(
     held = np.zeros(len(detection), dtype=bool)
     direction = None
     blind = bool((~part.ranged).any())
+    whole = _WholeVariance(rules, part, place, scans)
     for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
         mine = np.flatnonzero(codes == code)
         # What a track without a range expects of one says nothing: there the direction decides.
@@ -85,7 +88,7 @@ def gated_pairs(
             moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
             direction = moments[0].expected[:2]
             track, entry = _near(
-                rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks
+                rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks, whole
             )
             if of_whom is not None:
                 chosen = part.ranged[track] == of_whom
@@ -93,12 +96,15 @@ def gated_pairs(
             if len(track) == 0:
                 continue
             cells = detection[entry]
+            variance = whole(track, cells, rows)
             said = rules.bank.measure(
                 moments,
                 track,
                 _picked(scans.measured, rows, cells),
-                _picked(scans.variance, rows, cells),
-                common_errors(rules, part, track, scans, rows, cells, moments[0].expected),
+                variance,
+                common_errors(
+                    rules, part, track, scans, rows, cells, moments[0].expected, variance
+                ),
                 part.weights,
             )
             gated = said.distance <= gate_threshold(rules.gate_probability, kind.size)
@@ -131,6 +137,7 @@ def _near(
     detection: IntArray,
     rows: list[int],
     looks: int,
+    whole: "_WholeVariance",
 ) -> tuple[IntArray, IntArray]:
     """Return pairs of one look whose angles and range lie in a box about the gate."""
     counts = np.bincount(of, minlength=looks)
@@ -140,7 +147,7 @@ def _near(
     cells = detection[mine]
     measured = _picked(scans.measured, rows[:3], cells)
     variance = _picked(scans.variance, rows[:3], cells)
-    boxes = [_box(found, variance, threshold) for found in moments]
+    boxes = [_box(found, variance, threshold, whole.most) for found in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
     part = np.cumsum(many) // _MOST_PAIRS
@@ -160,7 +167,32 @@ def _near(
     return np.concatenate(tracks), np.concatenate(entries)
 
 
-def _box(found: Moments, variance: FloatArray, threshold: float) -> tuple[FloatArray, FloatArray]:
+class _WholeVariance:
+    """Variances of pairs: as reported, and of the ownship's place as far as the track is."""
+
+    def __init__(self, rules: TrackerRules, part: TrackStore, place: Place, scans: Scans) -> None:
+        self._scans, self._untold = scans, rules.untold_across_m2
+        #: What is added at most to each track's azimuth and elevation.
+        self.most: FloatArray | None = None
+        if self._untold is not None:
+            _, elevation, range_m = expected(Kind(True), part.state0, place)
+            range2 = np.maximum(range_m, 1.0) ** 2
+            level2 = np.maximum(np.cos(elevation), _LEAST_COS) ** 2
+            self._by_m2 = np.stack([1.0 / (range2 * level2), 1.0 / range2])
+            self.most = self._untold.max() * self._by_m2
+
+    def __call__(self, track: IntArray, cells: IntArray, rows: list[int]) -> FloatArray:
+        found = _picked(self._scans.variance, rows, cells)
+        if self._untold is not None:
+            source = self._scans.source[:2][:, cells]
+            across_m2 = np.where(source < 0, 0.0, self._untold[source])
+            found[:2] += across_m2 * selected(self._by_m2, track)
+        return found
+
+
+def _box(
+    found: Moments, variance: FloatArray, threshold: float, more: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
     """Return where one model expects angles and range, and half the widths of boxes about gates.
 
     They are wide enough for the worst detection of all, and for rounding.
@@ -168,7 +200,10 @@ def _box(found: Moments, variance: FloatArray, threshold: float) -> tuple[FloatA
     expected = found.expected[: len(variance)]
     half = np.empty_like(expected)
     for i, worst in enumerate(variance.max(axis=1).tolist()):
-        half[i] = np.sqrt((threshold * _WIDER) * (found.total[i, i] + worst))
+        spread = found.total[i, i] + worst
+        if more is not None and i < 2:
+            spread = spread + more[i]
+        half[i] = np.sqrt((threshold * _WIDER) * spread)
     return expected, half
 
 
@@ -229,7 +264,8 @@ def common_errors(
     scans: Scans,
     rows: list[int],
     cells: IntArray,
-    expected: FloatArray,
+    foreseen: FloatArray,
+    variance: FloatArray,
 ) -> FloatArray | None:
     """Return what the errors of pairs' measurements have in common with their sensors' last ones.
 
@@ -245,10 +281,9 @@ def common_errors(
     moved = np.zeros(source.shape)
     for place, row in enumerate(rows):
         if row < 3:
-            moved[place] = selected(expected[place], track) - part.seen[row, there[place], track]
+            moved[place] = selected(foreseen[place], track) - part.seen[row, there[place], track]
     moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
     moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
-    variance = scans.variance[rows][:, cells]
     range_m = np.where(np.isfinite(since_s), part.seen[2, there, track], np.inf)
     return rules.lasting.common(rows, there, variance, moved, since_s, range_m)
 

@@ -7,11 +7,10 @@ import numpy as np
 from components.estimation.covariance_intersection import distance_squared
 from components.estimation.frame import place_in_frame
 from components.estimation.measurement import position_of
-from components.messages.columns import COVARIANCE
-from components.messages.detections import POSE
+from components.messages.columns import POSE
+from components.messages.false_detections import true_entries
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks
-from components.messages.true_entries import true_entries
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, StateTracks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung

@@ -10,8 +10,7 @@ from components.estimation import modes
 from components.estimation.batched import selected
 from components.estimation.frame import Place
 from components.estimation.measurement import direction
-from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import StateTracks
+from components.messages.state_tracks import COVARIANCE, StateTracks
 from components.tracking.life import existence
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -44,6 +44,8 @@ class TrackerRules:
     ticks_per_s : int
     lasting : LastingErrors or None
         What of the sensors' errors is not new at every look.
+    untold_across_m2 : (sensors,)
+        As in `SensorOffer`.
     """
 
     bank: FilterBank
@@ -65,6 +67,7 @@ class TrackerRules:
     rates_of: int
     ticks_per_s: int
     lasting: LastingErrors | None = None
+    untold_across_m2: Any = None
 
     @property
     def widest_gate(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.estimation.batched import selected
 from components.estimation.measurement import Kind
-from components.messages.detections import POSE
+from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake

@@ -9,10 +9,9 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import Place, place_in_frame
 from components.estimation.measurement import Kind, linearised
-from components.messages.columns import COVARIANCE
 from components.messages.detections import SensorOffer
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import StateTracks
+from components.messages.state_tracks import COVARIANCE, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.lateness import LookCount, latest_s

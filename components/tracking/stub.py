@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import POSE
+from components.messages.columns import POSE
+from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
-from components.messages.true_entries import true_entries
 from components.navigation.effects import navigation_errs
 from components.sensor.marks import TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -177,6 +177,7 @@ class Tracker(Component):
         )
         assumed = self.p.assumed_range_m or 0.25 * farthest
         existence = self.p.start_existence
+        untold = [o.untold_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in told]
         return TrackerRules(
             bank=self.bank(),
             association=self.p.association,
@@ -199,6 +200,7 @@ class Tracker(Component):
             ),
             ticks_per_s=self.context.ticks_per_s,
             lasting=LastingErrors.of(offers, sensors),
+            untold_across_m2=None if not any(untold) else np.array(untold),
         )
 
     def run(self, wake: Wake) -> StateTracks | None:

@@ -10,7 +10,13 @@ from os import PathLike
 from pathlib import Path
 
 from components.geometry.normals import FloatArray
-from components.traffic.sample_table import UNITS, Column, SampleTable, enu_velocity, unit_factor
+from components.traffic.sample_table import (
+    UNITS,
+    SampleColumn,
+    SampleTable,
+    enu_velocity,
+    unit_factor,
+)
 from components.traffic.text_rows import read_lines
 from components.traffic.traffic_file import (
     Problems,
@@ -127,11 +133,11 @@ def _split(line: str, delimiter: str) -> list[str]:
         return []
 
 
-def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str, Column]:
+def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str, SampleColumn]:
     """Match the headers; a missing required column ends the reading."""
     parsed = [_name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
-    found: dict[str, Column] = {}
+    found: dict[str, SampleColumn] = {}
     ours = {alias for aliases in HEADERS.values() for alias in aliases}
     shown = shown_columns(headers, not ours.isdisjoint(names))
     for quantity, aliases in HEADERS.items():
@@ -149,7 +155,7 @@ def _find_columns(problems: Problems, headers: list[str], line: int) -> dict[str
         factor = 1.0
         if quantity in UNITS:
             factor = unit_factor(problems, quantity, unit, line=line, header=headers[index])
-        found[quantity] = Column(index, headers[index], factor)
+        found[quantity] = SampleColumn(index, headers[index], factor)
     problems.raise_if_any()
     # Velocity counts only when it is complete; half of one is no use.
     if not all(q in found for q in ("vx", "vy", "vz")):
@@ -180,7 +186,7 @@ def _name_and_unit(header: str) -> tuple[str, str | None]:
     return re.sub(r"[\s_\-.]", "", header).lower(), unit
 
 
-def _time_parser(column: Column) -> Callable[[str], float]:
+def _time_parser(column: SampleColumn) -> Callable[[str], float]:
     """Make a function that reads a number in the column's unit, or an ISO 8601 instant."""
 
     def parse(cell: str) -> float:

@@ -12,7 +12,7 @@ from components.geometry.enu import enu_to_geodetic
 from components.geometry.normals import FloatArray, local_axes
 from components.traffic.sample_table import (
     UNITS,
-    Column,
+    SampleColumn,
     SampleTable,
     enu_velocity,
     unit_factor,
@@ -163,7 +163,7 @@ def read_daa_samples(
 
 def _table(
     path: str | PathLike[str], extra: Sequence[str]
-) -> tuple[SampleTable, dict[str, Column]]:
+) -> tuple[SampleTable, dict[str, SampleColumn]]:
     """Read a file's rows into a table of samples, not checked yet against each other."""
     problems = Problems(str(path))
     lines = read_lines(Path(path), problems)
@@ -180,7 +180,7 @@ def _table(
             notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
             continue
         factor = unit_factor(problems, quantity, token, line=line, header=headers[index])
-        columns[quantity] = Column(index, headers[index], factor)
+        columns[quantity] = SampleColumn(index, headers[index], factor)
     ignored = [
         h
         for i, h in enumerate(headers)

@@ -66,7 +66,7 @@ Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
 
 @dataclass(frozen=True)
-class Column:
+class SampleColumn:
     """A column that is read: its place in the row, its header and its factor to s, m, m/s, deg."""
 
     index: int
@@ -108,7 +108,7 @@ class SampleTable:
         Told about every cell and aircraft that is wrong.
     name_column : int
         Which cell names the aircraft.
-    columns : dict of str to Column
+    columns : dict of str to SampleColumn
         The quantities to read.
     parse_time : callable, optional
         Turns a time cell into seconds where a plain number will not do.
@@ -121,7 +121,7 @@ class SampleTable:
         self,
         problems: Problems,
         name_column: int,
-        columns: dict[str, Column],
+        columns: dict[str, SampleColumn],
         parse_time: Callable[[str], float] | None = None,
         optional: Collection[str] = (),
     ) -> None:
@@ -225,7 +225,7 @@ class SampleTable:
         self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
 
-    def _number(self, line: int, quantity: str, column: Column, cell: str) -> float | None:
+    def _number(self, line: int, quantity: str, column: SampleColumn, cell: str) -> float | None:
         try:
             if quantity == "time" and self._parse_time is not None:
                 value = self._parse_time(cell)
@@ -346,7 +346,7 @@ class SampleTable:
         return trajectory
 
 
-def _number_or_nan(column: Column, cell: str) -> float:
+def _number_or_nan(column: SampleColumn, cell: str) -> float:
     """Read a cell of an optional column; what is no finite number of sense is NaN."""
     try:
         value = math.nan if "_" in cell else float(cell) * column.factor

@@ -12,8 +12,7 @@ from pydantic import Field
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import KnownTraffic
 from components.messages.reach import FarthestLook, farthest_look
-from components.messages.targets import TrafficStates
-from components.messages.true_states import TrueStates
+from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.censored import censored_approaches, present_together_s
 from components.traffic.closest_approach import (
     Approaches,

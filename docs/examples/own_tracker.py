@@ -5,7 +5,7 @@ from pydantic import Field
 
 import dsa_des
 from components.messages import FusedDetections, Tracks
-from components.messages.true_entries import true_entries
+from components.messages.false_detections import true_entries
 from dsa_des.block.wake import Wake
 
 

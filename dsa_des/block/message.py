@@ -4,27 +4,50 @@ A `Message` holds a *batch* of rows in time order: a single row when blocks run 
 when they run in a look-ahead window. Physics written over rows serves both.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.recorded_columns import (
-    RECORDED,
+    PER_ENTRY,
+    PER_ROW,
+    STATIC,
+    Column,
     Columns,
     DerivedColumns,
-    FieldColumns,
     Text,
-    recorded_as,
+    column,
+    columns,
+    columns_of,
+    nothing_in,
+    per_entry,
+    per_row,
+    static,
 )
 
-# How a field of a message depends on its rows.
-PER_ROW = "row"  # first axis is the rows
-PER_ENTRY = "entry"  # first axis is the entries; `offsets[i]:offsets[i + 1]` belong to row i
-STATIC = "static"  # the same for all rows
+__all__ = [
+    "PER_ENTRY",
+    "PER_ROW",
+    "STATIC",
+    "Column",
+    "Columns",
+    "Message",
+    "Text",
+    "by_output",
+    "column",
+    "columns",
+    "columns_of",
+    "derived",
+    "offsets_of",
+    "per_entry",
+    "per_row",
+    "rows_of",
+    "static",
+]
 
 #: Numbers and truth values; no objects, no text.
 _NUMBERS = frozenset("biuf")
@@ -35,68 +58,6 @@ _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...]]] = {}
 _TICK_FIELDS: dict[type, tuple[str, ...]] = {}
 #: What each class records by its fields.
 _DERIVED: dict[type, DerivedColumns] = {}
-
-
-def per_row(
-    *,
-    column: str | None = None,
-    columns: Mapping[str, str] | None = None,
-    name: str = "",
-    value: Callable[[Any], Any] | None = None,
-    in_entries: bool = False,
-    **kwargs: Any,
-) -> Any:
-    """Declare a field whose first axis is the rows (also the default for plain fields).
-
-    Parameters
-    ----------
-    column : {"int64", "float64", "bool", "text"}, optional
-        Record the field as a column of this kind in the class's ``row_table``.
-    columns : mapping, optional
-        For a dict: each column it may hold, and its kind. What it does not hold is null.
-    name : str
-        The column's, where it is not the field's.
-    value : callable, optional
-        Given the message, returns what is recorded, where that is not the field itself; needed
-        for text, which is recorded as `Text`.
-    in_entries : bool
-        Also repeat the column for each entry, in ``entry_table``.
-    **kwargs
-        Passed on to `dataclasses.field`.
-    """
-    how = recorded_as(column, columns, name, value, in_entries)
-    return field(metadata={"per": PER_ROW, **how}, **kwargs)
-
-
-def per_row_tick(**kwargs: Any) -> Any:
-    """Declare a field with an instant per row, in ticks, beside `Message.tick`."""
-    return field(metadata={"per": PER_ROW, "is_tick": True}, **kwargs)
-
-
-def per_entry_tick(*, name: str, **kwargs: Any) -> Any:
-    """Declare a field with an instant per entry, in ticks; recorded as seconds in column `name`."""
-    how = FieldColumns({name: "float64"}, many=False, value=None, in_entries=False, instant=True)
-    return field(metadata={"per": PER_ENTRY, "is_tick": True, RECORDED: how}, **kwargs)
-
-
-def per_entry(
-    *,
-    column: str | None = None,
-    columns: Mapping[str, str] | None = None,
-    name: str = "",
-    value: Callable[[Any], Any] | None = None,
-    **kwargs: Any,
-) -> Any:
-    """Declare a field with a varying number of entries per row; the class must have `offsets`.
-
-    It is recorded in the class's ``entry_table``; for the arguments see `per_row`.
-    """
-    return field(metadata={"per": PER_ENTRY, **recorded_as(column, columns, name, value)}, **kwargs)
-
-
-def static(**kwargs: Any) -> Any:
-    """Declare a field that is the same for all rows."""
-    return field(metadata={"per": STATIC}, **kwargs)
 
 
 def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -133,16 +94,14 @@ def rows_of(columns: Columns, rows: slice) -> Columns:
 def derived(message_type: type) -> DerivedColumns:
     """Return what a message class records by its fields."""
     if message_type not in _DERIVED:
-        _DERIVED[message_type] = DerivedColumns(
-            message_type, lambda metadata: metadata.get("per") == PER_ENTRY
-        )
+        _DERIVED[message_type] = DerivedColumns(message_type, Message)
     return _DERIVED[message_type]
 
 
 class _DerivedRecorded:
     """`Message.recorded` of a class that does not write it itself."""
 
-    def __get__(self, message: Any, owner: type) -> Mapping[str, Mapping[str, str]]:
+    def __get__(self, message: Any, owner: type) -> Mapping[str, Mapping[str, Column]]:
         # `dataclass` asks for it while it makes `Message` itself.
         return derived(owner).recorded if is_dataclass(owner) else {}
 
@@ -160,26 +119,37 @@ class Message:
 
     tick: IntArray
 
-    #: Tables of the columns that fields declare (`per_row`, `per_entry`).
+    #: Tables of the columns that fields declare (`column`, `columns`).
     row_table: ClassVar[str] = ""
     entry_table: ClassVar[str] = ""
 
-    #: What a recorder writes: table → column → "int64", "float64", "bool" or "text".
-    #: Columns block, tick and time_s are added by the engine. It follows from the fields; a class
-    #: whose columns do not writes it, and `tables`, itself.
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = _DerivedRecorded()  # type: ignore[assignment]
+    #: What a recorder writes: table → column → `Column`. Columns block, tick and time_s are added
+    #: by the engine. It follows from the fields; a class whose columns do not writes it, and
+    #: `tables`, itself.
+    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = _DerivedRecorded()  # type: ignore[assignment]
 
     #: Tables that `tables` may hold besides; other types declare them (`Component.also_records`).
     may_hold: ClassVar[frozenset[str]] = frozenset()
 
-    #: Unit, frame and meaning of recorded columns, table → column → texts: metadata of the tables.
-    described: ClassVar[Mapping[str, Mapping[str, tuple[str, str, str]]]] = {}
-
     #: Static fields that may differ between messages: `concatenate` brings them together.
     joins_static: ClassVar[frozenset[str]] = frozenset()
 
+    def __post_init__(self) -> None:
+        """Let columns of entries that were not given be null, and whole numbers 0."""
+        for name, kind in derived(type(self)).optional.items():
+            if getattr(self, name) is None:
+                count = int(self.offsets[-1])  # type: ignore[attr-defined]
+                none = nothing_in(count) if kind == "float64" else np.zeros(count, np.int64)
+                setattr(self, name, none)
+
     def __len__(self) -> int:
         return len(self.tick)
+
+    @classmethod
+    def empty(cls, **others: Any) -> Self:
+        """Return a message of one row, at tick 0, without entries, with `others` as fields."""
+        start, none = np.zeros(1, dtype=np.int64), np.zeros(2, dtype=np.int64)
+        return cls(tick=start, **{"offsets": none, **derived(cls).empty(), **others})
 
     def check(self) -> None:
         """Refuse fields whose first axis is not that of the rows, or of the entries.

@@ -1,13 +1,14 @@
-"""Columns that follow from the fields of a message: declared once, where the field stands.
+"""Fields of messages and the columns they fill, declared once, where the field stands.
 
-A field says which column it fills (``per_entry(column="float64")``). What the class declares to a
-recorder (`recorded`) and what it hands over (`tables`) are derived from that, in the order of the
-fields.
+``azimuth_rad: FloatArray = column("rad", BODY, "measured azimuth")``: the schema of a table, the
+metadata of its columns, the rows that are recorded, an empty message, the filling of what was not
+given and the page of reference follow from that.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from inspect import get_annotations
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,69 +77,170 @@ def is_empty(values: Any) -> bool:
 _NAN = np.full((), np.nan)
 _NAN.flags.writeable = False
 
-#: Key of the metadata of a field that says how it is recorded.
-RECORDED = "recorded"
+# How a field of a message depends on its rows.
+PER_ROW = "row"  # first axis is the rows
+PER_ENTRY = "entry"  # first axis is the entries; `offsets[i]:offsets[i + 1]` belong to row i
+STATIC = "static"  # the same for all rows
+
 _KINDS = ("int64", "float64", "bool", "text")
+_NOTHING = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "text": np.int64}
+#: What a run's `Instants` are counted in where a message does not say.
+_NANOSECONDS = 10**9
 
 
-@dataclass(frozen=True)
-class FieldColumns:
-    """How a field is recorded.
+class Column(NamedTuple):
+    """A recorded column.
 
     Parameters
     ----------
-    kinds : mapping
-        Column → kind; the name "" stands for the field's own.
-    many : bool
-        Whether the field is a dict of columns; those it does not hold are null.
-    value : callable, optional
-        Given the message, returns what is recorded, where that is not the field itself.
-    in_entries : bool
-        Whether a column per row is repeated for each of the row's entries too.
-    instant : bool
-        Whether the field holds ticks, to be recorded as seconds.
+    unit, frame, meaning : str
+        Empty where there is none.
+    kind : {"float64", "int64", "bool", "text"}
     """
 
-    kinds: Mapping[str, str]
-    many: bool
-    value: Callable[[Any], Any] | None
-    in_entries: bool
+    unit: str = ""
+    frame: str = ""
+    meaning: str = ""
+    kind: str = "float64"
+
+
+#: Columns with which every table begins.
+LEADING = {
+    "block": Column("", "", "block that sent the message", "text"),
+    "tick": Column(
+        "ticks", "", "instant, in the scene's ticks (`ticks_per_s` of run.json)", "int64"
+    ),
+    "time_s": Column("s", "", "the same instant since the start of the run"),
+}
+
+
+@dataclass(frozen=True)
+class Filled:
+    """How a field is recorded: as one column, or, a dict, as those of its columns it holds."""
+
+    columns: Mapping[str, Column]
+    many: bool = False
+    value: Callable[[Any], Any] | None = None
+    in_entries: bool = False
+    for_entries: bool = False
     instant: bool = False
 
 
-def recorded_as(
-    column: str | None = None,
-    columns: Mapping[str, str] | None = None,
+def per_row(*, is_tick: bool = False, **kwargs: Any) -> Any:
+    """Declare a field whose first axis is the rows, and which is not recorded.
+
+    Parameters
+    ----------
+    is_tick : bool
+        Whether it holds instants in ticks, beside `Message.tick`.
+    **kwargs
+        Passed on to `dataclasses.field`.
+    """
+    return field(metadata={"per": PER_ROW, "is_tick": is_tick}, **kwargs)
+
+
+def per_entry(**kwargs: Any) -> Any:
+    """Declare a field with a varying number of entries per row, which is not recorded.
+
+    The class must have `offsets`.
+    """
+    return field(metadata={"per": PER_ENTRY}, **kwargs)
+
+
+def static(**kwargs: Any) -> Any:
+    """Declare a field that is the same for all rows."""
+    return field(metadata={"per": STATIC}, **kwargs)
+
+
+def column(
+    unit: str,
+    frame: str,
+    meaning: str,
+    kind: str = "float64",
+    *,
+    of: str = PER_ENTRY,
     name: str = "",
     value: Callable[[Any], Any] | None = None,
     in_entries: bool = False,
-) -> dict[str, FieldColumns]:
-    """Return the metadata of a field that fills a column, or a dict of them; empty for neither.
+    for_entries: bool = False,
+    instant: bool = False,
+    **kwargs: Any,
+) -> Any:
+    """Declare a field that is recorded as a column, of the class's ``entry_table`` by default.
+
+    Parameters
+    ----------
+    unit, frame, meaning, kind
+        As of `Column`.
+    of : {"entry", "row"}
+        What its first axis is; columns of rows go to the class's ``row_table``.
+    name : str
+        The column's, where it is not the field's.
+    value : callable, optional
+        Given the message, returns what is recorded, where that is not the field itself; needed
+        for text, which is recorded as `Text`.
+    in_entries, for_entries : bool
+        A row's value is also recorded with each of its entries, or not, but a `Run` shows it so.
+    instant : bool
+        It holds ticks, which are recorded in seconds.
+    **kwargs
+        Passed on to `dataclasses.field`. Numbers with ``default=None`` that are not given are NaN,
+        in every entry.
 
     Raises
     ------
     ValueError
-        If a column is of no kind that can be recorded, or a field has both.
+        If the column is of no kind that can be recorded.
     """
-    if column is not None and columns is not None:
-        raise ValueError("a field fills one column or several: give column or columns")
-    kinds = {name: column} if column is not None else dict(columns or {})
-    for kind in kinds.values():
-        if kind not in _KINDS:
-            raise ValueError(f"column is {kind!r}: it must be one of {', '.join(_KINDS)}")
-    if not kinds:
-        return {}
-    return {RECORDED: FieldColumns(kinds, columns is not None, value, in_entries)}
+    filled = {name: Column(unit, frame, meaning, _known(kind))}
+    how = Filled(filled, False, value, in_entries, for_entries, instant)
+    return field(metadata={"per": of, "is_tick": instant, _RECORDED: how}, **kwargs)
 
 
-class DerivedColumns:
-    """What one message class records by its fields.
+def columns(
+    recorded: Mapping[str, Column],
+    *,
+    of: str = PER_ENTRY,
+    value: Callable[[Any], Any] | None = None,
+    for_entries: bool = False,
+    **kwargs: Any,
+) -> Any:
+    """Declare a field that is a dict of arrays; what it does not hold of the columns is null.
 
     Parameters
     ----------
-    message_type : type of Message
-    is_entry : callable
-        Whether a field, by its metadata, has entries.
+    recorded : mapping of Column
+        All that it may hold.
+    of, value, for_entries, **kwargs
+        As for `column`.
+    """
+    for one in recorded.values():
+        _known(one.kind)
+    how = Filled(dict(recorded), True, value, False, for_entries)
+    return field(metadata={"per": of, _RECORDED: how}, **kwargs)
+
+
+def columns_of(group: type) -> dict[str, Column]:
+    """Return what the fields of a group of columns, a dataclass, are recorded as."""
+    found: dict[str, Column] = {}
+    for item in fields(group):
+        how: Filled = item.metadata[_RECORDED]
+        found.update(zip(_names(item.name, how), how.columns.values(), strict=True))
+    return found
+
+
+def _known(kind: str) -> str:
+    if kind not in _KINDS:
+        raise ValueError(f"column is {kind!r}: it must be one of {', '.join(_KINDS)}")
+    return kind
+
+
+#: Key of the metadata of a field that says how it is recorded.
+_RECORDED = "recorded"
+
+
+class DerivedColumns:
+    """What one message class records by its fields; those of its mix-ins come last.
 
     Raises
     ------
@@ -146,36 +248,65 @@ class DerivedColumns:
         If a field fills a column of a table that the class does not name, or two fill one column.
     """
 
-    def __init__(self, message_type: Any, is_entry: Callable[[Mapping[str, Any]], bool]) -> None:
-        self.recorded: dict[str, dict[str, str]] = {}
-        self._rows: list[_Filled] = []
-        self._entries: list[_Filled] = []
-        for item in fields(message_type):
-            how = item.metadata.get(RECORDED)
-            if how is None:
-                continue
-            filled = _Filled(item.name, how)
-            if is_entry(item.metadata):
-                self._add(message_type, "entry_table", self._entries, filled)
-                continue
-            self._add(message_type, "row_table", self._rows, filled)
-            if how.in_entries:
-                self._add(message_type, "entry_table", self._entries, filled)
+    def __init__(self, message_type: Any, base: type) -> None:
+        self._type = message_type
+        #: Table → column.
+        self.recorded: dict[str, dict[str, Column]] = {}
+        #: By column of the table of rows, the table of entries to which it belongs as well.
+        self.for_entries: dict[str, str] = {}
+        #: Fields of entries that need not be given, and their kinds.
+        self.optional: dict[str, str] = {}
+        self._rows: list[tuple[str, Filled]] = []
+        self._entries: list[tuple[str, Filled]] = []
         self._row_table: str = message_type.row_table
         self._entry_table: str = message_type.entry_table
+        self._fields = {item.name: item for item in fields(message_type)}
+        names = [name for name in _in_order(message_type, base) if name in self._fields]
+        if not issubclass(message_type.__mro__[1], base):
+            # What only some fill comes behind what the mix-ins have.
+            names.sort(key=lambda name: _is_many(self._fields[name]))
+        for name in names:
+            item = self._fields[name]
+            how: Filled | None = item.metadata.get(_RECORDED)
+            if how is None:
+                continue
+            if item.metadata["per"] == PER_ENTRY:
+                self._add("entry_table", self._entries, name, how)
+                if item.default is None and not (how.many or how.instant):
+                    self.optional[name] = next(iter(how.columns.values())).kind
+                continue
+            self._add("row_table", self._rows, name, how)
+            if how.in_entries:
+                self._add("entry_table", self._entries, name, how)
+            if how.for_entries:
+                self.for_entries.update(dict.fromkeys(_names(name, how), self._entry_table))
 
-    def _add(self, owner: Any, which: str, filled: "list[_Filled]", new: "_Filled") -> None:
-        table = getattr(owner, which)
+    def _add(
+        self, which: str, filled: list[tuple[str, Filled]], field_name: str, how: Filled
+    ) -> None:
+        owner = self._type.__qualname__
+        table = getattr(self._type, which)
         if not table:
-            raise TypeError(
-                f"{owner.__qualname__}.{new.field} fills a column, but the class names no {which}"
-            )
-        columns = self.recorded.setdefault(table, {})
-        for name, kind in new.kinds.items():
-            if name in columns:
-                raise TypeError(f"{owner.__qualname__} has two fields for column {name!r}")
-            columns[name] = kind
-        filled.append(new)
+            raise TypeError(f"{owner}.{field_name} fills a column, but the class names no {which}")
+        known = self.recorded.setdefault(table, {})
+        for name, one in zip(_names(field_name, how), how.columns.values(), strict=True):
+            if name in known:
+                raise TypeError(f"{owner} has two fields for column {name!r}")
+            known[name] = one
+        filled.append((field_name, how))
+
+    def empty(self) -> dict[str, Any]:
+        """Return fields of entries by name, without any entry."""
+        made: dict[str, Any] = {}
+        for name, item in self._fields.items():
+            how: Filled | None = item.metadata.get(_RECORDED)
+            if how is None or item.metadata["per"] != PER_ENTRY:
+                continue
+            none: dict[str, Any] = {
+                key: np.empty(0, _NOTHING[one.kind]) for key, one in how.columns.items()
+            }
+            made[name] = none if how.many else next(iter(none.values()))
+        return made
 
     def tables(self, message: Any) -> dict[str, Columns]:
         """Return the rows to record of a message.
@@ -190,48 +321,60 @@ class DerivedColumns:
             tables[self._row_table] = self._filled(message, self._rows, {"tick": message.tick})
         if self._entries:
             counts = np.diff(message.offsets)
-            columns: Columns = {"tick": np.repeat(message.tick, counts)}
-            tables[self._entry_table] = self._filled(message, self._entries, columns, counts)
+            made: Columns = {"tick": np.repeat(message.tick, counts)}
+            tables[self._entry_table] = self._filled(message, self._entries, made, counts)
         return tables
 
     def _filled(
         self,
         message: Any,
-        filled: "list[_Filled]",
-        columns: Columns,
+        filled: list[tuple[str, Filled]],
+        made: Columns,
         counts: IntArray | None = None,
     ) -> Columns:
         dicts = []
-        for item in filled:
-            if item.many:  # after the others, whose names they may not take
-                dicts.append(item)
+        for name, how in filled:
+            if how.many:  # after the others, whose names they may not take
+                dicts.append((name, how))
                 continue
-            values = getattr(message, item.field) if item.value is None else item.value(message)
-            if item.instant:
-                values = Instants(values, getattr(message, "ticks_per_s", 10**9))
-            if item.in_entries and counts is not None:
+            values = getattr(message, name) if how.value is None else how.value(message)
+            if values is None:
+                continue
+            if how.instant:
+                values = Instants(values, getattr(message, "ticks_per_s", _NANOSECONDS))
+            if how.in_entries and counts is not None:
                 values = _repeated(values, counts)
-            columns[item.name] = values
-        for item in dicts:
-            held = getattr(message, item.field) if item.value is None else item.value(message)
-            if not columns.keys().isdisjoint(held):
-                twice = sorted(columns.keys() & held.keys())[0]
+            made[_names(name, how)[0]] = values
+        for name, how in dicts:
+            held = getattr(message, name) if how.value is None else how.value(message)
+            if not held:
+                continue
+            if not made.keys().isdisjoint(held):
+                twice = sorted(made.keys() & held.keys())[0]
                 raise ValueError(
-                    f"{type(message).__name__}.{item.field} holds {twice!r}, which is a column "
+                    f"{type(message).__name__}.{name} holds {twice!r}, which is a column "
                     "of another field: give it a name of its own"
                 )
-            columns.update(held)
-        return columns
+            made.update(held)
+        return made
 
 
-class _Filled:
-    """A field and the columns it fills."""
+def _names(field_name: str, how: Filled) -> list[str]:
+    return [name or field_name for name in how.columns]
 
-    def __init__(self, field_name: str, how: FieldColumns) -> None:
-        self.field, self.many, self.in_entries = field_name, how.many, how.in_entries
-        self.kinds = {name or field_name: kind for name, kind in how.kinds.items()}
-        self.name = next(iter(self.kinds))
-        self.value, self.instant = how.value, how.instant
+
+def _is_many(item: Any) -> bool:
+    how: Filled | None = item.metadata.get(_RECORDED)
+    return how is not None and how.many and item.metadata["per"] == PER_ENTRY
+
+
+def _in_order(message_type: type, base: type) -> Iterator[str]:
+    """Yield the names of a class: those of messages, the oldest first, then its mix-ins'."""
+    kinds = [kind for kind in message_type.__mro__ if hasattr(kind, "__dataclass_fields__")]
+    messages = [kind for kind in reversed(kinds) if issubclass(kind, base)]
+    mixed = [kind for kind in kinds if not issubclass(kind, base)]
+    of_kinds = (get_annotations(kind) for kind in (*messages, *mixed))
+    yield from dict.fromkeys(name for names in of_kinds for name in names)
 
 
 def _repeated(values: Any, counts: IntArray) -> Any:

@@ -3,14 +3,19 @@
 import base64
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from dsa_des.block.message import Message
+from dsa_des.block.message import Column, Message, derived
+from dsa_des.block.recorded_columns import LEADING
 from dsa_des.record.version import __version__
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+
+#: Metadata of a column: the table to whose rows its values belong, joined by block and tick.
+OF_ROWS = b"of_rows"
 
 
 @dataclass(frozen=True)
@@ -22,24 +27,27 @@ class Notes:
     run : mapping
         ``dsa_des_version``, ``seed``, ``scene_sha256`` (as in run.json) and ``ticks_per_s``.
     meanings : mapping
-        Table → column → (unit, frame, meaning), as messages describe them; empty texts are left
-        out.
+        Table → column, as messages declare them; empty texts are left out.
+    rows_of : mapping
+        Table → column → the table whose rows it belongs to as well.
     """
 
     run: Mapping[str, str]
-    meanings: Mapping[str, Mapping[str, tuple[str, str, str]]]
+    meanings: Mapping[str, Mapping[str, Column]]
+    rows_of: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def schema(self, table: str, schema: "pa.Schema") -> "pa.Schema":
         """Return the schema of a table with metadata of the run, and of each column."""
         import pyarrow as pa
 
-        described = self.meanings.get(table, {})
-        names = ("unit", "frame", "meaning")
+        described, rows_of = self.meanings.get(table, {}), self.rows_of.get(table, {})
         fields = []
-        for field in schema:
-            known = zip(names, described.get(field.name, ("", "", "")), strict=True)
-            said = {name: text for name, text in known if text}
-            fields.append(field.with_metadata(said) if said else field)
+        for item in schema:
+            unit, frame, meaning, _ = described.get(item.name, Column())
+            known = {"unit": unit, "frame": frame, "meaning": meaning}
+            known[OF_ROWS.decode()] = rows_of.get(item.name, "")
+            said = {name: text for name, text in known.items() if text}
+            fields.append(item.with_metadata(said) if said else item)
         return pa.schema(fields, metadata={"table": table, **self.run})
 
     def of_file(self, table: str, schema: "pa.Schema") -> dict[str, str]:
@@ -76,14 +84,16 @@ def notes_of(
         The resolved scene.
     seed, ticks_per_s : int
     """
-    meanings: dict[str, dict[str, tuple[str, str, str]]] = {}
+    meanings: dict[str, dict[str, Column]] = {}
+    rows_of: dict[str, dict[str, str]] = {}
     for message in messages:
-        for table, described in message.described.items():
-            meanings.setdefault(table, {}).update(described)
+        for table, columns in message.recorded.items():
+            meanings.setdefault(table, dict(LEADING)).update(columns)
+        rows_of.setdefault(message.row_table, {}).update(derived(message).for_entries)
     run = {
         "dsa_des_version": __version__,
         "seed": str(seed),
         "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
         "ticks_per_s": str(ticks_per_s),
     }
-    return Notes(run, meanings)
+    return Notes(run, meanings, rows_of)

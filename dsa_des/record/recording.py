@@ -12,7 +12,15 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
-from dsa_des.block.recorded_columns import Columns, Instants, Schema, Text, is_empty, nothing_in
+from dsa_des.block.recorded_columns import (
+    LEADING,
+    Columns,
+    Instants,
+    Schema,
+    Text,
+    is_empty,
+    nothing_in,
+)
 from dsa_des.record.attempts import attempt
 from dsa_des.record.declared_columns import DeclaredColumns
 from dsa_des.time.run_ends import RunEnds
@@ -20,7 +28,7 @@ from dsa_des.time.timeline import own_scans
 
 # So many rows, or pieces of them, are handed on at a time: a few would cost as much.
 _ROWS_AT_ONCE, _PIECES_AT_ONCE = 16_384, 2048
-_LEADING: Schema = {"block": "text", "tick": "int64", "time_s": "float64"}
+_LEADING: Schema = {name: column.kind for name, column in LEADING.items()}
 
 
 class Sink(Protocol):
@@ -93,8 +101,9 @@ class Recorder:
         self._span_ticks = span_ticks
         leading = {"replica": "int64", **_LEADING} if span_ticks else _LEADING
         for message in messages:
-            for table, schema in message.recorded.items():
-                self._schemas.setdefault(table, dict(leading)).update(schema)
+            for table, columns in message.recorded.items():
+                kinds = {name: column.kind for name, column in columns.items()}
+                self._schemas.setdefault(table, dict(leading)).update(kinds)
         self._declared = DeclaredColumns(self._schemas, leading)
         if self._wanted is not None:
             self._schemas = {

@@ -6,17 +6,19 @@ A run folder holds ``scene.toml`` (resolved), one Parquet file per table (``dete
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+from dsa_des.arrays.types import IntArray
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.manifest import RUN_JSON, with_files
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_names import new_folder_name
+from dsa_des.record.notes import OF_ROWS
 from dsa_des.record.picture import PictureFile, pictures_in
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shortened
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["RUN_JSON", "Run", "new_folder_name", "read_run", "write_json", "write_run_json"]
 
 
+# By these, rows of two tables belong together.
+_KEYS = {"block", "tick"}
 # Of what a run is shown as in Python.
 _WIDTH, _MOST_LINES = 84, 6
 
@@ -48,7 +52,8 @@ def write_run_json(folder: Path, content: dict[str, Any]) -> None:
 class Run:
     """A run, kept in memory or read back from its folder.
 
-    ``run["detections"]`` or ``run.detections`` is a ``pyarrow.Table``.
+    ``run["detections"]`` or ``run.detections`` is a ``pyarrow.Table``, with the columns of other
+    tables that belong to its rows: those of ``scans`` that say where the ownship was.
 
     Parameters
     ----------
@@ -58,7 +63,7 @@ class Run:
         The content of ``run.json``: seed, versions, resolution, scene hash, counts, summary, and
         ``files``, every file of the folder with a digest.
     tables : dict
-        Table name → ``pyarrow.Table``.
+        Table name → ``pyarrow.Table``, as it is recorded.
     scene : str
         The resolved scene, as TOML text.
     draw : callable
@@ -74,12 +79,12 @@ class Run:
     def __getitem__(self, table: str) -> "pa.Table":
         if table not in self.tables:
             raise KeyError(f"the run has no table {table!r}; it has {', '.join(self.tables)}")
-        return self.tables[table]
+        return with_columns_of_rows(self.tables, table)
 
     def __getattr__(self, table: str) -> "pa.Table":
         if table.startswith("__") or table not in self.__dict__.get("tables", {}):
             raise AttributeError(table)
-        return self.tables[table]
+        return self[table]
 
     def __dir__(self) -> list[str]:
         return sorted([*super().__dir__(), *self.tables])
@@ -119,6 +124,52 @@ class Run:
             hint = did_you_mean(name, self.figures)
             raise UsageError(f"the run has no figure {name!r}{hint}")
         return self.figures[name]
+
+
+def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Table":
+    """Return a table with the columns of other tables that belong to its rows (`OF_ROWS`).
+
+    They are joined by block, tick and replica; where the table has such a column itself, what
+    stands in it comes first.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    table = tables[name]
+    for other in tables.values():
+        wanted = [f for f in other.schema if (f.metadata or {}).get(OF_ROWS) == name.encode()]
+        if not wanted or not {*table.column_names} & {*other.column_names} >= _KEYS:
+            continue
+        row = _rows_of(table, other)
+        rows = pa.array(row, mask=row < 0)
+        for item in wanted:
+            values = other[item.name].take(rows)
+            if item.name in table.column_names:
+                place = table.column_names.index(item.name)
+                values = pc.coalesce(table[item.name], values)
+                table = table.set_column(place, item.remove_metadata(), values)
+            else:
+                table = table.append_column(item.remove_metadata(), values)
+    return table
+
+
+def _rows_of(table: "pa.Table", other: "pa.Table") -> IntArray:
+    """Return the row of another table with the block, tick and replica of each row; -1 for none."""
+    import numpy as np
+
+    count = len(table)
+    keys = np.zeros(count + len(other), dtype=np.int64)
+    for name in ("replica", "tick", "block"):
+        if name in other.column_names:
+            both = np.concatenate([part[name].to_numpy() for part in (table, other)])
+            values, place = np.unique(both, return_inverse=True)
+            keys = keys * len(values) + place
+    mine, theirs = keys[:count], keys[count:]
+    if not len(theirs):
+        return np.full(count, -1, dtype=np.int64)
+    order = np.argsort(theirs, kind="stable")
+    found = order[np.minimum(np.searchsorted(theirs[order], mine), len(theirs) - 1)]
+    return np.where(theirs[found] == mine, found, -1)
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:

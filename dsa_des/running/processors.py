@@ -15,7 +15,7 @@ import numpy as np
 import simpy
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.message import Columns, Message, Text, static
+from dsa_des.block.message import Column, Columns, Message, Text, static
 from dsa_des.running.events import Bell, WakeUp
 from dsa_des.scene.processor import ProcessorParameters
 from dsa_des.time.clock import nanosecond_of
@@ -45,14 +45,16 @@ class Processing(Message):
         Index into ``done``, ``dropped``, ``skipped``.
     """
 
-    recorded: ClassVar[Mapping[str, Mapping[str, str]]] = {
+    recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
         "processing": {
-            "processor": "text",
-            "entered_s": "float64",
-            "started_s": "float64",
-            "age_s": "float64",
-            "queue_length": "int64",
-            "outcome": "text",
+            "processor": Column("", "", "shared processor", "text"),
+            "entered_s": Column("s", "", "when the message came to the processor"),
+            "started_s": Column("s", "", "when work on it began; null if never"),
+            "age_s": Column("s", "", "from when it was handed in to its delivery"),
+            "queue_length": Column(
+                "messages", "", "messages that waited behind it at its outcome", "int64"
+            ),
+            "outcome": Column("", "", "whether it was done, dropped or skipped", "text"),
         }
     }
 

@@ -12,7 +12,7 @@ from components.evidence.benchmark.other_trackers import (
 )
 from components.evidence.benchmark.plain_tracker import track_plainly
 from components.evidence.benchmark.track_updates import LOOKS, heard
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():

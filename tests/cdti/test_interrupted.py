@@ -30,7 +30,7 @@ def test_what_was_decided_is_kept_when_the_run_is_stopped(tmp_path, monkeypatch)
     loaded = dsa_des.load_scene(session.out / "scene.toml", duration_s=info["duration_s"])
     again = dsa_des.run(loaded)
     for name in ("truth", "detections", "decisions"):
-        assert again[name].equals(pq.read_table(session.out / f"{name}.parquet")), name
+        assert again.tables[name].equals(pq.read_table(session.out / f"{name}.parquet")), name
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

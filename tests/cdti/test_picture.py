@@ -9,11 +9,9 @@ from matplotlib.path import Path as Outline
 
 import dsa_des
 from components.aircraft.aircraft import VisibleAreas
-from components.cdti.camera_picture import silhouette
-from components.cdti.contacts import Contacts, contacts_of_lines
-from components.cdti.lost_area import lost_area
-from components.cdti.own_flight import OwnFlight
-from components.cdti.scope import Scope
+from components.cdti.camera import silhouette
+from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines
+from components.cdti.scope import Scope, lost_area
 from components.messages.tracks import Tracks
 from components.optical.convex_hull import union_area
 from components.well_clear.violation import violates
@@ -81,8 +79,9 @@ def test_a_range_is_held_for_a_while_along_the_new_direction():
 
     def after(tick):
         tracks = Tracks(
-            np.array([tick]), np.array([0, 2]), np.array([3, 4]), np.array([math.pi / 2, 0.0]),
-            np.zeros(2), np.full(2, np.nan), np.zeros(2), np.zeros(2, dtype=int), None, ("eo",),
+            np.array([tick]), np.array([0, 2]), np.array([3, 4]), np.zeros(2),
+            np.zeros(2, dtype=int), None, ("eo",), azimuth_rad=np.array([math.pi / 2, 0.0]),
+            elevation_rad=np.zeros(2), range_m=np.full(2, np.nan),
         )  # fmt: skip
         return contacts_of_lines(tracks, own, 1, before)
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from dsa_des.block.component import ClockedParameters, Component, Parameters
-from dsa_des.block.message import Message, per_entry, static
+from dsa_des.block.message import PER_ROW, Message, column, per_entry, static
 from dsa_des.block.ports import Input, Output
 
 
@@ -21,21 +21,11 @@ from dsa_des.block.ports import Input, Output
 class Beat(Message):
     """One number per row."""
 
-    recorded = {"beats": {"scan": "int64", "value": "float64", "seen": "int64"}}
+    row_table = "beats"
 
-    value: np.ndarray
-    scan: np.ndarray
-    seen: np.ndarray
-
-    def tables(self):
-        return {
-            "beats": {
-                "tick": self.tick,
-                "scan": self.scan,
-                "value": self.value,
-                "seen": self.seen,
-            }
-        }
+    value: np.ndarray = column("", "", "what is sent", of=PER_ROW)
+    scan: np.ndarray = column("", "", "number of the scan", "int64", of=PER_ROW)
+    seen: np.ndarray = column("", "", "how many were seen", "int64", of=PER_ROW)
 
     @classmethod
     def initial(cls, values):

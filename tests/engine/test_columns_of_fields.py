@@ -9,24 +9,35 @@ from components.messages.detections import EXTRAS, Detections
 from components.messages.fused import FusedDetections
 from components.messages.steering import Manoeuvres
 from components.messages.tracks import Tracks
-from dsa_des.block.message import Message, Text, per_entry, per_row, static
+from dsa_des.block.message import (
+    PER_ROW,
+    Column,
+    Message,
+    Text,
+    column,
+    columns,
+    columns_of,
+    per_row,
+    static,
+)
 
-# As files of earlier versions have them; whoever reads one by position must not be surprised.
+# As files have them; whoever reads one by position must not be surprised.
 COLUMNS = {
     "scans": "scan evaluated detected skipped_absent skipped_off skipped_field_of_view "
-    "skipped_range skipped_hidden skipped_culled",
-    "detections": "scan target azimuth_rad elevation_rad range_m confidence true_azimuth_rad "
-    "true_elevation_rad true_range_m snr_db detection_probability pixels declared illuminated_s "
-    "ned_azimuth_rad ned_elevation_rad own_lat_deg own_lon_deg own_alt_m "
-    "own_heading_rad own_pitch_rad own_roll_rad "
+    "skipped_range skipped_hidden skipped_culled "
+    "own_lat_deg own_lon_deg own_alt_m own_heading_rad own_pitch_rad own_roll_rad "
+    "own_velocity_north_m_s own_velocity_east_m_s own_velocity_down_m_s",
+    "detections": "scan target confidence azimuth_rad elevation_rad range_m true_azimuth_rad "
+    "true_elevation_rad true_range_m "
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2 "
-    "own_velocity_north_m_s own_velocity_east_m_s own_velocity_down_m_s cued",
-    "fused": "target sensors azimuth_rad elevation_rad range_m angle_source range_source "
-    "true_azimuth_rad true_elevation_rad true_range_m measured_s "
+    "snr_db detection_probability pixels declared illuminated_s "
+    "ned_azimuth_rad ned_elevation_rad cued",
+    "fused": "target sensors angle_source range_source measured_s azimuth_rad elevation_rad "
+    "range_m true_azimuth_rad true_elevation_rad true_range_m "
     "range_rate_m_s azimuth_variance_rad2 elevation_variance_rad2 range_variance_m2 "
     "range_rate_variance_m2_s2",
-    "tracks": "target azimuth_rad elevation_rad range_m age_s updated_by measured_s",
+    "tracks": "target age_s updated_by measured_s azimuth_rad elevation_rad range_m",
     "manoeuvres": "turn_rad rate_rad_s climb_m climb_rate_mps speed_mps acceleration_mps2 "
     "vertical_speed_mps vertical_acceleration_mps2",
 }
@@ -41,14 +52,16 @@ class Catch(Message):
     row_table = "hauls"
     entry_table = "fish"
 
-    haul: np.ndarray = per_row(column="int64", name="number", in_entries=True)
-    crew: np.ndarray = per_row(
-        column="text", in_entries=True, value=lambda m: Text(m.crew, m.names)
+    haul: np.ndarray = column(
+        "", "", "its number", "int64", of=PER_ROW, name="number", in_entries=True
+    )
+    crew: np.ndarray = column(
+        "", "", "who", "text", of=PER_ROW, in_entries=True, value=lambda m: Text(m.crew, m.names)
     )
     note: np.ndarray = per_row()
     offsets: np.ndarray = per_row()
-    mass_kg: np.ndarray = per_entry(column="float64")
-    extras: dict = per_entry(columns={"age_years": "float64", "marked": "bool"})
+    mass_kg: np.ndarray = column("kg", "", "its weight")
+    extras: dict = columns({"age_years": Column("years"), "marked": Column(kind="bool")})
     names: tuple = static()
 
 
@@ -67,9 +80,10 @@ def catch(**extras):
 
 @pytest.mark.parametrize("message", [Detections, FusedDetections, Tracks, Manoeuvres])
 def test_tables_have_the_columns_they_always_had(message):
-    for table, columns in message.recorded.items():
-        assert " ".join(columns) == COLUMNS[table]
-        for name, kind in columns.items():
+    for table, found in message.recorded.items():
+        assert " ".join(found) == COLUMNS[table]
+        for name, (_, _, meaning, kind) in found.items():
+            assert meaning
             expected = next((k for k, names in KINDS.items() if name in names), "float64")
             if name.startswith("skipped_"):
                 expected = "int64"
@@ -78,13 +92,16 @@ def test_tables_have_the_columns_they_always_had(message):
 
 def test_columns_follow_from_fields():
     assert Catch.recorded == {
-        "hauls": {"number": "int64", "crew": "text"},
+        "hauls": {
+            "number": Column("", "", "its number", "int64"),
+            "crew": Column("", "", "who", "text"),
+        },
         "fish": {
-            "number": "int64",
-            "crew": "text",
-            "mass_kg": "float64",
-            "age_years": "float64",
-            "marked": "bool",
+            "number": Column("", "", "its number", "int64"),
+            "crew": Column("", "", "who", "text"),
+            "mass_kg": Column("kg", "", "its weight"),
+            "age_years": Column("years"),
+            "marked": Column(kind="bool"),
         },
     }
     assert Message.recorded == {} and Message(np.array([1])).tables() == {}
@@ -104,7 +121,7 @@ def test_rows_are_repeated_for_their_entries():
 def test_a_subclass_declares_more():
     @dataclass(eq=False)
     class Measured(Catch):
-        extras: dict = per_entry(columns={"length_m": "float64"})
+        extras: dict = columns({"length_m": Column("m")})
 
     assert list(Measured.recorded["fish"]) == ["number", "crew", "mass_kg", "length_m"]
     assert "age_years" in Catch.recorded["fish"]
@@ -118,20 +135,20 @@ def test_a_dict_cannot_take_the_place_of_another_fields_column():
 def test_a_column_without_a_table_or_twice_is_refused():
     @dataclass(eq=False)
     class Homeless(Message):
-        size: np.ndarray = per_row(column="float64")
+        size: np.ndarray = column("m", "", "", of=PER_ROW)
 
     @dataclass(eq=False)
     class Twice(Message):
         row_table = "sizes"
-        size: np.ndarray = per_row(column="float64")
-        other: np.ndarray = per_row(column="float64", name="size")
+        size: np.ndarray = column("m", "", "", of=PER_ROW)
+        other: np.ndarray = column("m", "", "", of=PER_ROW, name="size")
 
     with pytest.raises(TypeError, match=r"Homeless\.size .* no row_table"):
         _ = Homeless.recorded
     with pytest.raises(TypeError, match="two fields for column 'size'"):
         _ = Twice.recorded
     with pytest.raises(ValueError, match=r"'float32'.*float64"):
-        per_row(column="float32")
+        column("", "", "", "float32")
 
 
 def test_the_extras_of_detections_are_columns_of_theirs():
@@ -149,3 +166,25 @@ def test_what_a_wire_held_first_may_lack_columns_that_real_messages_have():
         np.testing.assert_array_equal(joined.extras["marked"][place], [True, False, True])
         assert joined.extras["marked"].dtype == bool and len(joined.note) == 6
         assert np.isnan(joined.extras["age_years"]).sum() == 3
+
+
+def test_groups_of_columns_come_behind_a_class_s_own_and_before_dicts():
+    @dataclass(eq=False, kw_only=True)
+    class Size:
+        length_m: np.ndarray = column("m", "", "its length")
+        width_m: np.ndarray = column("m", "", "its width", default=None)
+
+    @dataclass(eq=False)
+    class Sized(Size, Message):
+        entry_table = "sizes"
+        offsets: np.ndarray = per_row()
+        more: dict = columns({"depth_m": Column("m")})
+        number: np.ndarray = column("", "", "its number", "int64", default=None, kw_only=True)
+
+    assert list(Sized.recorded["sizes"]) == ["number", "length_m", "width_m", "depth_m"]
+    assert columns_of(Size)["length_m"] == Column("m", "", "its length")
+    made = Sized(np.array([5]), np.array([0, 2]), {}, length_m=np.array([1.0, 2.0]))
+    assert np.isnan(made.width_m).all() and made.number.tolist() == [0, 0]
+    empty = Sized.empty()
+    assert len(empty.length_m) == len(empty.number) == 0 and empty.offsets.tolist() == [0, 0]
+    assert empty.number.dtype == np.int64 and empty.more["depth_m"].dtype == np.float64

@@ -149,9 +149,9 @@ def test_a_beam_goes_on_from_the_instant_of_the_picture(tmp_path, delay_s):
 def test_what_the_ownship_believes_is_of_the_instant_of_the_picture(tmp_path):
     """White noise is keyed by the instant of the states: the late row brings its own."""
     head = "[navigation]\nposition_noise_m = [5, 5, 5]"
-    here = run(scene(tmp_path, head=head))["detections"].to_pydict()
+    here = run(scene(tmp_path, head=head))["scans"].to_pydict()
     late = run(scene(tmp_path, {("gate", "radar"): ', delay = "1 scan"'}, head=head))
-    assert late["detections"].to_pydict()["own_lat_deg"] == here["own_lat_deg"][:-1]
+    assert late["scans"].to_pydict()["own_lat_deg"] == here["own_lat_deg"][:-1]
 
 
 def test_a_tracker_is_updated_when_the_measurement_has_come(tmp_path):

@@ -10,7 +10,7 @@ from engine_blocks import Beat, Pulse
 from components.messages.detections import EXTRAS, Detections
 from components.radar.threshold_radar import ThresholdRadar
 from components.sensor.look import Look
-from dsa_des.block.message import per_entry
+from dsa_des.block.message import Column, columns
 from dsa_des.block.ports import Output
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import ColumnSink, Recorder
@@ -104,8 +104,9 @@ class CloudyRadar(ThresholdRadar):
 class CloudyDetections(Detections):
     """Detections with a column of their own."""
 
-    extras: dict = per_entry(
-        columns={**EXTRAS, "cloud_share": "float64"}, value=lambda message: message.extra_columns()
+    extras: dict = columns(
+        {**EXTRAS, "cloud_share": Column("", "", "of the cell")},
+        value=lambda message: message.extra_columns(),
     )
 
 

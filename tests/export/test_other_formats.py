@@ -19,10 +19,10 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 import dsa_des
+from components.display.recorded_run import RecordedTables
 from components.export.command import export
+from components.export.exported import daa_text
 from components.export.globe import czml_text, kml_text
-from components.export.recorded import RecordedTables
-from components.export.traffic import daa_text
 from components.traffic.daa_file import read_daa
 from components.view.command import view
 from tests.view.test_page import SCENE
@@ -217,7 +217,7 @@ def test_daa_holds_every_row_in_its_units():
         ("kml", "truth", "lat_deg", math.inf, "lat_deg in row 0 is inf"),
         ("daa", "truth", "time_s", "x", "time_s holds no numbers"),
         ("czml", "truth", "lon_deg", None, "there is no column 'lon_deg'"),
-        ("kml", "detections", "own_roll_rad", None, "there is no column 'own_roll_rad'"),
+        ("kml", "scans", "own_roll_rad", None, "there is no column 'own_roll_rad'"),
         ("kml", "detections", "time_s", 1e300, "detections.parquet: time_s in row 0 is 1e+300"),
         ("view", "truth", "lat_deg", None, "truth.parquet: there is no column 'lat_deg'"),
         ("view", "detections", "azimuth_rad", "x", "its tables are not those of a run"),

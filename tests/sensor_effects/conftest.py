@@ -4,7 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.run_folder import with_columns_of_rows
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -81,6 +83,13 @@ def scene(configs, tmp_path):
     return write
 
 
+class Made(SimpleNamespace):
+    """What a run made; `made["detections"]` has the ownship's pose, as a `Run` has it."""
+
+    def __getitem__(self, table):
+        return with_columns_of_rows(self.tables, table)
+
+
 class Runs:
     """Run scenes and look at what was recorded."""
 
@@ -89,13 +98,15 @@ class Runs:
         memory = MemorySink()
         simulation = Simulation(load_scene(path), recorder=Recorder([memory]), **options)
         outcome = simulation.run()
-        return SimpleNamespace(
-            tables=memory.tables(), plan=simulation.plan, simulation=simulation, outcome=outcome
-        )
+        notes = notes_of(simulation.recorded_messages(), "", 1, simulation.ticks_per_s)
+        return Made(
+            tables=notes.on(memory.tables()), plan=simulation.plan, simulation=simulation,
+            outcome=outcome,
+        )  # fmt: skip
 
     @staticmethod
     def detections(run, block):
-        rows = [row for row in run.tables["detections"].to_pylist() if row["block"] == block]
+        rows = [row for row in run["detections"].to_pylist() if row["block"] == block]
         return {(row["scan"], row["target"]): row for row in rows}
 
     @staticmethod

@@ -130,11 +130,12 @@ def without_poses(one):
     """A run of a stranger's sensor, which tells no pose."""
     import pyarrow as pa
 
-    table = one["detections"]
+    table = one["scans"]
     for place, name in enumerate(table.column_names):
         if name.startswith("own_"):
-            table = table.set_column(place, name, pa.nulls(len(table), pa.float64()))
-    return replace(one, tables={**one.tables, "detections": table})
+            none = table.schema.field(name).with_type(pa.float64())
+            table = table.set_column(place, none, pa.nulls(len(table), pa.float64()))
+    return replace(one, tables={**one.tables, "scans": table})
 
 
 def test_what_has_no_errors_or_poses_is_refused(tmp_path):

@@ -25,6 +25,7 @@ MOST_FILES = 12
 COMMON_WORDS = {
     "target",  # the receiving end of a wire
     "scan", "scans", "offsets",  # what a clock counts, and how entries belong to rows
+    "columns",  # what tables have, and messages about targets
     "skipped",  # what becomes of a message at a busy processor
     "confidence",  # of an interval
     "pixels",  # a unit

@@ -12,8 +12,7 @@ from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.estimated_flights import EstimatedFlights
 from components.alerting.memory import MemoryRule
 from components.alerting.track_memory import TrackMemory
-from components.messages.columns import COVARIANCE
-from components.messages.state_tracks import COASTED, CONFIRMED, TENTATIVE, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, TENTATIVE, StateTracks
 
 SIGMA_M = 25.0
 #: A short lookahead, over which an error of a vertical speed does not grow far.

@@ -170,7 +170,7 @@ def test_a_wrong_belief_moves_no_ground():
 def test_windows_change_nothing():
     radar = sensor("radar.threshold", **RADAR, **OFTEN, clutter_threshold="noise")
     scene = chain({"r": radar}, terrain=TERRAIN, duration_s=0.5)
-    whole = run(scene)["detections"]
+    whole = run(scene).tables["detections"]
     memory = MemorySink()
     Simulation(dsa_des.load_scene(scene), recorder=Recorder([memory]), window=1).run()
     assert memory.tables()["detections"].equals(whole)

@@ -28,11 +28,17 @@ def test_tracks_of_the_first_command_are_as_sure_as_they_are_right():
     [
         [f"blocks.{name}.errors='signal'" for name in ("radar", "eo", "ir")],
         ["navigation.attitude_noise_deg=[0.1,0.1,0.1]", "navigation.position_noise_m=[3,3,5]"],
+        ["navigation.position_noise_m=[3,3,5]", "navigation.position_correlation_time_s=0"],
+        ["navigation.position_noise_m=[10,10,15]", "navigation.position_correlation_time_s=2"],
     ],
-    ids=["glint", "navigation"],
+    ids=["glint", "navigation", "white place", "place of two seconds"],
 )
 def test_neither_glint_nor_navigation_is_averaged_away(sets):
-    """Taken for new at every look: 8.2 and 46. One track for each target, whatever errs."""
+    """Taken for new at every look: 8.2 and 46. One track for each target, whatever errs.
+
+    A camera knows no range, so how much of a direction is the ownship's place is the tracker's to
+    say: unsaid, two targets were eleven tracks.
+    """
     scene = dsa_des.load_scene("first_light", sets=[*FIRST_COMMAND, *sets])
     result = dsa_des.study(scene, metrics=["tracking"], replicas=2, workers=1)
     found = {row["result"]: row["value"] for row in result.summary.to_pylist()}

@@ -9,7 +9,7 @@ import pytest
 from covering import covers
 from scipy.special import gammaincc
 from scipy.stats import gamma, kstest, ncx2, norm
-from wired import HEARS_ALL, chain, decided, rows, run
+from wired import HEARS_ALL, chain, decided, run
 
 import dsa_des
 from components.radar.detection import detection_probability
@@ -134,7 +134,7 @@ def test_windows_and_replicas_together_change_nothing(lasts):
     together.run()
     assert not together.timeline.split  # one radar serves all replicas
     for number, alone in enumerate(scenes):
-        expected = rows(dsa_des.run(alone))
+        expected = dsa_des.run(alone).tables["detections"].to_pylist()
         mine = [row for row in sink.tables()["detections"].to_pylist() if row["replica"] == number]
         assert [{k: row[k] for k in expected[0]} for row in mine] == expected != []
 

@@ -67,12 +67,33 @@ def test_what_is_stated_of_it_is_that_of_the_scene_s_aircraft(kind):
             assert row["range_variance_m2"] == pytest.approx(0.04 * level2, rel=1e-3)
         else:
             pixel = math.radians(360.0) / 36000.0
-            solid = 4.0 / math.pi * row["pixels"] * pixel**2
-            width2 = 0.04 * solid * math.sqrt(level2 / upward2)
-            height2 = 0.04 * solid * math.sqrt(upward2 / level2)
+            share = row["pixels"] * pixel**2 / (math.pi + 2.0 / math.pi * 20.0)
+            width2, height2 = 0.04 * share * level2, 0.04 * share * upward2
         level = math.cos(row["elevation_rad"])
         assert row["azimuth_variance_rad2"] == pytest.approx(width2 / level**2, rel=1e-3)
         assert row["elevation_variance_rad2"] == pytest.approx(height2, rel=1e-3)
+
+
+# The pixels of a line, optical.projection, are of no area.
+@pytest.mark.parametrize("kind", ["optical.eo", "optical.ir"])
+def test_a_camera_s_directions_err_by_what_it_states(kind):
+    """Of level aircraft seen from all sides, by mean squares; a wing is wide, and no large area."""
+    own = {**OWN, "pitch_deg": 0.0, "roll_deg": 0.0}
+    level = {"pitch_deg": 0.0, "roll_deg": 0.0, "east_m": 0.0, "up_m": 0.0}
+    targets = [
+        {**TARGET, **level, "name": f"t{turn}", "north_m": 700.0 + 20.0 * turn, "yaw_deg": 7 + turn}
+        for turn in range(0, 360, 15)
+    ]
+    block = sensor(kind, errors="signal", quantised=False, scan_rate_hz=5, **EXACT[kind],
+                   glint_share=0.2, glint_correlation_time_s=0.01)  # fmt: skip
+    found = rows(run(chain({"sensor": block}, ownship=own, targets=targets, duration_s=100)))
+    assert len(found) == 500 * len(targets)
+    for name in ("azimuth", "elevation"):
+        range2 = np.array([row["true_range_m"] ** 2 for row in found])
+        wrong = np.array([row[f"{name}_rad"] - row[f"true_{name}_rad"] for row in found])
+        wrong = (wrong + math.pi) % (2.0 * math.pi) - math.pi
+        stated = np.array([row[f"{name}_variance_rad2"] for row in found])
+        assert np.mean(stated * range2) == pytest.approx(np.mean(wrong**2 * range2), rel=0.1)
 
 
 @covers("glint_correlation_time_s", of=(*LINK_BUDGETS, *CAMERAS))

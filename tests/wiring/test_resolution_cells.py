@@ -68,7 +68,7 @@ def test_two_targets_in_one_cell_are_one_report_of_the_stronger(kind):
 def test_windows_do_not_matter(kind):
     radar = sensor(kind, scan_rate_hz=5, resolution_cells=True, **CELL)
     scene = chain({"radar": radar}, targets=TARGETS, duration_s=3)
-    whole = run(scene)["detections"]
+    whole = run(scene).tables["detections"]
     memory = MemorySink()
     Simulation(dsa_des.load_scene(scene), recorder=Recorder([memory]), window=1).run()
     assert memory.tables()["detections"].equals(whole)

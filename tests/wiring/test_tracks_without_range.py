@@ -7,7 +7,7 @@ import pytest
 from wired import chain, rows, run
 
 import dsa_des
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of

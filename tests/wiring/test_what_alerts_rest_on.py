@@ -13,7 +13,7 @@ from wired import rows, run
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.estimated_flights import EstimatedFlights
-from components.messages.columns import COVARIANCE
+from components.messages.state_tracks import COVARIANCE
 from components.well_clear.uncertainty import Bounds, uncertain_violation_span
 from components.well_clear.volume import Volume
 

@@ -48,9 +48,11 @@ def _shown(target: str) -> str:
 
 _WITHOUT_ROW = (
     "",
-    "Without a row: Table 2.1 (strengths and weaknesses in words) and the CDTI's pictures (Fig. "
-    "4.15 and 4.16) print no number; PaRCA's range errors (40 %, about 10 % after its manoeuvres) "
-    "need passive ranging, which the project does not have: its cameras measure no range.",
+    "Without a row: Table 2.1 (strengths and weaknesses in words), the CDTI's pictures (Fig. 2.1, "
+    "4.15 and 4.16), the flight tests' ranges by geometry (Fig. 4.1, a plot), a block diagram and "
+    "silhouettes (Fig. 4.6 and 4.7) print no number; PaRCA's range errors (40 %, about 10 % after "
+    "its manoeuvres) need passive ranging, which the project does not have: its cameras measure "
+    "no range.",
 )
 _COLOURS = (BLUE, ORANGE, GREEN, SKY, GREY, "#CC79A7")
 

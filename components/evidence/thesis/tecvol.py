@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.wrapping import wrap_by_sines
 from dsa_des.arrays.types import FloatArray
 from dsa_des.running.simulation import Simulation
+
+_PLACE = ("own_lat_deg", "own_lon_deg", "own_alt_m")
 
 REPLICAS = 100
 _EDGES_KM = np.arange(0.0, 10.5, 1.0)
@@ -112,11 +115,10 @@ def make() -> tuple[list[Row], Picture, Columns]:
 
 def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     """Return the errors of what a sensor reports, the ownship flying level to the north."""
-    parts = [run.rows("detections", block=name) for run in runs]
+    parts = [_with_place(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
             for key in ("time_s", "ned_azimuth_rad", "ned_elevation_rad", "true_azimuth_rad",
-                        "true_elevation_rad", "true_range_m", "range_m", "own_lat_deg",
-                        "own_lon_deg", "own_alt_m")}  # fmt: skip
+                        "true_elevation_rad", "true_range_m", "range_m", *_PLACE)}  # fmt: skip
     turned = seen["ned_azimuth_rad"] - seen["true_azimuth_rad"]
     return Errors(
         range_km=seen["true_range_m"] / 1000.0,
@@ -124,6 +126,13 @@ def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
         elevation_deg=np.degrees(seen["ned_elevation_rad"] - seen["true_elevation_rad"]),
         east_m=_east_error_m(flights, seen),
     )
+
+
+def _with_place(run: Recording, name: str) -> dict[str, Any]:
+    """Return what a sensor detected, and where the ownship believed to be then."""
+    found, scans = run.rows("detections", block=name), run.rows("scans", block=name)
+    row = np.searchsorted(scans["tick"], found["tick"])
+    return {**found, **{key: scans[key][row] for key in _PLACE}}
 
 
 def _east_error_m(flights: Flights, seen: dict[str, FloatArray]) -> FloatArray:
