@@ -28,7 +28,8 @@ from components.optical.range_boundary import OpticalRangeBoundary as CameraBoun
 from components.radar.range_boundary import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.running.simulation import Simulation

@@ -5,7 +5,8 @@ import pytest
 from components.evidence.benchmark.pairs import PAIRS, measured
 from components.evidence.benchmark.rates import RATES
 from components.evidence.benchmark.rates import measured as measured_rate
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 FORMS = {pair.name: pair.forms(pair.case, False) for pair in PAIRS}

@@ -4,7 +4,8 @@ import pytest
 
 from components.evidence.benchmark import yardstick
 from components.evidence.benchmark.cases import CASES, replicas_of, scene_of
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 SHORT = {

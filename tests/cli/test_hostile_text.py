@@ -15,11 +15,10 @@ import pytest
 from click.testing import CliRunner, Result
 from pydantic import BaseModel
 
-from dsa_des.block.registry import find
-from dsa_des.block.sections import section_models
+from dsa_des.block.registry import find, section_models
 from dsa_des.cli import main
-from dsa_des.files.toml_text import to_toml
-from dsa_des.scene.options import BlockOptions
+from dsa_des.files.toml_files import to_toml
+from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import load_scene
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
@@ -227,7 +226,7 @@ def test_progress_bars_show_titles_as_they_are() -> None:
     from rich.progress import Progress
 
     from dsa_des.terminal import terminal
-    from dsa_des.terminal.safe_console import SafeConsole
+    from dsa_des.terminal.terminal import SafeConsole
 
     bar: Progress = terminal.progress("text")
     stream = io.StringIO()

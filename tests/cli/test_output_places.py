@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
-from dsa_des.files.unfinished import PREFIX
+from dsa_des.files.output_file import PREFIX
 from dsa_des.running import recorded_run as run_module
 
 
@@ -159,7 +159,7 @@ def test_a_folder_that_is_removed_in_mid_run_is_one_error(
         for folder in Path("a/b").glob(f"{PREFIX}*") if what != "all folders" else [Path("a")]:
             shutil.rmtree(folder)
 
-    monkeypatch.setattr("dsa_des.record.recording.ObserverSink.close", remove)
+    monkeypatch.setattr("dsa_des.record.sinks.ObserverSink.close", remove)
     result = call("run", first_light, "--duration", 1, "--quiet", "--out", "a/b/run")
     assert result.exit_code == 1
     assert result.stderr.splitlines() == [

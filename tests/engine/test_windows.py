@@ -8,7 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.simulation import Simulation

@@ -159,8 +159,9 @@ def _simulate(argv: list[str]) -> None:
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
         from dsa_des.commands.loading import load
-        from dsa_des.files.toml_text import to_toml
-        from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
+        from dsa_des.files.toml_files import to_toml
+        from dsa_des.record.recording import Recorder
+        from dsa_des.record.sinks import MemorySink, ObserverSink
         from dsa_des.running.long_run import say_if_long
         from dsa_des.running.reports import load_reports
         from dsa_des.running.simulation import Simulation

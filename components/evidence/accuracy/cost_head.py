@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 

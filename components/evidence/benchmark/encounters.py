@@ -10,7 +10,8 @@ from typing import Any
 from components.evidence.benchmark.cases import SCENES, replicas_of, scene_of
 from components.evidence.benchmark.cases import chosen as chosen_cases
 from components.examples import folder
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Failed, run_replicas

@@ -14,7 +14,7 @@ from typing import Any
 
 from components.evidence.benchmark.cases import CASES, replicas_of, scene_of
 from components.evidence.benchmark.measure import engine_run, peak_mb, pin
-from dsa_des.record.recording import MemorySink
+from dsa_des.record.sinks import MemorySink
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_json

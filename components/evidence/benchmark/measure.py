@@ -18,7 +18,8 @@ from typing import Any
 
 from components.evidence.benchmark import yardstick
 from components.evidence.benchmark.cases import BenchmarkCase, chosen, replicas_of, scene_of
-from dsa_des.record.recording import MemorySink, Recorder, Sink
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink, Sink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene

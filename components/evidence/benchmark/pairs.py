@@ -14,7 +14,7 @@ from typing import Any
 from components.evidence.benchmark.cases import CLOCKED, chosen, scene_of
 from components.evidence.benchmark.measure import engine_run, pin
 from components.examples import folder
-from dsa_des.record.recording import MemorySink
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal.terminal import say_json

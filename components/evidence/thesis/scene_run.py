@@ -12,7 +12,8 @@ from components.evidence.thesis.project_files import configs
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import UsageError
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.running.simulation import Simulation

@@ -14,7 +14,7 @@ from typing import Any
 from dsa_des.terminal.interruption import Terminated
 
 
-def is_ours_to_obey(error: BaseException) -> bool:
+def must_pass(error: BaseException) -> bool:
     """Return whether an exception is no stranger's error but means that we have to stop.
 
     Ctrl-C, and whatever this package raises itself to leave (in a handler of a signal, say).
@@ -35,7 +35,7 @@ def raised_in(trace: TracebackType | None) -> str:
     return name
 
 
-def told(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return what an exception says, with its kind: ``SystemExit: 0``."""
     try:
         text = str(error)
@@ -44,13 +44,13 @@ def told(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-class Left(Exception):
+class ForeignFailure(Exception):
     """A stranger's code raised something; the message says what, `__cause__` is that."""
 
 
 @contextmanager
-def strangers_code(*expected: type[Exception]) -> Iterator[None]:
-    """Turn whatever is raised inside, ctrl-C by the user excepted, into `Left`.
+def foreign_code(*expected: type[Exception]) -> Iterator[None]:
+    """Turn whatever is raised inside, ctrl-C by the user excepted, into `ForeignFailure`.
 
     The exception itself is its ``__cause__``. Those `expected` pass.
     """
@@ -58,14 +58,14 @@ def strangers_code(*expected: type[Exception]) -> Iterator[None]:
         try:
             yield
         except BaseException as error:
-            if isinstance(error, (Left, Terminated, *expected)):
+            if isinstance(error, (ForeignFailure, Terminated, *expected)):
                 raise
             pressed = isinstance(error, KeyboardInterrupt) and interrupted()
             if pressed or isinstance(error, GeneratorExit):
                 raise
-            if not isinstance(error, KeyboardInterrupt) and is_ours_to_obey(error):
+            if not isinstance(error, KeyboardInterrupt) and must_pass(error):
                 raise
-            raise Left(told(error)) from error
+            raise ForeignFailure(error_text(error)) from error
 
 
 @contextmanager
