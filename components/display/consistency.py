@@ -9,7 +9,7 @@ from components.display.drawn_tracks import DrawnTracks, errors_squared
 from components.display.tracks import colour_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.drawing import drawing, plain_log_ticks, tight
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 _MOST_POINTS = 2000
 _LOWEST, _HIGHEST = 0.02, 1000.0

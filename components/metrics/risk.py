@@ -2,10 +2,10 @@
 
 Every encounter is run without avoidance (*nominal*) and with it (*mitigated*), on the same random
 numbers, and has a weight that says how often it happens in the airspace. The numbers are those of
-`dsa_des.studies.ratio`, under the field's names.
+`dsa_des.results.ratio`, under the field's names.
 """
 
-from dsa_des.studies.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
+from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 
 __all__ = ["METHODS", "RiskRatio", "risk_ratio", "risk_ratios_by_class"]
 

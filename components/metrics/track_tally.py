@@ -9,7 +9,7 @@ import numpy as np
 
 from components.metrics.set_distances import assigned, set_distance
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 _AXES = ("north", "east", "down")
 _SETS = (

@@ -23,21 +23,23 @@ from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_wh
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
+from dsa_des.results.curves import draw_scatter
+from dsa_des.results.figures import safe_name
+from dsa_des.results.folder import STUDY_JSON, StudyFolder
+from dsa_des.results.labels import short
+from dsa_des.results.printing import interval_text, times
+from dsa_des.results.record import StudyRecord
+from dsa_des.results.rows import paired_units
+from dsa_des.results.statistics import difference
+from dsa_des.results.tables import Tables
 from dsa_des.scene.chosen_file import chosen_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.studies.figures import draw_scatter
-from dsa_des.studies.folder import STUDY_JSON, StudyFolder
-from dsa_des.studies.identity import record_of
-from dsa_des.studies.labels import short
+from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.output import Tables, safe_name
-from dsa_des.studies.printing import interval_text, times
-from dsa_des.studies.record import StudyRecord, results_of
-from dsa_des.studies.statistics import difference
+from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import MetricSpec, Study
 from dsa_des.studies.study_file import read_study, study_of_scene
-from dsa_des.studies.summary import paired_units
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import shortened
@@ -75,7 +77,7 @@ def compare_command(
     studies = [_study_at(path, replicas) for path in files]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
-        known_results(record.results_list(), results)
+        known_results(record.results, results)
     by_place: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
@@ -190,7 +192,7 @@ def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: P
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
     folder = run_into(study, target, workers, resume=False, again=lambda _: _ANEW)
-    return Tables(study, folder)
+    return tables_of(study, folder)
 
 
 def _shown(tables: Tables, only: Sequence[str]) -> list[str]:

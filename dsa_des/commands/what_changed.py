@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.studies.labels import short, unit_of
-from dsa_des.studies.metric import EVENT, Result
-from dsa_des.studies.output import Tables
+from dsa_des.results.labels import short, unit_of
+from dsa_des.results.record import EVENT, Result
+from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened
 

@@ -6,7 +6,6 @@ gives never depends on who ran it.
 """
 
 import math
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -17,14 +16,13 @@ from dsa_des.block.class_text import sourced
 from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.errors import Problem
 from dsa_des.replicas.changed_scene import Replica
+from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
 from dsa_des.scene.overrides import set_value, swap_type
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.draws import Draw, as_text, replica_seed
+from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, find_metric
-from dsa_des.studies.requirements import Requirement
-from dsa_des.studies.sample import member_seed
 from dsa_des.studies.study_tables import existing_file
 
 
@@ -54,15 +52,6 @@ class MetricSpec:
                 return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
         except Left as error:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
-
-
-@dataclass(frozen=True)
-class StopWhen:
-    """When a cell has enough replicas: half-width of a result's confidence interval."""
-
-    metric: str
-    half_width: float
-    batch: int
 
 
 @dataclass(frozen=True)
@@ -140,7 +129,7 @@ class Study:
     stop_when : StopWhen or None
     confidence : float
     interval : {"t", "bootstrap"}
-    figures : tuple of dict
+    figures : tuple of FigureRecord
     requirements : tuple of Requirement
     compare_weight : str, optional
         The result that weighs units where events are compared.
@@ -166,7 +155,7 @@ class Study:
     stop_when: StopWhen | None
     confidence: float
     interval: str
-    figures: tuple[dict[str, Any], ...]
+    figures: tuple[FigureRecord, ...]
     runs_per_chunk: int
     base: SceneFile
     tables: dict[str, Any]
@@ -250,21 +239,6 @@ class Study:
                     runs, room, number = [], self.runs_per_chunk, number + 1
         if runs:
             yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs))
-
-
-def run_command(
-    scene: str,
-    seed: int,
-    swaps: Iterable[tuple[str, str]],
-    sets: Iterable[tuple[str, str]],
-) -> str:
-    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
-    words = ["dsa-des", "run", scene, "--seed", str(seed)]
-    for block, name in swaps:
-        words += ["--swap", f"{block}={name}"]
-    for key, value in sets:
-        words += ["--set", f"{key}={value}"]
-    return shlex.join(words)
 
 
 def set_text(value: Any) -> str:

@@ -14,6 +14,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
+from dsa_des.results.record import StopWhen
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.overrides import apply_set
 from dsa_des.scene.parameter_errors import explain
@@ -21,12 +22,16 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import Key, SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, parse_draw
-from dsa_des.studies.figure_tables import read_figures
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.requirements import read_requirements
-from dsa_des.studies.study import MetricSpec, StopWhen, Study, changed_scene
+from dsa_des.studies.study import MetricSpec, Study, changed_scene
 from dsa_des.studies.study_checks import cell_problems
-from dsa_des.studies.study_tables import flat_draws, flat_values, resolved
+from dsa_des.studies.study_tables import (
+    flat_draws,
+    flat_values,
+    read_figures,
+    read_requirements,
+    resolved,
+)
 
 KEYS = (
     "title", "description", "scene", "set", "swap", "seed", "replicas", "axes", "draws", "metrics",

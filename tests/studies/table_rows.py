@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from dsa_des.studies.summary import Rows
+from dsa_des.results.rows import Rows
 
 
 class _Table:
-    """As `dsa_des.studies.stored_rows.StoredRows`, of a table."""
+    """As `dsa_des.results.rows.StoredRows`, of a table."""
 
     def __init__(self, table: pa.Table) -> None:
         self.status = Counter(table["status"].to_pylist())

@@ -7,10 +7,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from dsa_des.results.record import EVENT, NUMBER, SHARE, TRIALS, Result
+from dsa_des.results.rows import paired_units
+from dsa_des.results.statistics import Estimate, difference, mean, share
+from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.draws import parse_draw
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, TRIALS, Result
-from dsa_des.studies.statistics import Estimate, difference, mean, share
-from dsa_des.studies.summary import compare_axis, paired_units, summarise
 from tests.studies.table_rows import rows_of_table
 
 #: Chance alone moves a coverage of 95 % over so many rounds by 0.5 % (two standard deviations: 1).

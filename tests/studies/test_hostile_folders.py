@@ -11,9 +11,9 @@ from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
 from dsa_des.files.output_names import claim_folder
-from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.folder_names import latest_folder
-from dsa_des.studies.output import safe_name
+from dsa_des.results.figures import safe_name
+from dsa_des.results.folder import StudyFolder, latest_folder
+from dsa_des.studies.identity import description_text
 from dsa_des.studies.study_file import read_study
 
 STUDY = """
@@ -130,7 +130,7 @@ def test_folders_behind_links_are_refused(ready: Path) -> None:
     assert "something other than a study" in error
     Path("new/run-cell-0-replica-0").unlink()
     folder = StudyFolder(Path("new"))
-    folder.open(read_study("study.toml"), resume=False)
+    folder.open(description_text(read_study("study.toml")), resume=False)
     folder.close()
     Path("new/run-cell-0-replica-0").symlink_to(outside)
     error = dsa_des(*words[:5], "new", "--quiet", "--resume", code=2).stderr
@@ -226,7 +226,7 @@ def test_a_malformed_study_json_is_one_error(ready: Path, name: str) -> None:
 def test_temporary_files_of_a_running_study_are_left_alone(ready: Path) -> None:
     study = read_study("study.toml")
     running = StudyFolder(Path("o"))
-    running.open(study, resume=True)
+    running.open(description_text(study), resume=True)
     left = Path("o/parts/.part-000-000000.parquet.7.0")
     left.write_bytes(b"half")
     words = ("study", "study.toml", "--workers", "1", "--out", "o", "--quiet", "--resume")

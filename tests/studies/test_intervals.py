@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.studies import statistics
-from dsa_des.studies.labels import axis_label, readable, unit_of, value_label
+from dsa_des.results import statistics
+from dsa_des.results.labels import axis_label, readable, unit_of, value_label
 
 
 @pytest.mark.parametrize(

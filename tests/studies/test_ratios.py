@@ -6,9 +6,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.studies.metric import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
-from dsa_des.studies.ratio import paired_ratio
-from dsa_des.studies.summary import Rows, compare_axis, summarise
+from dsa_des.results.ratio import paired_ratio
+from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
+from dsa_des.results.rows import Rows
+from dsa_des.results.summary import compare_axis, summarise
 from tests.studies.table_rows import rows_of_table
 
 FLAGS = [

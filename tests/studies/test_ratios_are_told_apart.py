@@ -6,10 +6,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.studies.metric import RATIO, RatioOf, Result
-from dsa_des.studies.ratio import paired_ratio
+from dsa_des.results.ratio import paired_ratio
+from dsa_des.results.record import RATIO, RatioOf, Result
+from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.study_file import read_study
-from dsa_des.studies.summary import compare_axis, summarise
 from tests.studies.table_rows import rows_of_table
 from tests.studies.test_ratios import ratio, rows_of
 from tests.studies.test_requirements import ROOT, STUDY

@@ -9,13 +9,11 @@ from click.testing import CliRunner
 
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.studies import output
-from dsa_des.studies.cheapest import answers, one_sided
-from dsa_des.studies.metric import NUMBER, Result
-from dsa_des.studies.requirements import Requirement
-from dsa_des.studies.statistics import Estimate
+from dsa_des.results import figures
+from dsa_des.results.record import NUMBER, Requirement, Result
+from dsa_des.results.statistics import Estimate
+from dsa_des.results.summary import Line, answers, one_sided
 from dsa_des.studies.study_file import read_study
-from dsa_des.studies.summary import Line
 
 ROOT = Path(__file__).parents[2]
 RESULT = Result("risk", NUMBER, "")
@@ -114,8 +112,8 @@ def test_what_is_wrong_is_said(old: str, new: str, said: str, tmp_path: Path) ->
 def test_a_study_draws_its_map_and_tells_the_cheapest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn, draw = [], output.draw_map
-    monkeypatch.setattr(output, "draw_map", lambda *given: drawn.append(given) or draw(*given))
+    drawn, draw = [], figures.draw_map
+    monkeypatch.setattr(figures, "draw_map", lambda *given: drawn.append(given) or draw(*given))
     text = STUDY.replace("SCENE", str(ROOT / "configs" / "first_light.toml"))
     across, up = "blocks.eo.scan_rate_hz", "blocks.radar.scan_rate_hz"
     text = text.replace('kind = "map"\n', f'kind = "map"\nx = "{across}"\ny = "{up}"\n')
@@ -129,8 +127,8 @@ def test_a_study_draws_its_map_and_tells_the_cheapest(
     found = pq.read_table(tmp_path / "out" / "requirements.parquet").to_pylist()
     assert [row["others"] for row in found] == [f"eo.scan_rate_hz = {k}" for k in (1, 3)] * 2
     (map_,) = drawn
-    assert map_[2:5] == ("detection_share.radar", "eo.scan_rate_hz", "radar.scan_rate_hz")
-    assert (list(map_[5]), map_[7]) == ([0.2, 0.9], 0.95)
+    assert map_[3:6] == ("detection_share.radar", "eo.scan_rate_hz", "radar.scan_rate_hz")
+    assert (list(map_[6]), map_[8]) == ([0.2, 0.9], 0.95)
     summary = pq.read_table(tmp_path / "out" / "summary.parquet").to_pylist()
     for number, (row, eo) in enumerate(zip(found, (1.0, 3.0) * 2, strict=True)):
         mine = [r for r in summary if r["result"] == "detection_share.radar"]

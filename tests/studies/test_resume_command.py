@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from dsa_des.cli import main
-from dsa_des.studies.folder import StudyFolder
+from dsa_des.results.folder import StudyFolder
 
 STUDY = """
 scene = "small.toml"

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from dsa_des.studies.draws import identity, member_seed
 from dsa_des.studies.identity import description
-from dsa_des.studies.sample import identity, member_seed
 from dsa_des.studies.study_file import read_study
 from tests.studies.encounter_folder import rows_of, write_encounter, write_scene, write_study
 

@@ -9,11 +9,11 @@ from click.testing import CliRunner
 from scipy.stats import chi2
 
 from dsa_des.cli import main
-from dsa_des.studies import series_figure
-from dsa_des.studies.output import Tables
-from dsa_des.studies.series_figure import draw_series, of_series
-from dsa_des.studies.statistics import Estimate
-from dsa_des.studies.summary import Line
+from dsa_des.results import curves
+from dsa_des.results.curves import draw_series
+from dsa_des.results.statistics import Estimate
+from dsa_des.results.summary import Line, of_series
+from dsa_des.results.tables import Tables
 
 
 def test_a_series_is_what_bears_a_number_in_its_order():
@@ -35,7 +35,7 @@ def test_bounds_are_those_of_the_mean_of_as_many_runs():
     """Of one run and of 60: quantiles of chi-square with 6 and with 360 degrees."""
     lines = [Line((), None, Estimate(6.0, 5.0, 7.0, n, False), 0, None) for n in (1, 60, 0)]
     axes = Axes()
-    series_figure._bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
+    curves._bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
     for k, n in enumerate((1, 60)):
         np.testing.assert_allclose([axes.low[k], axes.high[k]], chi2.ppf([0.025, 0.975], 6 * n) / n)
     assert np.isnan(axes.low[2]) and axes.middle == 6.0

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.studies.distribution_figures import _edges
+from dsa_des.results.curves import _edges
 
 STUDY = """
 scene = "small.toml"

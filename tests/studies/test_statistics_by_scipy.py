@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dsa_des.studies.statistics import FEW, difference, mean, share
+from dsa_des.results.statistics import FEW, difference, mean, share
 
 RNG = np.random.default_rng(4)
 NORMAL = RNG.normal(3.0, 2.0, 24)

@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.studies import stored_rows
-from dsa_des.studies.stored_rows import StoredRows
+from dsa_des.results import rows as rows_of_parts
+from dsa_des.results.rows import StoredRows
 
 
 class _Folder:
@@ -44,7 +44,7 @@ class _Folder:
 
 @pytest.mark.parametrize("room", [1, 4 * 8 * 160, 2**20])
 def test_columns_are_those_of_the_table(room: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stored_rows, "_MOST_BYTES", room)
+    monkeypatch.setattr(rows_of_parts, "_MOST_HELD_BYTES", room)
     folder = _Folder()
     rows = StoredRows(folder)  # type: ignore[arg-type]
     whole = pa.concat_tables(folder.parts).sort_by(
@@ -62,7 +62,7 @@ def test_columns_are_those_of_the_table(room: int, monkeypatch: pytest.MonkeyPat
     assert rows.status == {"done": good.num_rows, "failed": 160 - good.num_rows}
     assert rows.first == whole.slice(0, 1).to_pylist()[0]
     bad = whole.filter(whole["error"].is_valid()).to_pylist()
-    assert rows.failed == bad[: stored_rows.MOST_FAILED] and len(bad) > stored_rows.MOST_FAILED
+    assert rows.failed == bad[: rows_of_parts.MOST_FAILED] and len(bad) > rows_of_parts.MOST_FAILED
     assert len(folder.read) == 1 or room < 2**20
 
 

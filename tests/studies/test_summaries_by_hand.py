@@ -5,8 +5,8 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from dsa_des.studies.metric import NUMBER, SHARE, TRIALS, Result
-from dsa_des.studies.summary import compare_axis
+from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
+from dsa_des.results.summary import compare_axis
 from tests.studies.table_rows import rows_of_table
 
 

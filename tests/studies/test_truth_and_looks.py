@@ -8,7 +8,8 @@ import pytest
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.studies.metric import NUMBER, Metric, Result
+from dsa_des.results.record import NUMBER, Result
+from dsa_des.studies.metric import Metric
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "wiring"))
 from wired import chain, sensor

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from components.metrics.set_distances import set_distance
 from components.metrics.track_tally import changes
-from dsa_des.studies.statistics import chi_square_bounds
+from dsa_des.results.statistics import chi_square_bounds
 
 
 def enumerated(distance, cutoff, order):

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dsa_des.studies.cheapest import Answer, one_sided
-from dsa_des.studies.labels import short
-from dsa_des.studies.output import Tables, cut_off_text
-from dsa_des.studies.statistics import Estimate
-from dsa_des.studies.summary import Compared, Line
+from dsa_des.results.labels import short
+from dsa_des.results.statistics import Estimate
+from dsa_des.results.summary import Answer, Compared, Line, one_sided
+from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shortened
 

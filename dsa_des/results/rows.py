@@ -1,51 +1,156 @@
-"""From the rows of a study to its tables: one line per cell and result, and paired differences.
+"""The rows of a study's parts, read part by part, and how they fall into places and units.
 
 Where a study runs over a sample of encounters (`over`), the encounters are the independent units
-and a cell of the summary joins all of them; otherwise the replicas are.
+and a place of the summary joins all of them; otherwise the replicas are.
 """
 
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.studies.chunk import CRASHED
-from dsa_des.studies.metric import CLASS, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
-from dsa_des.studies.ratio import PairedRatio, influences, paired_ratio
-from dsa_des.studies.statistics import (
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
+from dsa_des.results.record import CRASHED, EVENT, FRACTION, RATIO, SHARE, TRIALS, Result
+from dsa_des.results.statistics import (
     Estimate,
     EstimatedDifference,
-    difference,
     fraction,
     mean,
     normal_error,
     share,
     symmetric,
 )
-from dsa_des.studies.stored_rows import StoredRows
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from dsa_des.results.folder import StudyFolder
+
+
+#: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
+_MOST_HELD_BYTES = 2**27
+
+
+#: Of rows without result, the first ones are told.
+MOST_FAILED = 50
+
+
+_PLACE = ("cell", "replica")
+
+
+#: Columns that stand in no statistics.
+_ABOUT = ("status", "error", "command")
+
+
+class StoredRows:
+    """The rows with a result, in order of cell and replica, and what became of the others.
+
+    Parameters
+    ----------
+    folder : StudyFolder
+        With results.
+    before_round : int, optional
+        Only those of earlier rounds.
+
+    Raises
+    ------
+    UsageError
+        If there are none, or if a part is damaged or of another study.
+    """
+
+    def __init__(self, folder: "StudyFolder", before_round: int | None = None) -> None:
+        self._folder, self._before_round = folder, before_round
+        schema = folder.record.schema_of_parts()
+        self.names = [field.name for field in schema if field.name not in _ABOUT]
+        #: Status → how many runs ended in it.
+        self.status: Counter[str] = Counter()
+        #: The first rows without result, and the first row of all, as column → value.
+        self.failed: list[dict[str, Any]] = []
+        self.first: dict[str, Any] = {}
+        self._order: IntArray | None = None
+        self._held: OrderedDict[str, AnyArray] = OrderedDict()
+        rows = max(1, folder.record.cells * folder.record.replicas)
+        self._at_once = max(3, _MOST_HELD_BYTES // (8 * rows))
+        others = [name for name in self.names if name not in _PLACE]
+        self._read([*_PLACE, *others[: self._at_once - len(_PLACE)]], look=True)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def column(self, name: str) -> AnyArray:
+        """Return a column; missing numbers are NaN, missing texts None."""
+        if name not in self._held:
+            place = self.names.index(name)
+            others = [n for n in self.names[place:] if n not in self._held]
+            self._read(others[: self._at_once], look=False)
+        self._held.move_to_end(name)
+        return self._held[name]
+
+    def _read(self, names: Sequence[str], *, look: bool) -> None:
+        """Read columns of all parts; `look` also at what became of the runs."""
+        while self._held and len(self._held) + len(names) > self._at_once:
+            self._held.popitem(last=False)
+        columns = None if look else [*names, "error"]
+        pieces: dict[str, list[Any]] = {name: [] for name in names}
+        for table in self._folder.each_part(self._before_round, columns):
+            good = np.asarray(table["error"].is_null())
+            if look:
+                self._look(table, good)
+            kept = table if good.all() else table.filter(good)
+            for name, found in pieces.items():
+                found.append(_codes(kept[name].combine_chunks()))
+        if look:
+            cell, replica = (_joined(pieces[name]) for name in _PLACE)
+            self._count = len(cell)
+            later = (np.diff(cell) > 0) | ((np.diff(cell) == 0) & (np.diff(replica) > 0))
+            self._order = None if later.all() else np.lexsort((replica, cell))
+        for name in names:
+            column = _joined(pieces.pop(name))
+            self._held[name] = column if self._order is None else column[self._order]
+
+    def _look(self, table: "pa.Table", good: BoolArray) -> None:
+        self.status.update(table["status"].to_pylist())
+        places = table.select(_PLACE).to_pydict()
+        least = min(range(table.num_rows), key=lambda k: tuple(places[name][k] for name in _PLACE))
+        self.first = min(
+            (row for row in (self.first, table.slice(least, 1).to_pylist()[0]) if row),
+            key=_cell_and_replica,
+        )
+        if not good.all():
+            bad = table.filter(~good).slice(0, MOST_FAILED).to_pylist()
+            self.failed = sorted([*self.failed, *bad], key=_cell_and_replica)[:MOST_FAILED]
+
+
+def _cell_and_replica(row: dict[str, Any]) -> tuple[int, int]:
+    return row["cell"], row["replica"]
+
+
+def _codes(values: "pa.Array") -> Any:
+    """Return numbers as an array, texts as Arrow's codes of them: each text is held once."""
+    import pyarrow as pa
+
+    if pa.types.is_string(values.type):
+        return values.dictionary_encode()
+    return values.to_numpy(zero_copy_only=False)
+
+
+def _joined(pieces: list[Any]) -> AnyArray:
+    if not pieces or isinstance(pieces[0], np.ndarray):
+        return np.concatenate(pieces) if pieces else np.empty(0)
+    texts: dict[str, str] = {}
+    found = []
+    for piece in pieces:
+        names = [texts.setdefault(name, name) for name in piece.dictionary.to_pylist()]
+        place = piece.indices.fill_null(len(names)).to_numpy(zero_copy_only=False)
+        found.append(np.array([*names, None], dtype=object)[place])
+    joined: AnyArray = np.concatenate(found)
+    return joined
+
 
 #: Sets that are drawn for a bootstrap interval of a ratio.
 _RESAMPLES = 2000
-
-
-@dataclass(frozen=True)
-class Line:
-    """One result at one place of the summary's axes."""
-
-    at: tuple[Any, ...]
-    result: Result
-    estimate: Estimate
-    missing: int
-    expected: float | None
-    #: Runs of this place, and (where, how many) of those whose value the run cut off.
-    runs: int = 0
-    cut_off: tuple[tuple[str, int], ...] = ()
-    #: Of a ratio: all its numbers, by the study's own kind of interval and by the other.
-    ratio: PairedRatio | None = None
-    other: PairedRatio | None = None
 
 
 class Rows:
@@ -258,89 +363,6 @@ def estimate_of(ratio: PairedRatio) -> Estimate:
 
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
-
-
-def summarise(
-    rows: Rows,
-    results: Sequence[Result],
-    confidence: float,
-    method: str,
-    expected: dict[tuple[str, tuple[Any, ...]], float],
-) -> list[Line]:
-    """Return one line per place and result.
-
-    Parameters
-    ----------
-    expected : dict
-        (Result name, place) → analytic answer, where there is one.
-    """
-    lines = []
-    for at, chosen in rows.each_place():
-        for result in results:
-            if result.kind == CLASS:
-                continue
-            ratio = other = None
-            if result.kind == RATIO:
-                ratio, missing = rows.ratio(result, chosen, confidence, method)
-                estimate = estimate_of(ratio)
-                # Drawing sets again takes a while; of classes it is done only where it is asked.
-                if method == "bootstrap":
-                    other, _ = rows.ratio(result, chosen, confidence, "t")
-                elif result.ratio is not None and result.ratio.only is None:
-                    other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
-            else:
-                estimate, missing = rows.estimate(result, chosen, confidence, method)
-            known = expected.get((result.name, at))
-            cut_off = rows.cut_off(result, chosen)
-            lines.append(
-                Line(at, result, estimate, missing, known, len(chosen), cut_off, ratio, other)
-            )
-    return lines
-
-
-@dataclass(frozen=True)
-class Compared:
-    """A result at one value of the compared axis, less the same at the baseline."""
-
-    at: tuple[Any, ...]
-    value: Any
-    baseline: Any
-    result: Result
-    difference: EstimatedDifference
-    #: Of an event: how often it happens, by how often at the baseline.
-    ratio: PairedRatio | None = None
-
-
-def compare_axis(
-    rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float,
-    method: str, weight: str | None = None,
-) -> list[Compared]:  # fmt: skip
-    """Return the paired differences of every value of an axis against one of them.
-
-    Rows are paired that share the unit and the values of all other axes. `weight` names the result
-    that weighs units in ratios of events.
-    """
-    place = rows.axes.index(axis)
-    by_place = dict(rows.each_place())
-    found = []
-    for at, chosen in by_place.items():
-        base = (*at[:place], baseline, *at[place + 1 :])
-        if at[place] == baseline or base not in by_place:
-            continue
-        for result in results:
-            if result.kind == CLASS:
-                continue
-            others = (*at[:place], *at[place + 1 :])
-            if result.kind == RATIO:
-                change = rows.ratio_difference(result, by_place[base], chosen, confidence)
-            else:
-                first, second = paired(rows, result.name, by_place[base], chosen)[1:]
-                change = difference(first, second, confidence, method, kind=result.kind)
-            ratio = None
-            if result.kind == EVENT:
-                ratio = rows.event_ratio(result.name, by_place[base], chosen, weight, confidence)
-            found.append(Compared(others, at[place], baseline, result, change, ratio))
-    return found
 
 
 def paired(

@@ -13,21 +13,28 @@ from pydantic import ValidationError
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.unfinished import PREFIX
-from dsa_des.studies.identity import description_text
-from dsa_des.studies.record import StudyHead, StudyRecord
-from dsa_des.studies.safe_files import open_lock, read_regular
-from dsa_des.studies.seal import is_sealed, sealed
-from dsa_des.studies.study import Study
+from dsa_des.results.record import StudyHead, StudyRecord
+from dsa_des.results.sealed_files import is_sealed, open_lock, read_regular, sealed
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+
 STUDY_JSON = "study.json"
+
+
 PARTS = "parts"
+
+
 LOCK = ".lock"
+
+
 #: A part: the number of its round and its own.
 _PART = re.compile(r"part-(\d{3,})-\d{6,}\.parquet")
+
+
 _MOST_JSON_BYTES = 256 * 2**20
+
 
 _Head = TypeVar("_Head", bound=StudyHead)
 
@@ -49,8 +56,10 @@ class StudyFolder:
         self._lock: int | None = None
         self._record: StudyRecord | None = None
 
-    def open(self, study: Study, *, resume: bool) -> None:
+    def open(self, description: str, *, resume: bool) -> None:
         """Make the folder, or take up the one that is there, and lock it until `close`.
+
+        `description` is the content of ``study.json``.
 
         Raises
         ------
@@ -58,7 +67,6 @@ class StudyFolder:
             If it holds something else, another study, or results that were not to be resumed, or
             if another process runs the study.
         """
-        text = description_text(study)
         if self.path.is_symlink() and not self.path.exists():
             raise UsageError(f"--out {self.path}: is a link to nothing; a folder is needed")
         if self.path.exists() and not self.path.is_dir():
@@ -68,7 +76,7 @@ class StudyFolder:
             self.parts.mkdir(parents=True, exist_ok=True)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
-            self._take_up(study, text, resume=resume)
+            self._take_up(description, resume=resume)
         except OSError as error:
             self.close()
             raise UsageError(f"--out {self.path}: cannot be written: {error.strerror}") from error
@@ -108,7 +116,7 @@ class StudyFolder:
         except BlockingIOError:
             raise UsageError(f"{self.path}: another process is running this study") from None
 
-    def _take_up(self, study: Study, text: str, *, resume: bool) -> None:
+    def _take_up(self, text: str, *, resume: bool) -> None:
         known = os.path.lexists(self.path / STUDY_JSON)
         if known and not resume:
             raise UsageError(
@@ -234,7 +242,7 @@ class StudyFolder:
     def results(self) -> "pa.Table":
         """Return the rows of all parts, in order of cell and replica.
 
-        All of them are in memory then; `dsa_des.studies.stored_rows` reads them part by part.
+        All of them are in memory then; `dsa_des.results.rows` reads them part by part.
 
         Raises
         ------
@@ -325,3 +333,13 @@ def _fits(table: "pa.Table", record: StudyRecord) -> bool:
         return False
     cells = pc.min_max(table["cell"]).as_py()
     return table.num_rows > 0 and cells["min"] >= 0 and cells["max"] < record.cells
+
+
+def latest_folder(parent: Path, stem: str) -> Path | None:
+    """Return the ``parent/stem-NNN`` with the highest number; None if there is none."""
+    form = re.compile(re.escape(stem) + r"-(\d{3,})")
+    try:
+        names = [entry.name for entry in parent.iterdir() if form.fullmatch(entry.name)]
+    except OSError:
+        return None
+    return parent / max(names, key=lambda name: int(name[len(stem) + 1 :])) if names else None

@@ -6,29 +6,97 @@ code that it names. Pictures stand in the page itself, and it loads nothing.
 
 import base64
 import hashlib
+from collections.abc import Callable, Iterable, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
-from dsa_des.studies.cheapest import one_sided
-from dsa_des.studies.explained import read_explained, versions
-from dsa_des.studies.folder import StudyFolder
-from dsa_des.studies.labels import short
-from dsa_des.studies.measured_errors import read_errors
-from dsa_des.studies.output import Tables, cut_off_text
-from dsa_des.studies.printing import (
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.labels import short
+from dsa_des.results.models import (
+    EffectRecord,
+    Explained,
+    MeasuredErrors,
+    SceneRecord,
+    read_errors,
+    read_explained,
+    versions,
+)
+from dsa_des.results.printing import (
     ANSWER_HEADS,
     RATIO_HEADS,
     answer_cells,
     interval_text,
     ratio_cells,
 )
-from dsa_des.studies.report_html import page, table, text, verbatim
-from dsa_des.studies.report_models import models_part
-from dsa_des.studies.safe_files import read_regular
-from dsa_des.studies.study import run_command
+from dsa_des.results.record import run_command
+from dsa_des.results.sealed_files import read_regular
+from dsa_des.results.summary import one_sided
+from dsa_des.results.tables import Tables, cut_off_text
+from dsa_des.text.safe_text import printable, shortened
+
+_LONGEST = 400
+
+
+_STYLE = """
+:root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
+@media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
+--note:#a5abb3}figure img{background:#fff;border-radius:4px}}
+body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;
+color:var(--ink);background:var(--paper);overflow-wrap:break-word}
+h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid var(--line)}
+h3{font-size:1em;margin:1.2em 0 .2em}
+.wide{overflow-x:auto;max-width:100%}table{border-collapse:collapse;margin:.6em 0;
+width:max-content}
+td,th{padding:.15em .7em;border-bottom:1px solid var(--line);text-align:left;vertical-align:top;
+}td{max-width:34em}th{background:var(--soft)}code,pre{background:var(--soft);
+font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figure{margin:1em 0}
+img{max-width:100%;height:auto}.note{color:var(--note)}
+@media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}}
+@media print{.wide{overflow:visible}}
+"""
+
+
+def page(title: str, parts: Iterable[str]) -> bytes:
+    """Return a page that loads nothing, of a title and parts that are HTML already."""
+    head = (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "img-src data:; style-src 'unsafe-inline'\">"
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{text(title)}</title><style>{_STYLE}</style></head><body>\n"
+    )
+    return (head + "\n".join(filter(None, parts)) + "\n</body></html>\n").encode()
+
+
+def text(value: Any) -> str:
+    """Return a value as text of a page, on one line and of bounded length."""
+    return escape(shortened(printable(str(value)), _LONGEST))
+
+
+def verbatim(lines: Iterable[str]) -> str:
+    """Return lines as they stand."""
+    return "<pre>" + "\n".join(escape(printable(line)) for line in lines) + "</pre>"
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return a table; nothing where there are no rows."""
+
+    def line(cells: Sequence[Any], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{text(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    body = "\n".join(line(row, "td") for row in rows)
+    if not body:
+        return ""
+    return f"<div class='wide'><table>{line(headings, 'th')}\n{body}</table></div>"
+
 
 REPORT = "report.html"
+
+
 _LARGEST_PICTURE = 20 * 2**20
+
+
 _MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 
 
@@ -262,3 +330,122 @@ def _repeat(tables: Tables, folder: StudyFolder) -> str:
         "with the seed, axes and draws that stand in its row of the parts; rows of failed runs "
         "hold it as <code>command</code>.</p>"
     )
+
+
+#: Makes an HTML table of headings and rows of texts.
+Table = Callable[[Sequence[str], Iterable[Sequence[Any]]], str]
+
+
+#: Makes text fit for a page.
+Text = Callable[[Any], str]
+
+
+def models_part(found: Explained | None, errors: MeasuredErrors | None, table: Table,
+                text: Text, again: str) -> str:  # fmt: skip
+    """Return the models, their errors and the effects of a study as HTML.
+
+    Parameters
+    ----------
+    found : Explained or None
+        What the folder says of its scene.
+    errors : MeasuredErrors or None
+        What it says of its models' errors.
+    table, text : callable
+    again : str
+        The command that tells what the folder does not.
+    """
+    if found is None:
+        return (
+            "<h2>Models and effects</h2><p>This folder is of a version that kept neither. Which "
+            "model each block uses, with its proven error, and which effects are left out and "
+            f"why:</p><pre>{text(again)}</pre>"
+        )
+    parts = ["<h2>Models and their errors</h2>"]
+    for number, scene in enumerate(found.scenes):
+        if scene.models:
+            parts.append(_where(scene, number, text) + _models(scene, table))
+    parts.append(_proven(found, table))
+    parts.append(_measured(errors, table, text))
+    parts.append("<h2>Effects</h2>")
+    for number, scene in enumerate(found.scenes):
+        if scene.effects or scene.spared:
+            parts.append(_where(scene, number, text) + _effects(scene, table))
+    return "\n".join(filter(None, parts))
+
+
+def _where(scene: SceneRecord, number: int, text: Text) -> str:
+    if not scene.where:
+        return ""
+    said = "In the first cell" if number == 0 else "Otherwise"
+    return f"<p>{said}, <code>{text(scene.where)}</code>:</p>"
+
+
+def _models(scene: SceneRecord, table: Table) -> str:
+    rows = [(m.block, m.type, m.about, "; ".join(m.rungs)) for m in scene.models]
+    return table(("block", "model", "what it is", "its place among models of its kind"), rows)
+
+
+def _proven(found: Explained, table: Table) -> str:
+    """Return the proven bounds: of what was left out within a tolerance, and of what might be."""
+    rows = [
+        (e.block, e.effect, ", ".join(f"{q} {short(b)}" for q, b in sorted(e.bound.items())),
+         "simulated" if e.simulated else "left out")
+        for scene in found.scenes for e in scene.effects if e.bound
+    ]  # fmt: skip
+    if not rows:
+        return (
+            "<p class='note'>No model was chosen and no effect left out within an allowed error "
+            "([accuracy]), so there is no bound to prove.</p>"
+        )
+    return "<h3>Proven: largest influence</h3>" + table(
+        ("block", "effect", "largest influence", ""), rows
+    )
+
+
+def _measured(errors: MeasuredErrors | None, table: Table, text: Text) -> str:
+    if errors is None:
+        return (
+            "<p class='note'>Errors of the models were not measured (a study of 100 runs or more "
+            "does it by itself): <code>dsa-des study report FOLDER --measure</code>.</p>"
+        )
+    rows = [
+        (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short(e.mean), short(e.p95),
+         short(e.largest), e.target_scans, _against(e.against))
+        for e in errors.rows
+    ]  # fmt: skip
+    heads = ("block", "model", "error of", "mean", "95 %", "largest", "target-scans", "against")
+    notes = "".join(f"<li>{text(note)}</li>" for note in errors.notes)
+    return (
+        "<h3>Measured over the first run</h3>"
+        + table(heads, rows)
+        + (f"<p class='note'>Not measured:</p><ul class='note'>{notes}</ul>" if notes else "")
+    )
+
+
+def _against(said: str) -> str:
+    """Return what an error is against: another model, or for a reference something far better."""
+    return f"its own error, {said}" if said.startswith("measured") else said
+
+
+def _effects(scene: SceneRecord, table: Table) -> str:
+    built = [e for e in scene.effects if e.simulated]
+    left = [e for e in scene.effects if not e.simulated]
+
+    def rows(some: list[EffectRecord]) -> list[tuple[str, str, str]]:
+        together: dict[tuple[str, str], list[str]] = {}
+        for e in some:
+            together.setdefault((e.effect, e.because), []).append(e.block)
+        return [(", ".join(blocks), effect, why) for (effect, why), blocks in together.items()]
+
+    parts = []
+    if built:
+        parts.append("<h3>Simulated</h3>" + table(("where", "effect", "because"), rows(built)))
+    if left:
+        parts.append(
+            "<h3>Left out, and why</h3>" + table(("where", "effect", "because"), rows(left))
+        )
+    if scene.spared:
+        parts.append(
+            "<h3>Work that is spared</h3>" + table(("block", "what, and why"), scene.spared)
+        )
+    return "\n".join(parts)
