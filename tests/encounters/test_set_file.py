@@ -233,6 +233,7 @@ def test_miss_distances_are_drawn_as_the_command_line_says(model: Path, tmp_path
         (("--horizontal", "0,low", "1"), "rising edges, ft, and the proportion"),
         (("--horizontal", "-100,0,100", "1"), "3 edges need 2 proportions"),
         (("--vertical", "100,-100", "1"), "edges must be rising"),
+        (("--horizontal", "-100,0,0,100", "1,1,1"), "edges must be rising"),
         (("--vertical", "100,200", "1"), "must lie about 0"),
         (("--vertical", "-100,100", "0"), "proportions must be numbers above 0"),
     ],

@@ -230,7 +230,7 @@ def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.M
     def full(path: object, content: bytes, **how: bool) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("dsa_des.studies.folder.write_file", full)
+    monkeypatch.setattr("dsa_des.results.folder.write_file", full)
     from dsa_des.studies.executors import Serial
 
     with pytest.raises(Stopped, match="No space left"):
