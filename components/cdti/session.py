@@ -14,7 +14,7 @@ from components.cdti.scope import Scope
 from components.operator.desk import Desk
 from components.operator.human import Human
 from components.operator.recorded import RecordedOperator
-from dsa_des.commands.loading import say_what_was_done
+from dsa_des.commands.scene import say_what_was_done
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.library.scenes import load_scene

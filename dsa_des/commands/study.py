@@ -314,7 +314,7 @@ def _list_metrics() -> None:
     from rich.table import Table
 
     from dsa_des.block.entry_points import registered
-    from dsa_des.commands.parameter_rows import parameter_rows
+    from dsa_des.commands.parameters import parameter_rows
     from dsa_des.studies.metric import METRICS, find_metric
 
     console = terminal.console(120)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dsa_des.block.ladder import Ladder, Unavailable
-from dsa_des.costs.study import RungCost, applies, climb
+from dsa_des.costs.climb import RungCost, applies, climb
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.toml_text import to_toml

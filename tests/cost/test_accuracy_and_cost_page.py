@@ -10,7 +10,7 @@ from components.evidence.accuracy.error_map_page import error_map_section
 from components.line_of_sight.ladder import EARTH
 from components.optical.ladder import VISIBLE
 from dsa_des.commands.cost import comparison
-from dsa_des.costs.study import climb
+from dsa_des.costs.climb import climb
 from dsa_des.costs.variants import Variants
 
 PAGE = (DOCS / "accuracy-and-cost.md").read_text(encoding="utf-8")

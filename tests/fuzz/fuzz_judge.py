@@ -152,13 +152,13 @@ def _simulate(argv: list[str]) -> None:
     import click
 
     from dsa_des.cli import _scene_options
-    from dsa_des.commands.plain_errors import plain_errors
+    from dsa_des.commands.group import plain_errors
 
     @click.command()
     @_scene_options
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
-        from dsa_des.commands.loading import load
+        from dsa_des.commands.scene import load
         from dsa_des.files.toml_text import to_toml
         from dsa_des.record.recording import MemorySink, ObserverSink, Recorder
         from dsa_des.running.long_run import say_if_long
@@ -185,7 +185,7 @@ def import_everything() -> None:
     """Import what cases need, once, before any is forked."""
     import importlib
 
-    for module in ("run", "check", "graph", "explain", "study"):
+    for module in ("scene", "graph", "study"):
         importlib.import_module(f"dsa_des.commands.{module}")
     for module in (
         "dsa_des.record.arrow", "dsa_des.results.tables", "dsa_des.results.figures", "rich.console",

@@ -1,24 +1,80 @@
-"""Commands that packages add to ``dsa-des``: entry-point group ``dsa_des.commands``.
+"""The command group ``dsa-des``: plain errors, and commands that packages add to it.
 
-Each entry point is a `click.Command` in a module that imports click only, so that ``--help`` stays
-instant: a command imports what it needs when it is called.
+Those are entry points of the group ``dsa_des.commands``. Each is a `click.Command` in a module that
+imports click only, so that ``--help`` stays instant: a command imports what it needs when it is
+called. Every error that a user can cause is one message and an exit code.
 """
 
+import functools
+import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import click
 
 from dsa_des.block.entry_points import registered
-from dsa_des.commands.plain_errors import plain_output
-from dsa_des.errors import UsageError
+from dsa_des.block.strangers import raised_in, told
+from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.interruption import plain_ending
-from dsa_des.terminal.terminal import say_lines
+from dsa_des.terminal.terminal import say, say_lines
 from dsa_des.text.safe_text import printable
 
+# What may end a command; all else is a stranger's code in a place not foreseen.
+_OURS = ("dsa_des", "components", "click", "rich")
+
+
+def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn the errors a user can cause into one message without a traceback."""
+
+    @functools.wraps(command)
+    def guarded(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except (SceneError, UsageError) as error:
+            say_lines(f"error: {error}", err=True)
+            sys.exit(2)
+        except (BlockFailure, OutputError) as error:
+            say_lines(f"error: {error}", err=True)
+            sys.exit(getattr(error, "exit_code", 1))
+        except SystemExit as error:
+            module = raised_in(error.__traceback__)
+            if module.partition(".")[0] in _OURS:
+                raise
+            say(f"error: the module {module!r} left with {told(error)}", err=True)
+            sys.exit(2)
+        except BrokenPipeError:  # the reader of our output went away
+            sys.stderr.close()
+            sys.exit(1)
+
+    return guarded
+
+
+@contextmanager
+def plain_output() -> Iterator[None]:
+    """Say in one line that a file or our own output cannot be written, and end with exit code 1."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()  # now, where it can be said, and not when Python ends
+    except OSError as error:
+        # What is left in the buffer is written when Python ends, and must not fail again.
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+        if not isinstance(error, BrokenPipeError):
+            what = error.filename or "the output cannot be written"
+            with suppress(OSError, ValueError):
+                say(f"error: {what}: {error.strerror or error}", err=True)
+        sys.exit(1)
+
+
 COMMANDS = "dsa_des.commands"
+
+
 # What click (from 8.2 on) raises where a command is missing: its message is the whole help.
 HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 

@@ -1,17 +1,128 @@
-"""Climbing one ladder of one block: cost, error and effect of every rung."""
+"""Climbing one ladder of one block: cost, error and effect of every rung, and which are good."""
 
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsa_des.block.ladder import Ladder, Unavailable
-from dsa_des.costs.differences import Spread, Values, errors_against, own_errors, values_of
-from dsa_des.costs.front import allowed_error, on_front
-from dsa_des.costs.replay import RungRun, median_and_spread, run_rung, time_interleaved
+from dsa_des.block.ladder import Ladder, Quantity, Unavailable
+from dsa_des.costs.replay import (
+    RungRun,
+    Spread,
+    Values,
+    errors_against,
+    median_and_spread,
+    own_errors,
+    run_rung,
+    time_interleaved,
+    values_of,
+)
 from dsa_des.costs.variants import Choice, Variants
-from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
+from dsa_des.running.reports import Change, Difference, Report
 from dsa_des.running.simulation import Simulation
+
+_BUDGET = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S+)\s*")
+
+
+def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
+    """Return which (cost, error) no other point beats: none is as good on both and better on one.
+
+    A NaN error is on no front.
+    """
+    return [
+        error == error
+        and not any(
+            c <= cost and e <= error and (c < cost or e < error) for c, e in points if e == e
+        )
+        for cost, error in points
+    ]
+
+
+def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
+    """Return largest allowed errors by unit from texts such as ``0.5mrad``.
+
+    Raises
+    ------
+    UsageError
+        If one is no number with a unit of these ladders.
+    """
+    units = sorted({q.unit for ladder in ladders for q in ladder.quantities})
+    found: dict[str, float] = {}
+    for text in texts:
+        match = _BUDGET.fullmatch(text)
+        try:
+            value = float(match[1]) if match else 0.0
+        except ValueError:
+            value = 0.0
+        if match is None or not value > 0.0:
+            raise UsageError(
+                f"--budget {text}: must be a number above 0 with its unit, for example 0.5mrad; "
+                f"units: {', '.join(units)}"
+            )
+        unit = {"m2": "m²", "pd": "Pd"}.get(match[2].lower(), match[2])
+        if unit not in units:
+            raise UsageError(f"--budget {text}: unknown unit {match[2]}{did_you_mean(unit, units)}")
+        found[unit] = value
+    return found
+
+
+def allowed_error(
+    quantity: Quantity, budgets: Mapping[str, float], tolerance: Mapping[str, float]
+) -> float | None:
+    """Return the largest error that `--budget`, or else ``[accuracy]``, allows; None for any."""
+    if quantity.unit in budgets:
+        return budgets[quantity.unit]
+    if quantity.tolerance in tolerance:
+        return tolerance[quantity.tolerance] * quantity.per_tolerance
+    return None
+
+
+_NOTHING = Difference("what differs", "share of what differs", lambda changes: 0.0)
+
+
+class Comparison:
+    """What all reports together say of the difference between two runs.
+
+    Parameters
+    ----------
+    reports : sequence of Report
+        Those that compare; the first one's `difference` counts.
+    """
+
+    def __init__(self, reports: Sequence[Report]) -> None:
+        self._reports = [report for report in reports if hasattr(report, "compare")]
+        #: Columns of tables.
+        self.changes: tuple[Change, ...] = tuple(
+            change for report in self._reports for change in getattr(report, "changes", ())
+        )
+        known = [report.difference for report in self._reports if hasattr(report, "difference")]
+        #: The one number that is weighed against cost.
+        self.difference = known[0] if known else _NOTHING
+
+    def __call__(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what changed from one run's recorded tables to another's."""
+        found: dict[str, Any] = {}
+        for report in self._reports:
+            found.update(report.compare(reference, other))
+        return found
+
+    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+        """Return what is better said in words than in columns."""
+        return [
+            remark
+            for report in self._reports
+            if hasattr(report, "remarks")
+            for remark in report.remarks(changes)
+        ]
+
+
+def shown(change: Change, changes: Mapping[str, Any], none: str) -> str:
+    """Return one number as its table shows it, or `none` where it is unknown."""
+    value = changes.get(change.key)
+    return none if value is None else format(value, change.form)
+
 
 #: Compares the recorded tables of the reference's run and of a rung's run.
 Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
