@@ -158,12 +158,7 @@ def run_into(
 ) -> StudyFolder:  # fmt: skip
     """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
 
-    Parameters
-    ----------
-    path : Path or callable
-        The folder, or what makes a new one.
-    again : callable
-        Takes the folder and returns the command that continues the study.
+    `path` is the folder, or what makes a new one; `again` returns the command that continues there.
     """
     check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)

@@ -85,10 +85,7 @@ _NOTHING = Difference("what differs", "share of what differs", lambda changes: 0
 class Comparison:
     """What all reports together say of the difference between two runs.
 
-    Parameters
-    ----------
-    reports : sequence of Report
-        Those that compare; the first one's `difference` counts.
+    Of reports that compare, the first one's `difference` counts.
     """
 
     def __init__(self, reports: Sequence[Report]) -> None:
@@ -134,45 +131,30 @@ _APART = 1.1
 
 @dataclass
 class RungCost:
-    """What one rung costs and what it gets wrong.
-
-    Parameters
-    ----------
-    block, ladder, rung, reference : str
-    in_scene : bool
-        Whether the scene itself uses this rung.
-    unavailable : str
-        Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
-    cpu_us_per_target_scan, cpu_spread_us : float
-        Median over the repeats, and half the distance between the quartiles.
-        Costs closer than 10 % are not told apart: they get one value, and `tied_with` names the
-        other rungs.
-    tied_with : list of str
-    repeats : int
-    errors : dict of Spread
-        By quantity, against the reference; of the reference itself, its own error where that could
-        be measured.
-    error_note : str
-        Of the reference: how its own error was measured, or why it was not.
-    effect : dict
-        What changed in what the run found, against the reference's run.
-    pareto, inside_budget, cheapest_inside : bool
-        `inside_budget` is None when there is no budget.
-    """
+    """What one rung costs and what it gets wrong."""
 
     block: str
     ladder: Ladder
     rung: str
     reference: str
+    #: Whether the scene itself uses this rung.
     in_scene: bool = False
+    #: Why the rung cannot be had in this scene; empty when it can, and then the rest is known.
     unavailable: str = ""
+    #: Median over the repeats, and half the distance between the quartiles. Costs closer than 10 %
+    #: are not told apart: they get one value, and `tied_with` names the other rungs.
     cpu_us_per_target_scan: float = math.nan
     cpu_spread_us: float = math.nan
     tied_with: list[str] = field(default_factory=list)
     repeats: int = 0
+    #: By quantity, against the reference; of the reference itself, its own error where that could
+    #: be measured.
     errors: dict[str, Spread] = field(default_factory=dict)
+    #: Of the reference: how its own error was measured, or why it was not.
     error_note: str = ""
+    #: What changed in what the run found, against the reference's run.
     effect: dict[str, Any] = field(default_factory=dict)
+    #: `inside_budget` is None when there is no budget.
     pareto: bool = False
     inside_budget: bool | None = None
     cheapest_inside: bool = False
@@ -246,19 +228,8 @@ def climb(
 ) -> list[RungCost]:
     """Run the scene with every rung of a block's ladder and return their costs, crude to exact.
 
-    Parameters
-    ----------
-    variants : Variants
-    block : str
-    ladder : Ladder
-    against : str, optional
-        Another reference than the ladder's own.
-    repeats : int
-        How often each rung is timed.
-    budgets : mapping, optional
-        Largest allowed errors by unit; else the scene's ``[accuracy]``.
-    compare : callable, optional
-        Says what changed in what the run found.
+    `budgets` are largest allowed errors by unit, else the scene's ``[accuracy]``; `against` is
+    another reference than the ladder's own; `compare` says what changed in what the run found.
 
     Raises
     ------

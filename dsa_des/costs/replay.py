@@ -35,27 +35,17 @@ _PASSES = 10
 
 @dataclass
 class RungRun:
-    """A run of the scene with one rung in place.
-
-    Parameters
-    ----------
-    scene : Scene
-    block : str
-    wakes : list of Wake
-        What the block was given.
-    tables : dict
-        Recorded tables, as ``pyarrow.Table``.
-    run_cpu_s : float
-        Processor time of the whole simulation.
-    block_cpu_s : float
-        Of which the block took this much.
-    """
+    """A run of the scene with one rung in place."""
 
     scene: Scene
     block: str
+    #: What the block was given.
     wakes: list[Wake]
+    #: Recorded tables, as ``pyarrow.Table``.
     tables: dict[str, Any]
+    #: Processor time of the whole simulation.
     run_cpu_s: float
+    #: Of which the block took this much.
     block_cpu_s: float
     passes_s: list[float] = field(default_factory=list)
     _pristine: Component | None = None
@@ -170,15 +160,9 @@ SAMPLE = 100
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, 95th percentile and maximum of an error, and over how many target-scans.
+    """Mean, 95th percentile and maximum of an error, and over how many target-scans."""
 
-    Parameters
-    ----------
-    mean, p95, maximum : float
-        NaN when there was nothing to compare.
-    count : int
-    """
-
+    #: NaN when there was nothing to compare.
     mean: float
     p95: float
     maximum: float
@@ -220,15 +204,7 @@ def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str,
 
 
 def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, Spread], str]:
-    """Return a rung's error against a far more precise evaluation, or why there is none.
-
-    Returns
-    -------
-    dict of Spread
-        Empty when it could not be measured.
-    str
-        Why it could not; else what was done.
-    """
+    """Return a rung's error against a far more precise evaluation, or why there is none."""
     if ladder.truth is None:
         return {}, "nothing more exact is known"
     try:

@@ -44,10 +44,6 @@ class StudyFolder:
 
     It may hold anything: what is not a regular file of this very study is no part of it, and
     nothing is written through a link.
-
-    Parameters
-    ----------
-    path : Path
     """
 
     def __init__(self, path: Path) -> None:
@@ -202,11 +198,7 @@ class StudyFolder:
     def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
         """Return the rows of a part; None if it is not there, damaged, or of another study.
 
-        Parameters
-        ----------
-        name : str
-        columns : sequence of str, optional
-            Only these, of a part that was found good before.
+        Only some `columns` are read of a part that was found good before.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -259,12 +251,7 @@ class StudyFolder:
     ) -> Iterator["pa.Table"]:
         """Give the rows of each part, in order of their names.
 
-        Parameters
-        ----------
-        before_round : int, optional
-            Only those of earlier rounds.
-        columns : sequence of str, optional
-            Only these, of parts that were found good before.
+        Only those of rounds before one, and only some columns of parts found good before.
 
         Raises
         ------

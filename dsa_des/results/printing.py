@@ -17,12 +17,7 @@ _MOST_SHOWN = 1000
 def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     """Print the tables of a study on a ``rich.console.Console``.
 
-    Parameters
-    ----------
-    console : rich.console.Console
-    tables : Tables
-    only : sequence of str
-        Results to show; by default those that the study draws or waits for, or else all.
+    `only` names results; by default those that the study draws or waits for, or else all.
     """
     study = tables.record
     lines = tables.shown_lines(only)

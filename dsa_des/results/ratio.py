@@ -49,43 +49,30 @@ _FEW = 20.0
 
 @dataclass(frozen=True)
 class PairedRatio:
-    """A ratio with what is uncertain about it.
+    """A ratio with what is uncertain about it."""
 
-    Parameters
-    ----------
-    ratio, induced, unresolved : float
-        NaN where `reason` says why there is none.
-    standard_error : float
-        Of the ratio: paired delta method; with ``"bootstrap"`` the spread of its ratios.
-    interval : (low, high)
-        At the confidence that was asked for.
-    unpaired_error : float
-        The standard error that takes the nominal probability as known.
-    effective_sample_size : float
-        Kish's (Σ w)² / Σ w²: so many encounters of equal weight would tell as much of a mean.
-    encounters, nominal_events, mitigated_events, induced_events : int
-        Counts, without weights.
-    nominal_probability, mitigated_probability : float
-        Per encounter of the airspace, Σ w n / Σ w.
-    method : {"gamma", "delta", "bootstrap"}
-    reason : str
-        Why there is no ratio; empty where there is one.
-    """
-
+    #: NaN where `reason` says why there is none.
     ratio: float
     induced: float
     unresolved: float
+    #: Of the ratio: paired delta method; with ``"bootstrap"`` the spread of its ratios.
     standard_error: float
+    #: At the confidence that was asked for.
     interval: tuple[float, float]
+    #: The standard error that takes the nominal probability as known.
     unpaired_error: float
+    #: Kish's (Σ w)² / Σ w²: so many encounters of equal weight would tell as much of a mean.
     effective_sample_size: float
+    #: Counts, without weights.
     encounters: int
     nominal_events: int
     mitigated_events: int
     induced_events: int
+    #: Per encounter of the airspace, Σ w n / Σ w.
     nominal_probability: float
     mitigated_probability: float
     method: str = "gamma"
+    #: Why there is no ratio; empty where there is one.
     reason: str = ""
     #: Whether the interval holds the truth less often than it says: that of the delta method or the
     #: bootstrap where one event more would add more than a twentieth to the variance of those that
@@ -235,11 +222,7 @@ def influences(
 ) -> FloatArray:
     """Return what each encounter adds to the error of a ratio: their squares sum to its variance.
 
-    Parameters
-    ----------
-    nominal, mitigated, weight
-        As in `paired_ratio`.
-    ratio : float
+    Values are those of `paired_ratio`.
     """
     n, m = _flags("nominal", nominal), _flags("mitigated", mitigated)
     w = _weights(weight, len(n))
@@ -258,11 +241,7 @@ def _by_gammas(
 ) -> tuple[float, float]:
     """Return the ends of an interval of which either errs with a probability of at most `tail`.
 
-    Parameters
-    ----------
-    below, above : (clusters,)
-        Terms below and above the line.
-    ratio, tail : float
+    `below` and `above` are the clusters' terms below and above the line.
     """
     # In order of above/below, the terms y - R x that are negative are the first ones, for any R.
     some = (below > 0.0) | (above > 0.0)

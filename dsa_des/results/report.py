@@ -103,11 +103,6 @@ _MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 def study_report(folder: StudyFolder) -> bytes:
     """Return the page of a study's folder.
 
-    Parameters
-    ----------
-    folder : StudyFolder
-        With results.
-
     Raises
     ------
     UsageError
@@ -342,18 +337,7 @@ Text = Callable[[Any], str]
 
 def models_part(found: Explained | None, errors: MeasuredErrors | None, table: Table,
                 text: Text, again: str) -> str:  # fmt: skip
-    """Return the models, their errors and the effects of a study as HTML.
-
-    Parameters
-    ----------
-    found : Explained or None
-        What the folder says of its scene.
-    errors : MeasuredErrors or None
-        What it says of its models' errors.
-    table, text : callable
-    again : str
-        The command that tells what the folder does not.
-    """
+    """Return the models, their errors and the effects of a study as HTML."""
     if found is None:
         return (
             "<h2>Models and effects</h2><p>This folder is of a version that kept neither. Which "

@@ -47,12 +47,7 @@ _ABOUT = ("status", "error", "command")
 class StoredRows:
     """The rows with a result, in order of cell and replica, and what became of the others.
 
-    Parameters
-    ----------
-    folder : StudyFolder
-        With results.
-    before_round : int, optional
-        Only those of earlier rounds.
+    With `before_round` only those of earlier rounds.
 
     Raises
     ------
@@ -154,16 +149,7 @@ _RESAMPLES = 2000
 
 
 class Rows:
-    """The rows of a study as columns, and how they fall into places and units.
-
-    Parameters
-    ----------
-    stored : StoredRows
-    axes : sequence of str
-        Columns of all axes.
-    over : sequence of str
-        Those that are a sample.
-    """
+    """The rows of a study as columns, and how they fall into places and units."""
 
     def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
         self.stored = stored
@@ -321,15 +307,8 @@ class Rows:
     ) -> PairedRatio:
         """Return how often an event happens in some rows, by how often in others: run by run.
 
-        Parameters
-        ----------
-        name : str
-            The event.
-        first, second : (n,) of int
-            Rows below and above the line; runs that only one of them has do not count.
-        weight : str, optional
-            How often each unit happens.
-        confidence : float
+        Rows `first` are below the line, `second` above; runs that only one has do not count. The
+        result `weight` says how often each unit happens.
         """
         runs = self.units * (int(self.column("replica").max(initial=0)) + 1)
         runs = runs + self.column("replica")
@@ -384,11 +363,7 @@ def paired_units(
     Of a unit without such a run one condition keeps its mean, and the other has no value: runs
     with a value on one side only would compare other draws.
 
-    Parameters
-    ----------
-    units : (runs,)
-    first, second : (runs,)
-        NaN where a run has no value.
+    A run without a value has NaN.
     """
     found, place = np.unique(units, return_inverse=True)
 

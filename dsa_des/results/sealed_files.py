@@ -30,11 +30,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 def read_regular(path: Path, most: int | None = None) -> bytes:
     """Return the content of a file that is no link, folder, pipe or device.
 
-    Parameters
-    ----------
-    path : Path
-    most : int, optional
-        Largest size, bytes.
+    `most` is the largest size in bytes.
 
     Raises
     ------

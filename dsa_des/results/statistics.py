@@ -22,22 +22,15 @@ _RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean or a share, and its interval.
+    """A mean or a share, and its interval."""
 
-    Parameters
-    ----------
-    value, low, high : float
-        NaN where there are too few values to say.
-    count : int
-        Values it rests on.
-    few : bool
-        Whether those are too few to rely on the interval.
-    """
-
+    #: NaN where there are too few values to say.
     value: float
     low: float
     high: float
+    #: Values it rests on.
     count: int
+    #: Whether those are too few to rely on the interval.
     few: bool
 
     @property
@@ -49,12 +42,7 @@ class Estimate:
 def wilson(successes: float, trials: float, confidence: float) -> tuple[float, float]:
     """Return Wilson's score interval of a share.
 
-    Parameters
-    ----------
-    successes, trials : float
-        Trials may be an effective number, and need not be whole.
-    confidence : float
-        For example 0.95.
+    Trials may be an effective number, and need not be whole.
 
     Notes
     -----
@@ -87,10 +75,6 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
     for proportions with small expected number of positive counts", Survey Methodology 24, 1998).
     Where all trials went alike nothing tells how they hang together, and each unit counts once; of
     one unit with several trials there is no interval.
-
-    Parameters
-    ----------
-    successes, trials : (units,)
     """
     used = trials > 0
     successes, trials = successes[used], trials[used]
@@ -125,14 +109,9 @@ def _rests_on_few(successes: FloatArray, trials: FloatArray) -> bool:
 def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     """Return the mean of independent values; NaN ones are left out.
 
-    Parameters
-    ----------
-    values : (n,)
-    confidence : float
-    method : {"t", "bootstrap"}
-        Student's t, or the studentised bootstrap over 2000 resamples (always the same ones),
-        which leans to the side of the longer tail (Efron and Tibshirani, "An introduction to the
-        bootstrap", 1993, chapter 12.5).
+    `method` is "t" or "bootstrap": Student's t, or the studentised bootstrap over 2000 resamples
+    (always the same ones), which leans to the side of the longer tail (Efron and Tibshirani, "An
+    introduction to the bootstrap", 1993, chapter 12.5).
     """
     values = values[~np.isnan(values)]
     count = len(values)
@@ -154,11 +133,6 @@ def fraction(values: FloatArray, confidence: float) -> Estimate:
 
     The interval is Wilson's with as many trials as would make a share as uncertain as the mean is
     by Student's t, so it stays between 0 and 1; where all values are alike each is one trial.
-
-    Parameters
-    ----------
-    values : (n,)
-    confidence : float
     """
     plain = mean(values, confidence)
     if plain.count < 2:
@@ -220,20 +194,13 @@ def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float] | N
 
 @dataclass(frozen=True)
 class EstimatedDifference:
-    """How two conditions differ on the same units.
+    """How two conditions differ on the same units."""
 
-    Parameters
-    ----------
-    paired : Estimate
-        Mean of the differences, unit by unit.
-    unpaired : Estimate
-        The same mean with the interval it would have on independent units (Welch).
-    only_first, only_second : int
-        Units that have a value in one condition only; they are in neither estimate.
-    """
-
+    #: Mean of the differences, unit by unit.
     paired: Estimate
+    #: The same mean with the interval it would have on independent units (Welch).
     unpaired: Estimate
+    #: Units that have a value in one condition only; they are in neither estimate.
     only_first: int
     only_second: int
 
@@ -255,18 +222,11 @@ def difference(
 ) -> EstimatedDifference:
     """Return second minus first on common units.
 
-    Parameters
-    ----------
-    first, second : (units,)
-        NaN where a unit has no value.
-    confidence : float
-    method : {"t", "bootstrap"}
-    kind : {"number", "fraction", "event", "share"}
-        Of all but numbers no interval reaches beyond -1 and 1. Events, and shares of which each
-        unit has all or nothing, are counted: their paired interval is that of Bonett and Price,
-        "Adjusted Wald confidence interval for a difference of binomial proportions based on paired
-        data", Journal of Educational and Behavioral Statistics 37 (2012). It is no point where no
-        unit differs.
+    NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
+    Events, and shares of which each unit has all or nothing, are counted: their paired interval is
+    that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
+    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012).
+    It is no point where no unit differs.
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there

@@ -44,13 +44,7 @@ def summarise(
     method: str,
     expected: Mapping[tuple[str, tuple[Any, ...]], float],
 ) -> list[Line]:
-    """Return one line per place and result.
-
-    Parameters
-    ----------
-    expected : dict
-        (Result name, place) → analytic answer, where there is one.
-    """
+    """Return one line per place and result."""
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
@@ -122,42 +116,23 @@ def compare_axis(
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest value at one place of the other axes.
-
-    Parameters
-    ----------
-    requirement : Requirement
-    at : tuple
-        Values of the other axes.
-    value : object
-        Cheapest value whose interval, and that of all dearer ones, meets the limit; None if none.
-    estimated : object
-        The same by the estimates alone, which is sure of nothing.
-    line : Line
-        The summary's line at `value`, or at the dearest value where none meets it.
-    uneven : bool
-        Whether a cheaper value meets the limit though a dearer one does not: more runs would tell.
-    """
+    """The cheapest value at one place of the other axes."""
 
     requirement: Requirement
+    #: Values of the other axes.
     at: tuple[Any, ...]
+    #: Cheapest value whose interval, and that of all dearer ones, meets the limit; None if none.
     value: Any
+    #: The same by the estimates alone, which is sure of nothing.
     estimated: Any
+    #: The summary's line at `value`, or at the dearest value where none meets it.
     line: Line
+    #: Whether a cheaper value meets the limit though a dearer one does not: more runs would tell.
     uneven: bool
 
 
 def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]) -> list[Answer]:
-    """Return the cheapest value at every place of the other axes.
-
-    Parameters
-    ----------
-    requirement : Requirement
-    axes : sequence of str
-        Columns, in the order of `Line.at`.
-    lines : sequence of Line
-        Of a summary.
-    """
+    """Return the cheapest value at every place of the other axes."""
     if requirement.axis not in axes:
         return []
     place = list(axes).index(requirement.axis)

@@ -31,23 +31,15 @@ KINDS = ("uniform", "normal", "choice", "latin_hypercube", "sequence")
 
 @dataclass(frozen=True)
 class Draw:
-    """How one value of the scene is drawn.
+    """How one value of the scene is drawn."""
 
-    Parameters
-    ----------
-    key : str
-        Dotted key of the scene.
-    kind : {"uniform", "normal", "choice", "sequence"}
-    values : tuple
-        Lowest and highest; mean and standard deviation; what to choose from; or the value of the
-        first replica and the step to the next.
-    stratified : bool
-        Whether replicas share the range out among themselves (Latin hypercube).
-    """
-
+    #: Dotted key of the scene.
     key: str
     kind: str
+    #: Lowest and highest; mean and standard deviation; what to choose from; or the value of the
+    #: first replica and the step to the next.
     values: tuple[Any, ...]
+    #: Whether replicas share the range out among themselves (Latin hypercube).
     stratified: bool = False
 
     @property
@@ -58,13 +50,8 @@ class Draw:
     def value(self, seed: int, replica: int, batch: int) -> Any:
         """Return the value of one replica.
 
-        Parameters
-        ----------
-        seed : int
-            The study's, or that of a member of its sample.
-        replica : int
-        batch : int
-            How many consecutive replicas a Latin hypercube covers together.
+        `seed` is the study's, or that of a member of its sample; a Latin hypercube covers `batch`
+        consecutive replicas together.
         """
         if self.kind == "sequence":
             first, step = self.values
@@ -177,12 +164,8 @@ def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
 
     It depends on the values alone: not on their places, nor on what other values there are.
 
-    Parameters
-    ----------
-    seed : int
-        The study's.
-    members : iterable of (Axis, index of its value)
-        The axes that are a sample, in any order; without any the study's seed stays.
+    Members are values, by their index, of axes that are a sample, in any order; without any the
+    study's seed stays.
     """
     parts = sorted((axis.key, *identity(axis, index)) for axis, index in members)
     return (

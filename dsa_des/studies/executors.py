@@ -42,13 +42,7 @@ class Piece:
 
 
 class Attempts:
-    """What is still to be run.
-
-    Parameters
-    ----------
-    study : Study
-    chunks : iterable of Chunk
-    """
+    """What is still to be run."""
 
     def __init__(self, study: Study, chunks: Iterable[Chunk]) -> None:
         self._study = study
@@ -173,10 +167,6 @@ class Local:
 
     Each process is a pool of its own, so that one that dies takes nothing with it but what it was
     at, and that is known. It is replaced, and `Attempts` says what is run again.
-
-    Parameters
-    ----------
-    workers : int
     """
 
     def __init__(self, workers: int) -> None:
@@ -345,11 +335,6 @@ class Dask:
 
     Its workers need this package, and the scene's files under the same names; results travel back
     through the scheduler.
-
-    Parameters
-    ----------
-    scheduler : str
-        Address, for example ``tcp://host:8786``.
 
     Raises
     ------

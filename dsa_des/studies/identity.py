@@ -73,13 +73,6 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
 
     Their content fixes results as much as the values do. A relative name counts from the folder of
     the file that holds it; whichever way a file is named, its content is what counts.
-
-    Parameters
-    ----------
-    value : object
-        Tables, lists and texts.
-    beside : sequence of Path
-        Folders in which modules are looked for.
     """
     if isinstance(value, Mapping):
         return _files_in([item for key, item in value.items() if key not in _SAID], beside)

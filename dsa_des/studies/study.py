@@ -66,13 +66,7 @@ class Chunk:
 
 
 class StudyCells(Sequence[tuple[int, ...]]):
-    """The cells of a study, each made when it is asked for; the last axis runs fastest.
-
-    Parameters
-    ----------
-    sizes : iterable of int
-        How many values each axis has.
-    """
+    """The cells of a study, each made when it is asked for; the last axis runs fastest."""
 
     def __init__(self, sizes: Iterable[int]) -> None:
         self._sizes = tuple(sizes)
@@ -107,59 +101,37 @@ class StudyCells(Sequence[tuple[int, ...]]):
 
 @dataclass
 class Study:
-    """A study that can be run.
-
-    Parameters
-    ----------
-    path, scene_path : Path
-    title : str
-    seed : int
-    replicas : int
-        Per cell; with `stop_when` the most.
-    axes, draws, metrics : tuple
-    sets : tuple of (key, value)
-        Set in every cell.
-    swaps : tuple of (block, type)
-        Made in every cell.
-    over : tuple of str
-        Columns of axes that are a sample (of encounters): statistics are taken over them, and each
-        member has seeds and draws of its own.
-    baseline : (column, label) or None
-        With which value of which axis the others are compared.
-    stop_when : StopWhen or None
-    confidence : float
-    interval : {"t", "bootstrap"}
-    figures : tuple of FigureRecord
-    requirements : tuple of Requirement
-    compare_weight : str, optional
-        The result that weighs units where events are compared.
-    runs_per_chunk : int
-    base : SceneFile
-        The scene's tables.
-    tables : dict
-        The study's own tables, with paths that do not depend on where it stands.
-    """
+    """A study that can be run."""
 
     path: Path
     scene_path: Path
     title: str
     seed: int
+    #: Per cell; with `stop_when` the most.
     replicas: int
     axes: tuple[Axis, ...]
     draws: tuple[Draw, ...]
     metrics: tuple[MetricSpec, ...]
+    #: Set in every cell.
     sets: tuple[tuple[str, Any], ...]
+    #: Made in every cell.
     swaps: tuple[tuple[str, str], ...]
+    #: Columns of axes that are a sample (of encounters): statistics are taken over them, and each
+    #: member has seeds and draws of its own.
     over: tuple[str, ...]
+    #: With which value of which axis the others are compared.
     baseline: tuple[str, Any] | None
     stop_when: StopWhen | None
     confidence: float
     interval: str
     figures: tuple[FigureRecord, ...]
     runs_per_chunk: int
+    #: The scene's tables.
     base: SceneFile
+    #: The study's own tables, with paths that do not depend on where it stands.
     tables: dict[str, Any]
     requirements: tuple[Requirement, ...] = ()
+    #: The result that weighs units where events are compared.
     compare_weight: str | None = None
 
     @property

@@ -30,21 +30,8 @@ _MOST_SCENES = 64
 def cell_problems(study: Study, file: SceneFile, scene: Scene, *, whole: bool) -> list[Problem]:
     """Check every value of every axis, the draws, and one run up to its first event.
 
-    Parameters
-    ----------
-    study : Study
-        What could be read of it.
-    file : SceneFile
-        The study file, for messages.
-    scene : Scene
-        Without axes: what else is wrong is said of it where no cell has a scene that fits.
-    whole : bool
-        Whether all of it could be read; names of results are checked only then.
-
-    Returns
-    -------
-    list of Problem
-        Everything that is wrong.
+    What is wrong is said of `file`, the study's, and of the `scene` without axes where no cell has
+    one that fits. Names of results are checked only where the `whole` study could be read.
     """
     problems: list[Problem] = []
 

@@ -47,13 +47,7 @@ def read_study(
 ) -> Study:
     """Read and check a study.
 
-    Parameters
-    ----------
-    path : path of the TOML file
-    swaps : iterable of (block, types)
-        Further swap axes.
-    sets : iterable of str
-        Changes of the study itself, as ``key=value``.
+    `swaps` are further swap axes; `sets` change the study itself, as ``key=value``.
 
     Raises
     ------
@@ -87,15 +81,8 @@ def study_of_tables(
 ) -> Study:
     """Return a study of a scene that was read already.
 
-    Parameters
-    ----------
-    tables : dict
-        As a study file would hold them, without ``scene``, ``set`` and ``swap``.
-    base : SceneFile
-        The scene's tables.
-    swaps : sequence of (block, type)
-    sets : sequence of (key, value)
-        Made and set in every cell.
+    `tables` are as a study file would hold them, without ``scene``, ``set`` and ``swap``; `swaps`
+    and `sets` are made in every cell.
 
     Raises
     ------

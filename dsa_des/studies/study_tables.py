@@ -128,17 +128,8 @@ def read_figures(
 ) -> tuple[FigureRecord, ...]:
     """Return the figures of a study.
 
-    Parameters
-    ----------
-    items : object
-        What the file holds under ``figures``.
-    axes : tuple of Axis
-    replicas : int
-        Of a cell.
-    column : callable
-        Gives the column of the axis that a name means, or reports that there is none.
-    add : callable
-        Takes the key, the message and the value of a problem.
+    `column` gives the column of the axis that a name means, or reports that there is none; `add`
+    takes the key, the message and the value of a problem.
     """
     if not isinstance(items, list):
         add(("figures",), "must be a list of tables ([[figures]])")
@@ -212,15 +203,7 @@ def read_requirements(
 ) -> tuple[Requirement, ...]:
     """Return the requirements of a study file.
 
-    Parameters
-    ----------
-    items : object
-        What the file holds under ``requirements``.
-    axes : tuple of Axis
-    column : callable
-        Gives the column of the axis that a name means, or reports that there is none.
-    add : callable
-        Takes the key, the message and the value of a problem.
+    `column` and `add` are those of `read_figures`.
     """
     if not isinstance(items, list):
         add(("requirements",), "must be a list of tables ([[requirements]])")
