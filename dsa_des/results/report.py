@@ -6,16 +6,17 @@ code that it names. Pictures stand in the page itself, and it loads nothing.
 
 import base64
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
-from pathlib import Path
 from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
 
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import short
 from dsa_des.results.models import (
     EffectRecord,
-    Explained,
     MeasuredErrors,
     SceneRecord,
     read_errors,
@@ -35,10 +36,16 @@ from dsa_des.results.summary import one_sided
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.text.safe_text import printable, shortened
 
+REPORT = "report.html"
+_LARGEST_PICTURE = 20 * 2**20
+_MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
+#: Letters of a text.
 _LONGEST = 400
 
-
-_STYLE = """
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" \
+content="default-src 'none'; img-src data:; style-src 'unsafe-inline'"><meta name="viewport" \
+content="width=device-width,initial-scale=1"><title>{{ record.title }}</title><style>
 :root{color-scheme:light dark;--ink:#1a1a1a;--paper:#fff;--soft:#f3f3f3;--line:#ddd;--note:#555}
 @media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--paper:#16181b;--soft:#24272b;--line:#3a3f45;
 --note:#a5abb3}figure img{background:#fff;border-radius:4px}}
@@ -54,50 +61,115 @@ font-size:.9em;white-space:pre-wrap;overflow-wrap:anywhere}pre{padding:.5em}figu
 img{max-width:100%;height:auto}.note{color:var(--note)}
 @media(max-width:45em){body{margin:1em auto;padding:0 .7em}td{max-width:18em}}
 @media print{.wide{overflow:visible}}
+</style></head><body>
+{% macro table(heads, rows) %}{% if rows %}
+<div class='wide'><table><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr>
+{% for row in rows %}
+<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}
+</table></div>
+{% endif %}{% endmacro %}
+{% macro where(scene, first) %}{% if scene.where %}
+<p>{{ "In the first cell" if first else "Otherwise" }}, <code>{{ scene.where }}</code>:</p>
+{% endif %}{% endmacro %}
+<h1>{{ record.title }}</h1><p class="note">{{ runs }} runs in {{ record.cells }} cells; \
+{{ tables.rows.failed }} without result</p>
+<h2>What was asked</h2>
+{{ table(("", ""), asked) }}{{ table(("axis", "values", ""), axes) }}
+{{ table(("result", "kind", "meaning"), results) }}
+<h2>The scene</h2><p><code>{{ record.scene }}</code></p>
+{{ table(("in every cell", ""), changes) }}
+{% if explained and explained.scene %}
+<details><summary>The first run's scene, every default written out</summary>\
+{{ explained.scene.splitlines() | verbatim }}</details>
+{% endif %}
+{% if not explained %}
+<h2>Models and effects</h2><p>This folder is of a version that kept neither. Which model each \
+block uses, with its proven error, and which effects are left out and why:</p>\
+<pre>{{ explain }}</pre>
+{% else %}
+<h2>Models and their errors</h2>
+{% for scene in explained.scenes if scene.models %}
+{{ where(scene, scene is sameas explained.scenes[0]) }}
+{{ table(("block", "model", "what it is", "its place among models of its kind"),
+         scene | models) }}
+{% endfor %}
+{% if bounds %}
+<h3>Proven: largest influence</h3>
+{{ table(("block", "effect", "largest influence", ""), bounds) }}
+{% else %}
+<p class='note'>No model was chosen and no effect left out within an allowed error ([accuracy]), \
+so there is no bound to prove.</p>
+{% endif %}
+{% if not errors %}
+<p class='note'>Errors of the models were not measured (a study of 100 runs or more does it by \
+itself): <code>dsa-des study report FOLDER --measure</code>.</p>
+{% else %}
+<h3>Measured over the first run</h3>
+{{ table(("block", "model", "error of", "mean", "95 %", "largest", "target-scans", "against"),
+         errors | measured) }}
+{% if errors.notes %}
+<p class='note'>Not measured:</p><ul class='note'>\
+{% for note in errors.notes %}<li>{{ note }}</li>{% endfor %}</ul>
+{% endif %}
+{% endif %}
+<h2>Effects</h2>
+{% for scene in explained.scenes if scene.effects or scene.spared %}
+{{ where(scene, scene is sameas explained.scenes[0]) }}
+{% for title, simulated in (("Simulated", true), ("Left out, and why", false)) %}
+{% set rows = scene.effects | effects(simulated) %}
+{% if rows %}<h3>{{ title }}</h3>{{ table(("where", "effect", "because"), rows) }}{% endif %}
+{% endfor %}
+{% if scene.spared %}
+<h3>Work that is spared</h3>{{ table(("block", "what, and why"), scene.spared) }}
+{% endif %}
+{% endfor %}
+{% endif %}
+<h2>Results</h2><p class='note'>Cut off: values that the beginning or the end of a run censored; \
+the mean holds them.</p>
+{{ table(tables.rows.axes + ["result", "value", "interval", "units", "no value", "", "cut off",
+                              "expected"], lines) }}
+{% if tables.lines | length > most %}
+<p>and {{ tables.lines | length - most }} more lines in summary.parquet</p>
+{% endif %}
+{% if ratios %}
+<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. Nominal, \
+mitigated, induced: units with the event without and with the remedy, and with it alone. \
+Effective size: Kish's, of the weights.</p>
+{{ table(tables.rows.axes + ratio_heads, ratios) }}
+{% endif %}
+{% if answers %}
+<h2>Requirements</h2><p class='note'>The cheapest value whose interval, and that of all dearer \
+ones, lies within the limit; {{ sure }} sure.</p>
+{{ table(answer_heads, answers) }}
+{% endif %}
+{% if differences %}
+<h2>Paired differences</h2>
+{{ table(others + [tables.baseline[0], "less", "result", "difference", "interval", "pairs"],
+         differences) }}
+{% endif %}
+{% if pictures %}
+<h2>Figures</h2>
+{% for stem, name, data in pictures %}
+<figure><img alt="{{ stem }}" src="data:image/png;base64,{{ data | plain }}">\
+<figcaption>{{ name }}</figcaption></figure>
+{% endfor %}
+{% endif %}
+<h2>Failed and censored runs</h2><p>Runs: {{ status }}. Values cut off by a run's beginning or \
+end: {{ censored }}.</p>
+{{ table(("cell", "replica", "status", "error", "command"), failed) }}
+{% if tables.rows.failed > failed | length %}
+<p>and {{ tables.rows.failed - failed | length }} more</p>
+{% endif %}
+<h2>Seeds, versions and hashes</h2><p>Seed of the study: <code>{{ record.seed }}</code>. Every \
+run's own seed is in the column <code>seed</code> of the parts.</p>
+{{ table(("package", "when the study was begun", "when this page was made"), packages) }}
+{{ table(("", "SHA-256"), hashes) }}
+<h2>To repeat it</h2>{{ commands | verbatim }}<p class='note'>Any other run: the same with the \
+seed, axes and draws that stand in its row of the parts; rows of failed runs hold it as \
+<code>command</code>.</p>
+</body></html>
 """
-
-
-def page(title: str, parts: Iterable[str]) -> bytes:
-    """Return a page that loads nothing, of a title and parts that are HTML already."""
-    head = (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "img-src data:; style-src 'unsafe-inline'\">"
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{text(title)}</title><style>{_STYLE}</style></head><body>\n"
-    )
-    return (head + "\n".join(filter(None, parts)) + "\n</body></html>\n").encode()
-
-
-def text(value: Any) -> str:
-    """Return a value as text of a page, on one line and of bounded length."""
-    return escape(shortened(printable(str(value)), _LONGEST))
-
-
-def verbatim(lines: Iterable[str]) -> str:
-    """Return lines as they stand."""
-    return "<pre>" + "\n".join(escape(printable(line)) for line in lines) + "</pre>"
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Return a table; nothing where there are no rows."""
-
-    def line(cells: Sequence[Any], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{text(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-    body = "\n".join(line(row, "td") for row in rows)
-    if not body:
-        return ""
-    return f"<div class='wide'><table>{line(headings, 'th')}\n{body}</table></div>"
-
-
-REPORT = "report.html"
-
-
-_LARGEST_PICTURE = 20 * 2**20
-
-
-_MOST_PICTURES, _MOST_ROWS, _MOST_PARTS = 60, 5000, 1000
 
 
 def study_report(folder: StudyFolder) -> bytes:
@@ -109,37 +181,92 @@ def study_report(folder: StudyFolder) -> bytes:
         If the folder holds no results, or damaged ones.
     """
     tables = Tables(folder.record, folder)
+    record, stored, first = tables.record, tables.rows.stored, tables.rows.stored.first
+    explained = read_explained(folder)
+    explain = run_command(record.scene, record.seed, record.swaps, record.sets)
+    explain = explain.replace("dsa-des run ", "dsa-des explain ", 1)
+    begun, now = explained.versions if explained else {}, versions()
+    page = _environment().from_string(_PAGE).render(
+        tables=tables, record=record, explained=explained, errors=read_errors(folder),
+        explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
+        asked=_asked(tables),
+        axes=[
+            (axis.column, ", ".join(map(str, axis.values[:40])) + ", …" * (len(axis.values) > 40),
+             "a sample: its values are independent units" if axis.over else "")
+            for axis in record.axes
+        ],
+        results=[(r.name, r.kind, r.meaning) for r in tables.results],
+        changes=[("set", f"{key} = {value}") for key, value in record.sets]
+        + [("swap", f"{block} = {name}") for block, name in record.swaps],
+        bounds=[
+            (e.block, e.effect, ", ".join(f"{q} {short(b)}" for q, b in sorted(e.bound.items())),
+             "simulated" if e.simulated else "left out")
+            for scene in (explained.scenes if explained else ()) for e in scene.effects if e.bound
+        ],
+        lines=[
+            (*line.at, line.result.name, short(line.estimate.value), interval_text(line.estimate),
+             line.estimate.count, line.missing, "few" if line.estimate.few else "",
+             cut_off_text(line), "" if line.expected is None else short(line.expected))
+            for line in tables.lines[:_MOST_ROWS]
+        ],
+        ratio_heads=list(RATIO_HEADS), answer_heads=ANSWER_HEADS,
+        ratios=[(*map(short, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
+        answers=[answer_cells(tables, answer) for answer in tables.answers[:_MOST_ROWS]],
+        sure=f"{100 * one_sided(record.confidence):g} %",
+        others=[n for n in tables.rows.axes if tables.baseline and n != tables.baseline[0]],
+        differences=[
+            (*item.at, item.value, item.baseline, item.result.name,
+             short(item.difference.paired.value), interval_text(item.difference.paired),
+             item.difference.paired.count)
+            for item in tables.compared[:_MOST_ROWS]
+        ],
+        pictures=_pictures(folder),
+        status=", ".join(f"{many} {name}" for name, many in sorted(stored.status.items())),
+        censored=sum(many for line in tables.lines for _, many in line.cut_off),
+        failed=[
+            (row["cell"], row["replica"], row["status"], row["error"], record.command(row))
+            for row in stored.failed
+        ],
+        packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
+        hashes=_hashes(folder),
+        commands=[
+            f"dsa-des study {record.study}",
+            f"dsa-des study show {folder.path}",
+            f"dsa-des study report {folder.path}",
+            explain,
+            f"{record.command(first)}    # cell {first['cell']}, replica {first['replica']}",
+        ],
+    )  # fmt: skip
+    return page.encode()
+
+
+def _environment() -> Environment:
+    """Return the language of the page: whatever it is given is shown as text, on one line."""
+    environment = Environment(
+        autoescape=True, finalize=_text, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters.update(
+        verbatim=_verbatim, plain=Markup, models=_models, measured=_measured, effects=_effects
+    )
+    return environment
+
+
+def _text(value: Any) -> Markup:
+    """Return a value as text of a page, on one line and of bounded length."""
+    if isinstance(value, Markup):
+        return value
+    return Markup(escape(shortened(printable(str(value)), _LONGEST)))
+
+
+def _verbatim(lines: Iterable[str]) -> Markup:
+    """Return lines as they stand."""
+    some = list(lines)[:_MOST_ROWS]
+    return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
+
+
+def _asked(tables: Tables) -> list[tuple[str, Any]]:
     record = tables.record
-    parts = [
-        _head(tables),
-        _asked(tables),
-        _scene(tables, folder),
-        models_part(
-            read_explained(folder), read_errors(folder), table, text, _explain(tables.record)
-        ),
-        _results(tables),
-        _ratios(tables),
-        _requirements(tables),
-        _differences(tables),
-        _pictures(folder),
-        _troubles(tables),
-        _origin(folder),
-        _repeat(tables, folder),
-    ]
-    return page(record.title, parts)
-
-
-def _head(tables: Tables) -> str:
-    record = tables.record
-    rows = tables.rows
-    runs = len(rows.places) + rows.failed
-    said = f"{runs} runs in {record.cells} cells; {rows.failed} without result"
-    return f'<h1>{text(record.title)}</h1><p class="note">{text(said)}</p>'
-
-
-def _asked(tables: Tables) -> str:
-    record = tables.record
-    rows: list[tuple[Any, ...]] = [
+    rows: list[tuple[str, Any]] = [
         ("replicas of each cell", record.replicas),
         ("seed", record.seed),
         ("intervals", f"{100 * record.confidence:g} %, {record.interval}"),
@@ -149,287 +276,45 @@ def _asked(tables: Tables) -> str:
     if record.stop_when is not None:
         stop = record.stop_when
         rows.append(("stopped when", f"{stop.metric} is known to ±{stop.half_width:g}"))
-    rows += [("drawn", draw.key) for draw in record.draws]
-    axes = [
-        (
-            axis.column,
-            ", ".join(map(str, axis.values[:40])) + (", …" if len(axis.values) > 40 else ""),
-            "a sample: its values are independent units" if axis.over else "",
-        )
-        for axis in record.axes
-    ]
-    results = [(r.name, r.kind, r.meaning) for r in tables.results]
-    return (
-        "<h2>What was asked</h2>"
-        + table(("", ""), rows)
-        + table(("axis", "values", ""), axes)
-        + table(("result", "kind", "meaning"), results)
-    )
+    return rows + [("drawn", draw.key) for draw in record.draws]
 
 
-def _scene(tables: Tables, folder: StudyFolder) -> str:
-    record = tables.record
-    changes = [("set", f"{key} = {value}") for key, value in record.sets]
-    changes += [("swap", f"{block} = {name}") for block, name in record.swaps]
-    found = read_explained(folder)
-    whole = ""
-    if found is not None and found.scene:
-        whole = (
-            "<details><summary>The first run's scene, every default written out</summary>"
-            + verbatim(found.scene.splitlines()[:_MOST_ROWS])
-            + "</details>"
-        )
-    return (
-        f"<h2>The scene</h2><p><code>{text(record.scene)}</code></p>"
-        + table(("in every cell", ""), changes)
-        + whole
-    )
+def _models(scene: SceneRecord) -> list[tuple[str, ...]]:
+    return [(m.block, m.type, m.about, "; ".join(m.rungs)) for m in scene.models]
 
 
-def _explain(record: Any) -> str:
-    words = run_command(record.scene, record.seed, record.swaps, record.sets)
-    return words.replace("dsa-des run ", "dsa-des explain ", 1)
-
-
-def _results(tables: Tables) -> str:
-    axes = tables.rows.axes
-    rows = [
-        (
-            *line.at, line.result.name, short(line.estimate.value), interval_text(line.estimate),
-            line.estimate.count, line.missing, "few" if line.estimate.few else "",
-            cut_off_text(line), "" if line.expected is None else short(line.expected),
-        )
-        for line in tables.lines[:_MOST_ROWS]
+def _measured(errors: MeasuredErrors) -> list[tuple[Any, ...]]:
+    return [
+        (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short(e.mean), short(e.p95),
+         short(e.largest), e.target_scans,
+         # Another model, or for a reference something far better.
+         f"its own error, {e.against}" if e.against.startswith("measured") else e.against)
+        for e in errors.rows
     ]  # fmt: skip
-    headings = (
-        *axes,
-        "result",
-        "value",
-        "interval",
-        "units",
-        "no value",
-        "",
-        "cut off",
-        "expected",
-    )
-    more = len(tables.lines) - _MOST_ROWS
-    note = f"<p>and {more} more lines in summary.parquet</p>" if more > 0 else ""
-    return (
-        "<h2>Results</h2><p class='note'>Cut off: values that the beginning or the end of a run "
-        "censored; the mean holds them.</p>" + table(headings, rows) + note
-    )
 
 
-def _ratios(tables: Tables) -> str:
-    rows = [(*map(short, line.at), *ratio_cells(line)) for line in tables.ratios()[:_MOST_ROWS]]
-    return (
-        "<h2>Ratios of events</h2><p class='note'>Unresolved and induced add up to the ratio. "
-        "Nominal, mitigated, induced: units with the event without and with the remedy, and with "
-        "it alone. Effective size: Kish's, of the weights.</p>"
-        + table((*tables.rows.axes, *RATIO_HEADS), rows)
-        if rows
-        else ""
-    )
+def _effects(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str, str, str]]:
+    """Return in which blocks each effect is simulated, or is not, for one reason."""
+    together: dict[tuple[str, str], list[str]] = {}
+    for e in effects:
+        if e.simulated == simulated:
+            together.setdefault((e.effect, e.because), []).append(e.block)
+    return [(", ".join(blocks), effect, why) for (effect, why), blocks in together.items()]
 
 
-def _requirements(tables: Tables) -> str:
-    if not tables.answers:
-        return ""
-    rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_ROWS]]
-    sure = f"{100 * one_sided(tables.record.confidence):g} %"
-    return (
-        f"<h2>Requirements</h2><p class='note'>The cheapest value whose interval, and that of all "
-        f"dearer ones, lies within the limit; {sure} sure.</p>" + table(ANSWER_HEADS, rows)
-    )
-
-
-def _differences(tables: Tables) -> str:
-    if not tables.compared or tables.baseline is None:
-        return ""
-    others = [name for name in tables.rows.axes if name != tables.baseline[0]]
-    rows = [
-        (
-            *item.at, item.value, item.baseline, item.result.name,
-            short(item.difference.paired.value), interval_text(item.difference.paired),
-            item.difference.paired.count,
-        )
-        for item in tables.compared[:_MOST_ROWS]
-    ]  # fmt: skip
-    headings = (*others, tables.baseline[0], "less", "result", "difference", "interval", "pairs")
-    return "<h2>Paired differences</h2>" + table(headings, rows)
-
-
-def _pictures(folder: StudyFolder) -> str:
+def _pictures(folder: StudyFolder) -> list[tuple[str, str, str]]:
+    """Return stem, name and content of the folder's figures."""
     found = []
     for path in sorted(folder.path.glob("*.png"))[:_MOST_PICTURES]:
         try:
             content = read_regular(path, _LARGEST_PICTURE)
         except OSError:
             continue  # a link, or gone
-        data = base64.b64encode(content).decode()
-        found.append(
-            f'<figure><img alt="{text(path.stem)}" src="data:image/png;base64,{data}">'
-            f"<figcaption>{text(path.name)}</figcaption></figure>"
-        )
-    return "<h2>Figures</h2>" + "\n".join(found) if found else ""
+        found.append((path.stem, path.name, base64.b64encode(content).decode()))
+    return found
 
 
-def _troubles(tables: Tables) -> str:
-    stored = tables.rows.stored
-    rows = [
-        (row["cell"], row["replica"], row["status"], row["error"], tables.record.command(row))
-        for row in stored.failed
-    ]
-    cut = sum(many for line in tables.lines for _, many in line.cut_off)
-    said = ", ".join(f"{many} {name}" for name, many in sorted(stored.status.items()))
-    more = tables.rows.failed - len(rows)
-    return (
-        f"<h2>Failed and censored runs</h2><p>Runs: {text(said)}. Values cut off by a run's "
-        f"beginning or end: {cut}.</p>"
-        + table(("cell", "replica", "status", "error", "command"), rows)
-        + (f"<p>and {more} more</p>" if more > 0 else "")
-    )
-
-
-def _origin(folder: StudyFolder) -> str:
-    record = folder.record
-    found = read_explained(folder)
-    now = versions()
-    runs = {} if found is None else found.versions
-    rows = [(name, runs.get(name, ""), now.get(name, "")) for name in {**runs, **now}]
-    hashes = [("study, with all that fixes its results", record.study_sha256)]
-    for name in folder.part_names()[:_MOST_PARTS]:
-        path: Path = folder.parts / f"{name}.parquet"
-        hashes.append((path.name, hashlib.sha256(read_regular(path)).hexdigest()))
-    return (
-        "<h2>Seeds, versions and hashes</h2>"
-        f"<p>Seed of the study: <code>{record.seed}</code>. Every run's own seed is in the column "
-        "<code>seed</code> of the parts.</p>"
-        + table(("package", "when the study was begun", "when this page was made"), rows)
-        + table(("", "SHA-256"), hashes)
-    )
-
-
-def _repeat(tables: Tables, folder: StudyFolder) -> str:
-    record = tables.record
-    first = tables.rows.stored.first
-    commands = [
-        f"dsa-des study {record.study}",
-        f"dsa-des study show {folder.path}",
-        f"dsa-des study report {folder.path}",
-        _explain(record),
-        f"{record.command(first)}    # cell {first['cell']}, replica {first['replica']}",
-    ]
-    return (
-        f"<h2>To repeat it</h2>{verbatim(commands)}<p class='note'>Any other run: the same "
-        "with the seed, axes and draws that stand in its row of the parts; rows of failed runs "
-        "hold it as <code>command</code>.</p>"
-    )
-
-
-#: Makes an HTML table of headings and rows of texts.
-Table = Callable[[Sequence[str], Iterable[Sequence[Any]]], str]
-
-
-#: Makes text fit for a page.
-Text = Callable[[Any], str]
-
-
-def models_part(found: Explained | None, errors: MeasuredErrors | None, table: Table,
-                text: Text, again: str) -> str:  # fmt: skip
-    """Return the models, their errors and the effects of a study as HTML."""
-    if found is None:
-        return (
-            "<h2>Models and effects</h2><p>This folder is of a version that kept neither. Which "
-            "model each block uses, with its proven error, and which effects are left out and "
-            f"why:</p><pre>{text(again)}</pre>"
-        )
-    parts = ["<h2>Models and their errors</h2>"]
-    for number, scene in enumerate(found.scenes):
-        if scene.models:
-            parts.append(_where(scene, number, text) + _models(scene, table))
-    parts.append(_proven(found, table))
-    parts.append(_measured(errors, table, text))
-    parts.append("<h2>Effects</h2>")
-    for number, scene in enumerate(found.scenes):
-        if scene.effects or scene.spared:
-            parts.append(_where(scene, number, text) + _effects(scene, table))
-    return "\n".join(filter(None, parts))
-
-
-def _where(scene: SceneRecord, number: int, text: Text) -> str:
-    if not scene.where:
-        return ""
-    said = "In the first cell" if number == 0 else "Otherwise"
-    return f"<p>{said}, <code>{text(scene.where)}</code>:</p>"
-
-
-def _models(scene: SceneRecord, table: Table) -> str:
-    rows = [(m.block, m.type, m.about, "; ".join(m.rungs)) for m in scene.models]
-    return table(("block", "model", "what it is", "its place among models of its kind"), rows)
-
-
-def _proven(found: Explained, table: Table) -> str:
-    """Return the proven bounds: of what was left out within a tolerance, and of what might be."""
-    rows = [
-        (e.block, e.effect, ", ".join(f"{q} {short(b)}" for q, b in sorted(e.bound.items())),
-         "simulated" if e.simulated else "left out")
-        for scene in found.scenes for e in scene.effects if e.bound
-    ]  # fmt: skip
-    if not rows:
-        return (
-            "<p class='note'>No model was chosen and no effect left out within an allowed error "
-            "([accuracy]), so there is no bound to prove.</p>"
-        )
-    return "<h3>Proven: largest influence</h3>" + table(
-        ("block", "effect", "largest influence", ""), rows
-    )
-
-
-def _measured(errors: MeasuredErrors | None, table: Table, text: Text) -> str:
-    if errors is None:
-        return (
-            "<p class='note'>Errors of the models were not measured (a study of 100 runs or more "
-            "does it by itself): <code>dsa-des study report FOLDER --measure</code>.</p>"
-        )
-    rows = [
-        (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short(e.mean), short(e.p95),
-         short(e.largest), e.target_scans, _against(e.against))
-        for e in errors.rows
-    ]  # fmt: skip
-    heads = ("block", "model", "error of", "mean", "95 %", "largest", "target-scans", "against")
-    notes = "".join(f"<li>{text(note)}</li>" for note in errors.notes)
-    return (
-        "<h3>Measured over the first run</h3>"
-        + table(heads, rows)
-        + (f"<p class='note'>Not measured:</p><ul class='note'>{notes}</ul>" if notes else "")
-    )
-
-
-def _against(said: str) -> str:
-    """Return what an error is against: another model, or for a reference something far better."""
-    return f"its own error, {said}" if said.startswith("measured") else said
-
-
-def _effects(scene: SceneRecord, table: Table) -> str:
-    built = [e for e in scene.effects if e.simulated]
-    left = [e for e in scene.effects if not e.simulated]
-
-    def rows(some: list[EffectRecord]) -> list[tuple[str, str, str]]:
-        together: dict[tuple[str, str], list[str]] = {}
-        for e in some:
-            together.setdefault((e.effect, e.because), []).append(e.block)
-        return [(", ".join(blocks), effect, why) for (effect, why), blocks in together.items()]
-
-    parts = []
-    if built:
-        parts.append("<h3>Simulated</h3>" + table(("where", "effect", "because"), rows(built)))
-    if left:
-        parts.append(
-            "<h3>Left out, and why</h3>" + table(("where", "effect", "because"), rows(left))
-        )
-    if scene.spared:
-        parts.append(
-            "<h3>Work that is spared</h3>" + table(("block", "what, and why"), scene.spared)
-        )
-    return "\n".join(parts)
+def _hashes(folder: StudyFolder) -> list[tuple[str, str]]:
+    files = [folder.parts / f"{name}.parquet" for name in folder.part_names()[:_MOST_PARTS]]
+    hashes = [(file.name, hashlib.sha256(read_regular(file)).hexdigest()) for file in files]
+    return [("study, with all that fixes its results", folder.record.study_sha256), *hashes]
