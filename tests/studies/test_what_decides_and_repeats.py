@@ -12,7 +12,7 @@ import dsa_des
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.ratio import paired_ratio
 from dsa_des.studies import models, runner
-from tests.studies.test_ratios import ratio
+from tests.results.test_ratios import ratio
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,4 +1,4 @@
-"""Rows of a study made of one table, for tests by hand."""
+"""Rows of results from tables in memory, and a small study."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -8,6 +8,9 @@ import numpy as np
 import pyarrow as pa
 
 from dsa_des.results.rows import Rows
+from tests.studies.conftest import small
+
+__all__ = ["small"]
 
 
 class _Table:

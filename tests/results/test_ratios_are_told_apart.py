@@ -10,9 +10,9 @@ from dsa_des.results.ratio import paired_ratio
 from dsa_des.results.record import RATIO, RatioOf, Result
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.study_file import read_study
-from tests.studies.table_rows import rows_of_table
-from tests.studies.test_ratios import ratio, rows_of
-from tests.studies.test_requirements import ROOT, STUDY
+from tests.results.conftest import rows_of_table
+from tests.results.test_ratios import ratio, rows_of
+from tests.results.test_requirements import ROOT, STUDY
 
 
 def flags(count: int = 40) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from dsa_des.results.rows import paired_units
 from dsa_des.results.statistics import Estimate, difference, mean, share
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.draws import parse_draw
-from tests.studies.table_rows import rows_of_table
+from tests.results.conftest import rows_of_table
 
 #: Chance alone moves a coverage of 95 % over so many rounds by 0.5 % (two standard deviations: 1).
 ROUNDS = 2000

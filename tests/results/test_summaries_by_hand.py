@@ -7,7 +7,7 @@ from scipy import stats
 
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.summary import compare_axis
-from tests.studies.table_rows import rows_of_table
+from tests.results.conftest import rows_of_table
 
 
 def table(**columns: list) -> pa.Table:

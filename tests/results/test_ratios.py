@@ -10,7 +10,7 @@ from dsa_des.results.ratio import paired_ratio
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
 from dsa_des.results.summary import compare_axis, summarise
-from tests.studies.table_rows import rows_of_table
+from tests.results.conftest import rows_of_table
 
 FLAGS = [
     Result("n", EVENT, ""), Result("m", EVENT, ""), Result("w", NUMBER, ""),
