@@ -23,6 +23,8 @@ from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import printable
 
+_PARAMETER_HEADS = ("  name", "type", "unit", "default", "meaning")
+
 
 def show_components(name: str | None) -> None:
     """Print the list of block types, or the description of one."""
@@ -65,11 +67,21 @@ def _describe_table(
     console: Any, name: str, what: str, rows: typing.Callable[[], list[typing.Any]]
 ) -> None:
     console.print(Text.assemble((name, "bold"), f"  {what}"))
+    _print_rows(
+        console,
+        _PARAMETER_HEADS,
+        [[Text(f"  {first}"), *map(Text, rest)] for first, *rest in rows()],
+    )
+
+
+def _print_rows(
+    console: Any, heads: typing.Sequence[str], rows: typing.Iterable[typing.Sequence[Any]]
+) -> None:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("  name", "type", "unit", "default", "meaning"):
+    for heading in heads:
         table.add_column(heading, no_wrap=heading.startswith("  "))
-    for first, *rest in rows():
-        table.add_row(Text(f"  {first}"), *map(Text, rest))
+    for row in rows:
+        table.add_row(*row)
     console.print(table, highlight=False)
 
 
@@ -103,12 +115,7 @@ def _describe(console: Any, name: str, cls: type[Component]) -> None:
             console.print(line, highlight=False)
     console.print()
     console.print("parameters", style="bold")
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("  name", "type", "unit", "default", "meaning"):
-        table.add_column(heading, no_wrap=heading.startswith("  "))
-    for row in parameter_rows(cls.Parameters):
-        table.add_row(*row)
-    console.print(table, highlight=False)
+    _print_rows(console, _PARAMETER_HEADS, parameter_rows(cls.Parameters))
     _describe_hooks(console, cls)
     for ladder in cls.ladders:
         _describe_ladder(console, ladder)
@@ -121,13 +128,12 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
         return
     console.print()
     console.print("hooks, what effects may act on", style="bold")
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("  hook", "what it calls", "effects"):
-        table.add_column(heading, no_wrap=heading.startswith("  "))
-    for hook, how in sorted(hooks.items()):
-        names = ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
-        table.add_row(f"  {hook}", how, names or "-")
-    console.print(table, highlight=False)
+    acting = {
+        hook: ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
+        for hook in hooks
+    }
+    rows = [(f"  {hook}", how, acting[hook] or "-") for hook, how in sorted(hooks.items())]
+    _print_rows(console, ("  hook", "what it calls", "effects"), rows)
 
 
 def _describe_ladder(console: Any, ladder: Ladder) -> None:
@@ -135,24 +141,17 @@ def _describe_ladder(console: Any, ladder: Ladder) -> None:
     console.print()
     console.print(f"ladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
                   highlight=False)  # fmt: skip
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("  rung", "type", "what it is"):
-        table.add_column(heading, no_wrap=heading.startswith("  "))
-    for rung in ladder.rungs:
-        reference = " (reference)" if rung.name == ladder.reference else ""
-        table.add_row(f"  {rung.name}{reference}", rung.type_name or "as it is", rung.what)
-    console.print(table, highlight=False)
+    names = [f"  {r.name}{' (reference)' * (r.name == ladder.reference)}" for r in ladder.rungs]
+    rows = [(name, r.type_name or "as it is", r.what)
+            for name, r in zip(names, ladder.rungs, strict=True)]  # fmt: skip
+    _print_rows(console, ("  rung", "type", "what it is"), rows)
 
 
 _HEADINGS = {
     "scene": "Scenes: dsa-des run NAME",
     "study": "Studies: dsa-des study NAME",
 }
-
-
 _OPTION = "--copy"
-
-
 _CODE = "__pycache__"
 
 

@@ -14,10 +14,10 @@ from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
     check_workers,
     finish,
-    known_results,
+    report_crashes,
+    result_names,
     run_into,
     show_study,
-    tell_crashed,
 )
 from dsa_des.commands.what_changed import Pair, Units, say_changes_along, say_what_changed
 from dsa_des.errors import UsageError, did_you_mean
@@ -66,7 +66,7 @@ def compare_command(
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
         found = _compare_swap(chosen_file(paths[0]), swaps, replicas, results, workers, out)
-        tell_crashed(found, _ANEW)
+        report_crashes(found, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
         show_study(Path(paths[0]), results, _first(results))
@@ -77,7 +77,7 @@ def compare_command(
     studies = [_study_at(path, replicas) for path in files]
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
-        known_results(record.results, results)
+        result_names(record.results, results)
     by_place: dict[Path, Tables] = {}  # what is named twice is run once
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
@@ -88,7 +88,7 @@ def compare_command(
         for number, (other, path) in enumerate(zip(found[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(found) == 2 else f"scatter-{number}"
             _compare(found[0], other, (paths[0], path), results, home / stem)
-    tell_crashed(list(by_place.values()), _ANEW)
+    report_crashes(list(by_place.values()), _ANEW)
 
 
 def _compare_swap(
@@ -115,14 +115,14 @@ def _compare_swap(
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
     study = _read(path, replicas, chosen)
-    known_results(results_of(study), results)
+    result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=lambda _: _ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
     axis = f"swap.{chosen[0][0]}"
     place = tables.rows.axes.index(axis)
     by_place = dict(tables.rows.each_place())
-    metrics = tables.telling(results)
+    metrics = tables.notable_results(results)
     for at, rows in by_place.items():
         base = (*at[:place], chosen[0][1][0], *at[place + 1 :])
         if at[place] == chosen[0][1][0] or base not in by_place:

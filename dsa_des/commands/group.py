@@ -73,8 +73,6 @@ def plain_output() -> Iterator[None]:
 
 
 COMMANDS = "dsa_des.commands"
-
-
 # What click (from 8.2 on) raises where a command is missing: its message is the whole help.
 HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 

@@ -110,8 +110,6 @@ def _unit(name: str, kind: str) -> str:
 
 #: Name, type with bounds, unit, default, meaning.
 Row = tuple[str, str, str, str, str]
-
-
 SCENE: tuple[Row, ...] = (
     ("title", "text", "", "the file's name", "What the scene is, for tables and figures."),
     ("description", "text", "", "-", "More about it."),
@@ -121,8 +119,6 @@ SCENE: tuple[Row, ...] = (
     ("wires", "list", "", "[]", "Who sends to whom: texts or tables."),
     ("processors", "tables", "", "-", "Shared processors, by name."),
 )
-
-
 ANYWHERE: tuple[Row, ...] = (
     ("extends", "text or list of texts", "", "-",
      "TOML files whose keys come first, from the folder of the file that says it; where there is "
@@ -132,8 +128,6 @@ ANYWHERE: tuple[Row, ...] = (
      "Inherited keys that are taken away, dotted from this table: [\"calibrate\"]. Items of a list "
      "with a name go by it: [\"intruders.head_on\"]."),
 )  # fmt: skip
-
-
 WIRES: tuple[Row, ...] = (
     ("from", "text", "", "required",
      "Block, or block.output. A text \"a -> b -> c\" is short for tables."),

@@ -36,11 +36,11 @@ def load(
     path = chosen_file(scene, "scene")
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     if not quiet:
-        say_what_was_done(loaded)
+        say_notes(loaded)
     return loaded
 
 
-def say_what_was_done(loaded: Scene) -> None:
+def say_notes(loaded: Scene) -> None:
     """List on standard error what was done to a scene that its files do not show."""
     for key in loaded.dropped:
         say(f"note: the swap dropped {key}", err=True)

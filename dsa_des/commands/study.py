@@ -67,7 +67,7 @@ def study_command(
                 _measure(folder)
         except KeyboardInterrupt:
             _stopped("interrupted", again(folder.path), 130)
-        tell_crashed([tables], again(folder.path))
+        report_crashes([tables], again(folder.path))
     else:
         raise UsageError("give STUDY.toml, or: show FOLDER, or: report FOLDER")
 
@@ -124,7 +124,7 @@ def _stopped(reason: str, again: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def tell_crashed(found: Sequence[Tables], again: str) -> None:
+def report_crashes(found: Sequence[Tables], again: str) -> None:
     """Say how many runs crashed, and end with exit code 1 if there are any."""
     crashed = sum(tables.rows.crashed for tables in found)
     if crashed:
@@ -227,7 +227,7 @@ def show_study(
     The folder's tables are read and nothing else: no scene, and no code that it names.
     """
     folder = StudyFolder(path)
-    every = known_results(folder.record.results, only)
+    every = result_names(folder.record.results, only)
     finish(folder.record, folder, only=only or every, first=first, draw=draw)
 
 
@@ -262,7 +262,7 @@ def _report(path: Path, out: str | None, *, draw: bool, measure: bool) -> None:
     say(f"wrote {target}")
 
 
-def known_results(results: Sequence[Result], only: Sequence[str]) -> list[str]:
+def result_names(results: Sequence[Result], only: Sequence[str]) -> list[str]:
     """Return the names of results.
 
     Raises

@@ -123,8 +123,6 @@ def shown(change: Change, changes: Mapping[str, Any], none: str) -> str:
 
 #: Compares the recorded tables of the reference's run and of a rung's run.
 Compare = Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
-
-
 # Two costs nearer to each other than this factor come in another order in another run.
 _APART = 1.1
 

@@ -24,11 +24,7 @@ from dsa_des.scene.scene import Scene
 
 # Slow rungs are timed fewer times: all passes of one rung together take about this long at most.
 _LONGEST_S = 2.0
-
-
 _FEWEST = 3
-
-
 # A repeat is the best of so many passes: what interrupts a pass is not the block's.
 _PASSES = 10
 

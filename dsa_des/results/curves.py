@@ -57,12 +57,12 @@ def draw_axis(
     with drawing(9.6 if len(series) > 4 else 7.5, 6.4 if shown else 4.2, target) as figure:
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
-        for number, (who, some) in enumerate(series[:_MOST_LINES]):
+        for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
             shift = 0.0 if numeric else (number - (min(len(series), 12) - 1) / 2) * 0.06
             x = np.array([where[line.at[place]] for line in some]) + shift
             known = any(not np.isnan(line.estimate.half_width) for line in some)
-            seen = who or "simulated" + f", {100 * confidence:g} % interval" * known
+            seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
             _points(top, x, some, colour, marker, seen, join=numeric)
             expected = [line.expected for line in some]
             if any(item is not None for item in expected):
@@ -134,7 +134,7 @@ def _beside_or_inside(axes: Any) -> None:
 
 
 def _points(
-    axes: Any, x: Any, lines: list[Line], colour: str, marker: str, who: str, *, join: bool
+    axes: Any, x: Any, lines: list[Line], colour: str, marker: str, series_label: str, *, join: bool
 ) -> None:
     y = np.array([line.estimate.value for line in lines])
     low = np.array([line.estimate.low for line in lines])
@@ -142,7 +142,7 @@ def _points(
     bars = np.nan_to_num(np.abs([y - low, high - y]))
     axes.errorbar(
         x, y, yerr=bars, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
-        ls="-" if join else "none", label=who or None, zorder=2,
+        ls="-" if join else "none", label=series_label or None, zorder=2,
     )  # fmt: skip
 
 
@@ -166,9 +166,9 @@ def _differences(
         x = np.array([where[item.value] for item in items])
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
-        who = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
+        series_label = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
         axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
-                      ls="none", label=who or None)  # fmt: skip
+                      ls="none", label=series_label or None)  # fmt: skip
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
@@ -197,7 +197,7 @@ def draw_polar(
         polar.set_theta_zero_location("N")
         polar.set_theta_direction(-1)
         series = list(_series_along(axes, lines, axis, None).items())
-        for number, (who, some) in enumerate(series[:_MOST_LINES]):
+        for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _style(some[0].result.mark, number, len(series))
             some = sorted(some, key=lambda line: line.at[place])
             angle = np.radians([line.at[place] for line in some])
@@ -208,7 +208,9 @@ def draw_polar(
             ring = slice(None)
             if len(some) > 2 and np.ptp(np.degrees(angle)) >= 270:
                 ring = np.append(np.arange(len(some)), 0)  # type: ignore[assignment]
-            polar.plot(angle[ring], value[ring], color=colour, marker=marker, ms=4, label=who)
+            polar.plot(
+                angle[ring], value[ring], color=colour, marker=marker, ms=4, label=series_label
+            )
             polar.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         polar.set_ylim(bottom=0.0)
         over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
@@ -226,15 +228,20 @@ def draw_histogram(
     path: Target, series: Sequence[Spread], metric: str, title: str, mark: tuple[str, str] | None
 ) -> None:
     """Draw how many runs have which value, one outline per series over common bins."""
-    known = [(who, values[~np.isnan(values)], len(values)) for who, values in series[:_MOST_LINES]]
+    known = [
+        (series_label, values[~np.isnan(values)], len(values))
+        for series_label, values in series[:_MOST_LINES]
+    ]
     every = np.concatenate([values for _, values, _ in known] or [np.empty(0)])
     with drawing(9.0 if len(known) > 4 else 7.5, 4.2, path) as figure:
         axes = figure.add_subplot()
         edges = _edges(every, max((len(values) for _, values, _ in known), default=0))
-        for number, (who, values, runs) in enumerate(known):
+        for number, (series_label, values, runs) in enumerate(known):
             colour = _style(mark, number, len(known))[0]
             counts = np.histogram(values, edges)[0]
-            axes.stairs(counts, edges, color=colour, lw=1.4, label=_counted(who, values, runs))
+            axes.stairs(
+                counts, edges, color=colour, lw=1.4, label=_counted(series_label, values, runs)
+            )
             axes.stairs(counts, edges, color=colour, fill=True, alpha=0.15)
         axes.set_ylim(bottom=0.0)
         axes.yaxis.get_major_locator().set_params(integer=True)
@@ -252,18 +259,21 @@ def draw_cdf(
     shown = series[:_MOST_LINES]
     with drawing(9.0 if len(shown) > 4 else 7.5, 4.2, path) as figure:
         axes = figure.add_subplot()
-        for number, (who, values) in enumerate(shown):
+        for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
             if not len(ascending):
                 axes.plot(
-                    [], [], color=_style(mark, number, len(shown))[0], label=f"{who}: no value"
+                    [],
+                    [],
+                    color=_style(mark, number, len(shown))[0],
+                    label=f"{series_label}: no value",
                 )
                 continue
             share = np.arange(1, len(ascending) + 1) / len(values)
             axes.step(
                 np.concatenate((ascending[:1], ascending)), np.concatenate(([0.0], share)),
                 where="post", color=_style(mark, number, len(shown))[0], lw=1.4,
-                label=_counted(who, ascending, len(values)),
+                label=_counted(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.set_ylabel("Share of the runs at or below")
@@ -271,9 +281,9 @@ def draw_cdf(
         _finish(figure, axes, metric, title)
 
 
-def _counted(who: str, values: FloatArray, runs: int) -> str:
+def _counted(series_label: str, values: FloatArray, runs: int) -> str:
     of = f"{len(values):,} of {runs:,}" if len(values) < runs else f"{runs:,}"
-    return f"{who}: {of} runs" if who else f"{of} runs"
+    return f"{series_label}: {of} runs" if series_label else f"{of} runs"
 
 
 def _edges(values: FloatArray, most: int) -> FloatArray:
@@ -316,13 +326,13 @@ def draw_series(
         axes = figure.add_subplot()
         if freedom is not None and series:
             _bounds(axes, series[0][1], series[0][2], freedom, confidence)
-        for place, (who, x, lines) in enumerate(series[:_MOST_LINES]):
+        for place, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
             colour, marker = STYLES[place % len(STYLES)]
             value, low, high = (
                 np.array([getattr(line.estimate, part) for line in lines])
                 for part in ("value", "low", "high")
             )
-            label = who or f"mean of the runs, {100 * confidence:g} % interval"
+            label = series_label or f"mean of the runs, {100 * confidence:g} % interval"
             axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label, zorder=2)
             axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2)
         axes.set_ylim(bottom=0.0)

@@ -149,7 +149,7 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
         base = (*at[:place], baseline, *at[place + 1 :])
         if at[place] == baseline or base not in by_place:
             continue
-        for metric in tables.telling(only):
+        for metric in tables.notable_results(only):
             _, first, second = paired(tables.rows, metric, by_place[base], chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
             names, drawn = (str(baseline), str(at[place])), io.BytesIO()

@@ -21,21 +21,11 @@ if TYPE_CHECKING:
 
 
 STUDY_JSON = "study.json"
-
-
 PARTS = "parts"
-
-
 LOCK = ".lock"
-
-
 #: A part: the number of its round and its own.
 _PART = re.compile(r"part-(\d{3,})-\d{6,}\.parquet")
-
-
 _MOST_JSON_BYTES = 256 * 2**20
-
-
 _Head = TypeVar("_Head", bound=StudyHead)
 
 

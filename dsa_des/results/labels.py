@@ -11,20 +11,12 @@ _UNITS = {
     "db": "dB", "dbsm": "dBsm", "dbm": "dBm", "ppm": "ppm", "w": "W", "k": "K", "ft": "ft",
     "px": "px", "pixels": "pixels", "percent": "%", "mrad": "mrad", "mm": "mm",
 }  # fmt: skip
-
-
 #: Units of two words, such as ``mm_per_h``.
 _PER = re.compile(r"_([a-z]+2?)_per_([a-z]+)$")
-
-
 #: Words of two letters that are none but words.
 _WORDS = {"at", "by", "in", "is", "no", "of", "on", "or", "to", "up"}
-
-
 #: Abbreviations that hold vowels.
 _ABBREVIATIONS = {"nees", "ospa", "gospa", "nmac", "siap"}
-
-
 _CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
 
 

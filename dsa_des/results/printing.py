@@ -94,7 +94,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
     notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
     notes += ["few"] if estimate.few else []
     return [
-        answer.requirement.said(), answer.requirement.axis, tables.others_said(answer),
+        answer.requirement.text(), answer.requirement.axis, tables.other_values(answer),
         "none" if answer.value is None else short(answer.value), short(estimate.value),
         interval_text(estimate), "none" if answer.estimated is None else short(answer.estimated),
         "; ".join(notes),

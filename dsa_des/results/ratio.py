@@ -38,12 +38,8 @@ from dsa_des.errors import shown_value
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
 METHODS = ("gamma", "delta", "bootstrap")
-
-
 # Counts of drawn encounters that are in memory at once.
 _AT_ONCE = 2_000_000
-
-
 _FEW = 20.0
 
 

@@ -148,7 +148,7 @@ class Requirement:
     #: Whether the last value of the axis is the cheapest; otherwise the first.
     cheap_last: bool = False
 
-    def said(self) -> str:
+    def text(self) -> str:
         """Return ``nmac_risk_ratio at most 0.3``."""
         return f"{self.metric} at {'most' if self.below else 'least'} {self.limit:g}"
 

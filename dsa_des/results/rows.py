@@ -31,15 +31,9 @@ if TYPE_CHECKING:
 
 #: Bytes of columns that are held at a time; a study of more rows than that holds at least one.
 _MOST_HELD_BYTES = 2**27
-
-
 #: Of rows without result, the first ones are told.
 MOST_FAILED = 50
-
-
 _PLACE = ("cell", "replica")
-
-
 #: Columns that stand in no statistics.
 _ABOUT = ("status", "error", "command")
 

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 
 
 _NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-
-
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
-
-
 _BINARY = getattr(os, "O_BINARY", 0)
 
 
@@ -62,15 +58,9 @@ def open_lock(path: Path) -> int:
 
 
 _KEY = b"dsa_des.sha256"
-
-
 _DIGITS = 64
-
-
 #: The key as Thrift's compact protocol writes it, then a text of 64 bytes.
 _MARK = _KEY + bytes([0x18, _DIGITS])
-
-
 _ZEROS = b"0" * _DIGITS
 
 

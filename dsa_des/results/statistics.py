@@ -10,13 +10,9 @@ from dsa_des.arrays.types import FloatArray
 
 #: Below this many values (effective trials, for a share) an interval says little.
 FEW = 10
-
-
 #: Below this many units with a trial that went otherwise than most, an interval of a share of
 #: trials that hang together says little.
 FEW_UNLIKE = 5
-
-
 _RESAMPLES = 2000
 
 

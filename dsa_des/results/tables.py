@@ -21,11 +21,7 @@ from dsa_des.text.safe_text import shortened
 
 _MOST_SCATTERS = 6
 SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
-
-
 REQUIREMENTS = "requirements.parquet"
-
-
 #: (Result, place) → the analytic answer there.
 Expected = Mapping[tuple[str, tuple[Any, ...]], float]
 
@@ -149,7 +145,7 @@ class Tables:
         }
         return columns
 
-    def others_said(self, answer: Answer) -> str:
+    def other_values(self, answer: Answer) -> str:
         """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
         names = [name for name in self.rows.axes if name != answer.requirement.axis]
         return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
@@ -157,9 +153,9 @@ class Tables:
     def _answer_columns(self) -> dict[str, list[Any]]:
         found = self.answers
         return {
-            "requirement": [item.requirement.said() for item in found],
+            "requirement": [item.requirement.text() for item in found],
             "axis": [item.requirement.axis for item in found],
-            "others": [self.others_said(item) for item in found],
+            "others": [self.other_values(item) for item in found],
             "cheapest": [None if item.value is None else short(item.value) for item in found],
             "confidence": [one_sided(self.record.confidence)] * len(found),
             "cheapest_by_estimate": [
@@ -206,7 +202,7 @@ class Tables:
         }
         return columns
 
-    def telling(self, only: Sequence[str] = ()) -> list[str]:
+    def notable_results(self, only: Sequence[str] = ()) -> list[str]:
         """Return the results worth a closer look: those named, drawn, or else that differ."""
         drawn = [f.metric for f in self.record.figures if f.metric is not None]
         if only or drawn:

@@ -16,21 +16,11 @@ from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import parse_rational
 
 SWAP = "swap."
-
-
 _SPEC_KEYS = ("from", "to", "step", "steps", "log", "files", "beat_with", "values", "set")
-
-
 #: Each value is checked before anything runs, some 3 ms each.
 _MOST_VALUES = 10_000
-
-
 _MOST_FILES = 100_000
-
-
 _LONGEST_FRACTION = 300
-
-
 _FRACTION = re.compile(r"\d+/[1-9]\d*")
 
 

@@ -207,8 +207,6 @@ class _Size:
 #: Rows that runs of a study record at a time, in bytes; they are held up to three times. The first
 #: runs of a cell tell how many that is.
 _MOST_BYTES, _FIRST_RUNS = 150e6, 64
-
-
 _MOST_KNOWN = 1000
 
 

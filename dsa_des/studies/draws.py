@@ -24,8 +24,6 @@ from dsa_des.time.randomness import key_of
 
 #: No normal draw lies farther out: the smallest probability is 2^-54.
 _MOST_SIGMA = 9.0
-
-
 KINDS = ("uniform", "normal", "choice", "latin_hypercube", "sequence")
 
 

@@ -27,8 +27,6 @@ from dsa_des.studies.study import Chunk, Study
 
 #: How often a chunk may lose its process before it is cut.
 _PATIENCE = 2
-
-
 #: How often a single run may lose its process before it has crashed.
 TRIES = 3
 
@@ -128,14 +126,8 @@ def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
 
 #: How many pieces a worker has at a time: the next one is there when it ends the first.
 _AHEAD = 2
-
-
 _CONNECT_TIMEOUT_S = 5
-
-
 _SAFE_PATH = "PYTHONSAFEPATH"
-
-
 #: The folder that we were imported from.
 _HOME = str(Path(__file__).parents[2])
 
@@ -216,7 +208,7 @@ class _Worker:
     def submit(self, piece: Piece) -> None:
         """Run a piece after those that were given before."""
         try:
-            with not_from_here():
+            with safe_import_path():
                 if self._pool is None:
                     self._pool = _new_pool(self.study)
                 future = self._pool.submit(_work, piece.chunk)
@@ -260,7 +252,7 @@ def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
 
 
 @contextmanager
-def not_from_here() -> Iterator[None]:
+def safe_import_path() -> Iterator[None]:
     """Let nothing of the working directory, or beside a script, stand in for another module.
 
     Python puts the working directory first on the module path of each process that it starts with
@@ -269,7 +261,7 @@ def not_from_here() -> Iterator[None]:
     """
     before, path = os.environ.get(_SAFE_PATH), list(sys.path)
     os.environ[_SAFE_PATH] = "1"
-    sys.path[:] = _own_last(path)
+    sys.path[:] = _script_folder_last(path)
     # Nor do they run the program again that started the study: it may be a script without a guard.
     program = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -284,7 +276,7 @@ def not_from_here() -> Iterator[None]:
             os.environ[_SAFE_PATH] = before
 
 
-def _own_last(path: list[str]) -> list[str]:
+def _script_folder_last(path: list[str]) -> list[str]:
     """Return a module path without the working directory, and a script's folder last.
 
     The folder that we were imported from stays, whichever it is.

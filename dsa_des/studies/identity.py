@@ -25,7 +25,7 @@ from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_tables import json_safe
 
 #: Texts for people, which name no file.
-_SAID = ("title", "description", "labels")
+_PROSE = ("title", "description", "labels")
 
 
 def description_text(study: Study) -> str:
@@ -75,7 +75,7 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
     the file that holds it; whichever way a file is named, its content is what counts.
     """
     if isinstance(value, Mapping):
-        return _files_in([item for key, item in value.items() if key not in _SAID], beside)
+        return _files_in([item for key, item in value.items() if key not in _PROSE], beside)
     if isinstance(value, list | tuple):
         return set().union(*(_files_in(item, beside) for item in value))
     if not isinstance(value, str):

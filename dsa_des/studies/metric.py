@@ -44,8 +44,6 @@ __all__ = [
 ]  # fmt: skip
 
 METRICS = "dsa_des.metrics"
-
-
 _T = TypeVar("_T")
 
 

@@ -21,8 +21,6 @@ from dsa_des.studies.study import Study
 
 #: How many replicas the ends of a range are looked for in.
 _MOST_DRAWN = 10_000
-
-
 #: In so many scenes the last value of a sequence is tried.
 _MOST_SCENES = 64
 

@@ -14,8 +14,6 @@ from dsa_des.studies.draws import KINDS
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when")
-
-
 #: The key of an axis whose values are patterns of file names.
 _PATTERNS = "files"
 
@@ -111,11 +109,7 @@ FIGURES = {
     "series": ("metric", "freedom"),
     "run": ("cell", "replica"),
 }
-
-
 _MOST_FREEDOM = 1e6
-
-
 _AXES = ("axis", "lines", "x", "y")
 
 
