@@ -57,12 +57,6 @@ def description_text(study: Study) -> str:
     return record_text(study, hashlib.sha256(text.encode()).hexdigest())
 
 
-def description(study: Study) -> dict[str, Any]:
-    """Return the content of ``study.json`` as a table."""
-    content: dict[str, Any] = json.loads(description_text(study))
-    return content
-
-
 def record_of(study: Study) -> StudyRecord:
     """Return the record of a study as its folder will hold it."""
     return StudyRecord.model_validate_json(description_text(study))

@@ -89,11 +89,20 @@ def study_of_tables(
     SceneError
         With every problem found.
     """
-    return _GivenReader(tables, base, swaps, sets).study(())
+    return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 
 
 class _StudyReader:
-    def __init__(self, file: SceneFile) -> None:
+    """Reads a study; its scene, and changes of every cell, may be given beside its tables."""
+
+    def __init__(
+        self,
+        file: SceneFile,
+        base: SceneFile | None = None,
+        swaps: Sequence[tuple[str, str]] = (),
+        sets: Sequence[tuple[str, Any]] = (),
+    ) -> None:
+        self._base, self._swaps, self._sets = base, swaps, sets
         self.file = file
         self.data = file.data
         self.problems: list[Problem] = []
@@ -185,18 +194,20 @@ class _StudyReader:
         return value
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        flat = flat_values(self.table("set"))
-        return tuple(flat.items())
+        return (*self._sets, *flat_values(self.table("set")).items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
-        return tuple(
+        named = [
             (block, str(absolute(name)) if isinstance(name, str) else str(name))
             for block, name in self.table("swap").items()
-        )
+        ]
+        return (*self._swaps, *named)
 
     # -- the base scene --------------------------------------------------------------------
 
     def scene(self) -> tuple[SceneFile | None, Scene | None]:
+        if self._base is not None:
+            return self.checked(self._base)
         name = self.data.get("scene")
         if not isinstance(name, str):
             self.add(("scene",), "is required: the TOML file of the scene that is studied")
@@ -351,26 +362,3 @@ class _StudyReader:
             self.add(("stop_when", "batch"), "must be a whole number of 2 or more", batch)
             return None
         return StopWhen(str(table["metric"]), float(width), min(batch, replicas))
-
-
-class _GivenReader(_StudyReader):
-    """Reads a study whose scene, and what is changed in it, are not in its tables."""
-
-    def __init__(
-        self,
-        tables: dict[str, Any],
-        base: SceneFile,
-        swaps: Sequence[tuple[str, str]],
-        sets: Sequence[tuple[str, Any]],
-    ) -> None:
-        super().__init__(SceneFile(Path("study"), tables))
-        self._base, self._swaps, self._sets = base, tuple(swaps), tuple(sets)
-
-    def scene(self) -> tuple[SceneFile | None, Scene | None]:
-        return self.checked(self._base)
-
-    def swaps(self) -> tuple[tuple[str, str], ...]:
-        return self._swaps
-
-    def sets(self) -> tuple[tuple[str, Any], ...]:
-        return self._sets

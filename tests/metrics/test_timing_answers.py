@@ -14,7 +14,7 @@ from components.metrics.track_quality import age_quantile_s, mean_age_s, mean_in
 from dsa_des.cli import main
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.identity import description, record_of
+from dsa_des.studies.identity import record_of
 from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_file import read_study
@@ -188,7 +188,7 @@ def test_a_changed_encounter_file_is_another_study(tmp_path: Path) -> None:
     def digest() -> str:
         sets = [f'axes.blocks.traffic.file.files="{tmp_path}/*.daa"', "replicas=1"]
         study = read_study(READY / "folder_by_scan_rate.toml", sets=sets)
-        return str(description(study)["study_sha256"])
+        return str(record_of(study).study_sha256)
 
     first = digest()
     assert digest() == first
