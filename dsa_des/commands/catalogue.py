@@ -15,8 +15,8 @@ from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.commands.parameters import parameter_rows, scene_tables
 from dsa_des.errors import OutputError, UsageError
+from dsa_des.files.output_file import unfinished
 from dsa_des.files.output_names import check_place, location_of, named, reason_of
-from dsa_des.files.unfinished import unfinished
 from dsa_des.scene.examples import Example, examples
 from dsa_des.scene.shipped_files import folders
 from dsa_des.terminal import terminal

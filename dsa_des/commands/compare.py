@@ -32,7 +32,7 @@ from dsa_des.results.record import StudyRecord
 from dsa_des.results.rows import paired_units
 from dsa_des.results.statistics import difference
 from dsa_des.results.tables import Tables
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.identity import record_of, results_of

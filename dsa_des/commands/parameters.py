@@ -11,9 +11,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from dsa_des.block.sections import section_models
-from dsa_des.scene.options import BlockOptions
-from dsa_des.scene.processor import ProcessorParameters
+from dsa_des.block.registry import section_models
+from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",

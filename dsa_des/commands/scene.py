@@ -1,7 +1,9 @@
 """``dsa-des run``, ``check`` and ``explain``: one scene run, checked, and its effects told."""
 
+import gc
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,7 @@ from dsa_des.running.recorded_run import record_run
 from dsa_des.running.reports import load_reports
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import say_warnings, warnings_of
-from dsa_des.scene.chosen_file import chosen_file
-from dsa_des.scene.collection import no_collection
+from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.terminal import terminal
@@ -86,6 +87,18 @@ def run_scene(
             console.print(pacer.sentence(), soft_wrap=True)
         if check_rewinding:
             console.print("Every window ran twice from its saved state and came out the same.")
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Pause the search for cyclic garbage: of a million targets it takes a quarter of a check."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def check_scene_file(

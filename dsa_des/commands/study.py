@@ -17,7 +17,7 @@ from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
 from dsa_des.results.record import CLASS, Result, StudyRecord
 from dsa_des.results.tables import Tables
-from dsa_des.scene.chosen_file import chosen_file
+from dsa_des.scene.examples import chosen_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Clock, Stopped, draw_run, run_study, tables_of, why_one_by_one

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from dsa_des.block.mark import Mark, marks_of
-from dsa_des.block.module_search import file_of
-from dsa_des.block.source_file import is_file, path_of, split_name
+from dsa_des.block.source_file import file_of, is_file, path_of, split_name
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.files.input_files import resolve_home
-from dsa_des.files.manifest import RUN_JSON
+from dsa_des.files.output_folder import RUN_JSON
 from dsa_des.record.version import __version__
 from dsa_des.results.record import Result, StudyRecord, draw_column
 from dsa_des.scene.scene import Scene

@@ -9,7 +9,7 @@ from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.costs.climb import RungCost, applies, climb
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import short
