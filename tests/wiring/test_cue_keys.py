@@ -252,7 +252,7 @@ def test_a_loop_is_the_same_whatever_its_windows():
     scene["wires"].append("sensor -> fusion")
     loaded = dsa_des.load_scene(scene)
     tables = []
-    for options in ({}, {"window": 1}, {"check_rewinding": True}):
+    for options in ({}, {"window": 1}, {"window": 40}):
         sink = MemorySink()
         Simulation(loaded, recorder=Recorder([sink]), **options).run()
         tables.append(sink.tables())

@@ -8,7 +8,7 @@ import pytest
 from wired import HEARS_ALL, SEES_ALL, chain, rows, run, sensor
 
 import dsa_des
-from dsa_des.embed import Simulator
+from components.embedding.simulator import Simulator
 
 
 def geodetic_rad(flight: dict) -> tuple[tuple, list]:
