@@ -7,8 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.embed import HostDriven
-from components.embedding.simulator import Simulator
+from dsa_des.embed import HostDriven, Simulator
 from dsa_des.errors import BlockFailure, SceneError, UsageError
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

@@ -8,7 +8,7 @@ import pytest
 from wired import HEARS_ALL, SEES_ALL, chain, rows, run, sensor
 
 import dsa_des
-from components.embedding.simulator import Simulator
+from dsa_des.embed import Simulator
 
 
 def geodetic_rad(flight: dict) -> tuple[tuple, list]:

@@ -9,7 +9,7 @@ from covering import covers
 from wired import SENSORS, chain
 
 import dsa_des
-from components.embedding.simulator import Simulator
+from dsa_des.embed import Simulator
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import warnings_of
 
