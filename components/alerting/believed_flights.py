@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from components.alert_configuration.margins import Deviations
+from components.alert_configuration.configuration import Deviations
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 

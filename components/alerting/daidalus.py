@@ -7,17 +7,14 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
-from components.alert_configuration.configuration import Configuration
-from components.alert_configuration.margins import Deviations, margins
-from components.alerting.alert_table import without_memory
+from components.alert_configuration.configuration import Configuration, Deviations, margins
+from components.alerting.alert_tables import without_memory
 from components.alerting.believed_flights import BelievedFlights
 from components.alerting.followed_tracks import FollowedTracks
-from components.alerting.lasting_memory import LastingMemory
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
+from components.alerting.memory import LastingMemory, TrackMemory
 from components.alerting.own_poses import OwnPoses
-from components.alerting.separation import separation
 from components.alerting.straight_fit import StraightFit
-from components.alerting.track_memory import TrackMemory
 from components.geometry.attitude import body_to_ned
 from components.geometry.daidalus_sphere import east_north_m
 from components.guidance.situation import State
@@ -26,6 +23,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
+from components.well_clear.separation import separation
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, ScenePath
 from dsa_des.block.message import offsets_of

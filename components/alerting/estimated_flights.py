@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.alert_configuration.margins import Deviations, largest
+from components.alert_configuration.configuration import Deviations, largest
 from components.estimation.frame import ned_axes
 from components.geometry.daidalus_sphere import east_north_m, east_north_mps
 from components.geometry.enu import enu_to_geodetic

@@ -1,4 +1,4 @@
-"""What an alerting logic remembers of its targets: hysteresis, m of n, persistence."""
+"""Memory of alert levels: hysteresis, M-of-N, persistence, of one run or of many."""
 
 from dataclasses import dataclass
 
@@ -148,3 +148,180 @@ class AlertMemory:
         on = (self._output[:, np.newaxis] == levels) & before[:, np.newaxis]
         is_due = np.where(on, early, due)
         return np.asarray((is_due * levels).max(axis=1, initial=0))
+
+
+class LastingMemory:
+    """The memories of runs, made when each of them begins.
+
+    Parameters
+    ----------
+    rule : MemoryRule
+    targets : int
+        Of each run.
+    """
+
+    def __init__(self, rule: MemoryRule, targets: int) -> None:
+        self._rule, self._targets = rule, targets
+        #: Which runs are remembered, ascending, and what of all their targets.
+        self._runs: IntArray = np.empty(0, dtype=np.int64)
+        self._memory = AlertMemory(rule, 0)
+
+    def levels(
+        self,
+        run: IntArray,
+        now_s: FloatArray,
+        present: BoolArray,
+        due: BoolArray,
+        early: BoolArray,
+    ) -> IntArray:
+        """Take in some instants and return the level of each target, (n * targets,).
+
+        Parameters
+        ----------
+        run : (n,) of int
+            Ascending; the instants of a run are in order.
+        now_s : (n,)
+        present : (n, targets) of bool
+        due, early : (n, targets, levels) of bool
+            As `AlertMemory.step` has them.
+        """
+        begins = np.append(True, run[1:] != run[:-1])
+        first = np.flatnonzero(begins)
+        place = self._places(run[first])
+        turn = np.arange(len(run)) - first[np.cumsum(begins) - 1]
+        targets = np.arange(self._targets)
+        level = np.zeros((len(run), self._targets), dtype=np.int64)
+        order = np.argsort(turn, kind="stable")
+        for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
+            which = place[np.cumsum(begins)[rows] - 1][:, np.newaxis] * self._targets + targets
+            part = self._memory.take(which.reshape(-1))
+            shape = len(rows) * self._targets, due.shape[2]
+            stepped = part.step(
+                np.repeat(now_s[rows], self._targets), present[rows].reshape(-1),
+                due[rows].reshape(shape), early[rows].reshape(shape),
+            )  # fmt: skip
+            self._memory.put(which.reshape(-1), part)
+            level[rows] = stepped.reshape(len(rows), self._targets)
+        return level.reshape(-1)
+
+    def forget_before(self, run: int) -> None:
+        """Forget the runs before one."""
+        kept = np.flatnonzero(self._runs >= run)
+        if len(kept) < len(self._runs):
+            self._remembered(kept, self._runs[kept])
+
+    def _places(self, runs: IntArray) -> IntArray:
+        """Return the places of runs among those that are remembered, all of them from now on."""
+        if not np.isin(runs, self._runs).all():
+            every = np.union1d(self._runs, runs)
+            before = np.full(len(every), -1, dtype=np.int64)
+            before[np.searchsorted(every, self._runs)] = np.arange(len(self._runs))
+            self._remembered(before, every)
+        return np.searchsorted(self._runs, runs)
+
+    def _remembered(self, before: IntArray, runs: IntArray) -> None:
+        """Remember these runs, each as the one that was at a place before; -1 for a new one."""
+        memory = AlertMemory(self._rule, len(runs) * self._targets)
+        targets = np.arange(self._targets)
+        old = np.flatnonzero(before >= 0)
+        if len(old):
+            there = (old[:, np.newaxis] * self._targets + targets).reshape(-1)
+            here = (before[old][:, np.newaxis] * self._targets + targets).reshape(-1)
+            memory.put(there, self._memory.take(here))
+        self._runs, self._memory = runs, memory
+
+
+# Numbers of tracks stay below this; a key holds the run above it.
+_MOST_TRACKS = 1 << 40
+
+
+class TrackMemory:
+    """The memories of tracks; a track that was gone for longer than anything lasts is new.
+
+    Parameters
+    ----------
+    rule : MemoryRule
+    """
+
+    def __init__(self, rule: MemoryRule) -> None:
+        self._rule = rule
+        #: Run and number of each track that is remembered, ascending, and when it was last there.
+        self._key: IntArray = np.empty(0, dtype=np.int64)
+        self._seen_s: FloatArray = np.empty(0)
+        self._memory = AlertMemory(rule, 0)
+
+    def __len__(self) -> int:
+        """Return how many tracks are remembered."""
+        return len(self._key)
+
+    def levels(
+        self,
+        run: IntArray,
+        number: IntArray,
+        now_s: FloatArray,
+        due: BoolArray,
+        early: BoolArray,
+    ) -> IntArray:
+        """Take in tracks at some instants and return the level of each, (n,).
+
+        Parameters
+        ----------
+        run, number : (n,) of int
+            Runs ascending; the instants of a run in order.
+        now_s : (n,)
+        due, early : (n, levels) of bool
+            As `AlertMemory.step` has them.
+        """
+        key = run * _MOST_TRACKS + number
+        level = np.zeros(len(key), dtype=np.int64)
+        if len(key) == 0:
+            return level
+        order = np.argsort(key, kind="stable")
+        begins = np.append(True, key[order][1:] != key[order][:-1])
+        place = np.empty(len(key), dtype=np.int64)
+        place[order] = self._places(key[order][begins])[np.cumsum(begins) - 1]
+        turn = np.empty(len(key), dtype=np.int64)
+        turn[order] = np.arange(len(key)) - np.flatnonzero(begins)[np.cumsum(begins) - 1]
+        turns = np.argsort(turn, kind="stable")
+        for rows in np.split(turns, np.cumsum(np.bincount(turn))[:-1]):
+            part = self._memory.take(place[rows])
+            there = np.ones(len(rows), dtype=bool)
+            level[rows] = part.step(now_s[rows], there, due[rows], early[rows])
+            self._memory.put(place[rows], part)
+        self._seen_s[place] = now_s  # the last of each counts
+        return level
+
+    def forget(self, runs: IntArray, times_s: FloatArray) -> None:
+        """Forget tracks that were gone for too long.
+
+        Parameters
+        ----------
+        runs : (n,) of int
+            Ascending.
+        times_s : (n,)
+            What time it is in them.
+        """
+        of = self._key // _MOST_TRACKS
+        last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
+        away_s = np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)
+        self._remember(np.flatnonzero(away_s <= self._rule.hysteresis_s))
+
+    def forget_before(self, run: int) -> None:
+        """Forget the runs before one."""
+        self._remember(np.flatnonzero(self._key >= run * _MOST_TRACKS))
+
+    def _remember(self, which: IntArray) -> None:
+        if len(which) < len(self._key):
+            self._key, self._seen_s = self._key[which], self._seen_s[which]
+            self._memory = self._memory.take(which)
+
+    def _places(self, keys: IntArray) -> IntArray:
+        """Return the places of tracks (ascending), all of them remembered from now on."""
+        if not np.isin(keys, self._key).all():
+            every = np.union1d(self._key, keys)
+            old = np.searchsorted(every, self._key)
+            memory, seen_s = AlertMemory(self._rule, len(every)), np.full(len(every), -np.inf)
+            memory.put(old, self._memory)
+            seen_s[old] = self._seen_s
+            self._key, self._seen_s, self._memory = every, seen_s, memory
+        return np.searchsorted(self._key, keys)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from components.alerting.followed_tracks import FollowedTracks
-from components.alerting.memory import MemoryRule
-from components.alerting.track_memory import TrackMemory
+from components.alerting.memory import MemoryRule, TrackMemory
 from components.tracking.stub import TrackerStub
 from dsa_des.files.toml_text import to_toml
 from dsa_des.replicas.lockstep import lock_step

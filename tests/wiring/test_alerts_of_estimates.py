@@ -10,8 +10,7 @@ from wired import HEARS_ALL, chain, rows, run
 
 from components.alerting.daidalus import DaidalusAlerting
 from components.alerting.estimated_flights import EstimatedFlights
-from components.alerting.memory import MemoryRule
-from components.alerting.track_memory import TrackMemory
+from components.alerting.memory import MemoryRule, TrackMemory
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, TENTATIVE, StateTracks
 
 SIGMA_M = 25.0
