@@ -116,14 +116,6 @@ class AlertMemory:
         self._last_s = np.where(present, now_s, self._last_s)
         return level
 
-    def levels(
-        self, times_s: FloatArray, present: BoolArray, due: BoolArray, early: BoolArray
-    ) -> IntArray:
-        """Take in some instants in order and return all levels, (instants * targets,)."""
-        rows = enumerate(times_s.tolist())
-        found = [self.step(now_s, present[i], due[i], early[i]) for i, now_s in rows]
-        return np.concatenate(found)
-
     def early_levels(self, now_s: float, present: BoolArray) -> IntArray:
         """Return whose early alerting time counts for guidance: levels that rose before now.
 
@@ -150,108 +142,22 @@ class AlertMemory:
         return np.asarray((is_due * levels).max(axis=1, initial=0))
 
 
-class LastingMemory:
-    """The memories of runs, made when each of them begins.
-
-    Parameters
-    ----------
-    rule : MemoryRule
-    targets : int
-        Of each run.
-    """
-
-    def __init__(self, rule: MemoryRule, targets: int) -> None:
-        self._rule, self._targets = rule, targets
-        #: Which runs are remembered, ascending, and what of all their targets.
-        self._runs: IntArray = np.empty(0, dtype=np.int64)
-        self._memory = AlertMemory(rule, 0)
-
-    def levels(
-        self,
-        run: IntArray,
-        now_s: FloatArray,
-        present: BoolArray,
-        due: BoolArray,
-        early: BoolArray,
-    ) -> IntArray:
-        """Take in some instants and return the level of each target, (n * targets,).
-
-        Parameters
-        ----------
-        run : (n,) of int
-            Ascending; the instants of a run are in order.
-        now_s : (n,)
-        present : (n, targets) of bool
-        due, early : (n, targets, levels) of bool
-            As `AlertMemory.step` has them.
-        """
-        begins = np.append(True, run[1:] != run[:-1])
-        first = np.flatnonzero(begins)
-        place = self._places(run[first])
-        turn = np.arange(len(run)) - first[np.cumsum(begins) - 1]
-        targets = np.arange(self._targets)
-        level = np.zeros((len(run), self._targets), dtype=np.int64)
-        order = np.argsort(turn, kind="stable")
-        for rows in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
-            which = place[np.cumsum(begins)[rows] - 1][:, np.newaxis] * self._targets + targets
-            part = self._memory.take(which.reshape(-1))
-            shape = len(rows) * self._targets, due.shape[2]
-            stepped = part.step(
-                np.repeat(now_s[rows], self._targets), present[rows].reshape(-1),
-                due[rows].reshape(shape), early[rows].reshape(shape),
-            )  # fmt: skip
-            self._memory.put(which.reshape(-1), part)
-            level[rows] = stepped.reshape(len(rows), self._targets)
-        return level.reshape(-1)
-
-    def forget_before(self, run: int) -> None:
-        """Forget the runs before one."""
-        kept = np.flatnonzero(self._runs >= run)
-        if len(kept) < len(self._runs):
-            self._remembered(kept, self._runs[kept])
-
-    def _places(self, runs: IntArray) -> IntArray:
-        """Return the places of runs among those that are remembered, all of them from now on."""
-        if not np.isin(runs, self._runs).all():
-            every = np.union1d(self._runs, runs)
-            before = np.full(len(every), -1, dtype=np.int64)
-            before[np.searchsorted(every, self._runs)] = np.arange(len(self._runs))
-            self._remembered(before, every)
-        return np.searchsorted(self._runs, runs)
-
-    def _remembered(self, before: IntArray, runs: IntArray) -> None:
-        """Remember these runs, each as the one that was at a place before; -1 for a new one."""
-        memory = AlertMemory(self._rule, len(runs) * self._targets)
-        targets = np.arange(self._targets)
-        old = np.flatnonzero(before >= 0)
-        if len(old):
-            there = (old[:, np.newaxis] * self._targets + targets).reshape(-1)
-            here = (before[old][:, np.newaxis] * self._targets + targets).reshape(-1)
-            memory.put(there, self._memory.take(here))
-        self._runs, self._memory = runs, memory
-
-
-# Numbers of tracks stay below this; a key holds the run above it.
+# Numbers of targets and tracks stay below this; a key holds the run above it.
 _MOST_TRACKS = 1 << 40
 
 
-class TrackMemory:
-    """The memories of tracks; a track that was gone for longer than anything lasts is new.
-
-    Parameters
-    ----------
-    rule : MemoryRule
-    """
+class LevelMemory:
+    """Memories of targets or tracks by run and number; who was gone for too long is new."""
 
     def __init__(self, rule: MemoryRule) -> None:
         self._rule = rule
-        #: Run and number of each track that is remembered, ascending, and when it was last there.
+        #: Run and number of each one that is remembered, ascending, and when it was last seen.
         self._key: IntArray = np.empty(0, dtype=np.int64)
         self._seen_s: FloatArray = np.empty(0)
         self._memory = AlertMemory(rule, 0)
 
     def __len__(self) -> int:
-        """Return how many tracks are remembered."""
+        """Return how many targets are remembered."""
         return len(self._key)
 
     def levels(
@@ -261,21 +167,17 @@ class TrackMemory:
         now_s: FloatArray,
         due: BoolArray,
         early: BoolArray,
+        present: BoolArray | None = None,
     ) -> IntArray:
-        """Take in tracks at some instants and return the level of each, (n,).
+        """Take in targets (n,) at some instants, in order within a run, and return their levels.
 
-        Parameters
-        ----------
-        run, number : (n,) of int
-            Runs ascending; the instants of a run in order.
-        now_s : (n,)
-        due, early : (n, levels) of bool
-            As `AlertMemory.step` has them.
+        `due` and `early` (n, levels) are as for `AlertMemory.step`; all are present by default.
         """
         key = run * _MOST_TRACKS + number
         level = np.zeros(len(key), dtype=np.int64)
         if len(key) == 0:
             return level
+        present = np.ones(len(key), dtype=bool) if present is None else present
         order = np.argsort(key, kind="stable")
         begins = np.append(True, key[order][1:] != key[order][:-1])
         place = np.empty(len(key), dtype=np.int64)
@@ -285,22 +187,13 @@ class TrackMemory:
         turns = np.argsort(turn, kind="stable")
         for rows in np.split(turns, np.cumsum(np.bincount(turn))[:-1]):
             part = self._memory.take(place[rows])
-            there = np.ones(len(rows), dtype=bool)
-            level[rows] = part.step(now_s[rows], there, due[rows], early[rows])
+            level[rows] = part.step(now_s[rows], present[rows], due[rows], early[rows])
             self._memory.put(place[rows], part)
         self._seen_s[place] = now_s  # the last of each counts
         return level
 
     def forget(self, runs: IntArray, times_s: FloatArray) -> None:
-        """Forget tracks that were gone for too long.
-
-        Parameters
-        ----------
-        runs : (n,) of int
-            Ascending.
-        times_s : (n,)
-            What time it is in them.
-        """
+        """Forget who was gone for too long, given the time in some runs (ascending)."""
         of = self._key // _MOST_TRACKS
         last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
         away_s = np.where(runs[last] == of, times_s[last] - self._seen_s, 0.0)
@@ -316,7 +209,7 @@ class TrackMemory:
             self._memory = self._memory.take(which)
 
     def _places(self, keys: IntArray) -> IntArray:
-        """Return the places of tracks (ascending), all of them remembered from now on."""
+        """Return the rows of targets (keys ascending), all of them remembered from now on."""
         if not np.isin(keys, self._key).all():
             every = np.union1d(self._key, keys)
             old = np.searchsorted(every, self._key)
