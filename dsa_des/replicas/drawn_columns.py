@@ -23,7 +23,7 @@ from dsa_des.block.component import ClockedParameters, Component, Parameters
 from dsa_des.errors import SceneError
 from dsa_des.replicas.changed_scene import Replica, item_of, key_path, scene_of
 from dsa_des.replicas.watched_parameters import reading, watched_type
-from dsa_des.scene.options import BlockOptions
+from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import NANOSECONDS, parse_rational
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
+from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.replica_runs import ReplicaRuns, Runner
-from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.channel import ReplicaChannel, ReplicaWireFaults
 from dsa_des.replicas.clock import ReplicaClock
@@ -176,7 +176,7 @@ class Replicas(Timeline):
         try:
             return face.together(ReplicaRuns(self._parameters_of(name), partial(self._made, name)))
         except BaseException as error:
-            if is_ours_to_obey(error):
+            if must_pass(error):
                 raise
             return None  # what is wrong with one of them shows when that one is made
 

@@ -15,9 +15,9 @@ import simpy
 from dsa_des.arrays.sorted_union import last_at_or_before, sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
+from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message, by_output
 from dsa_des.block.run_end import RunEnd
-from dsa_des.block.strangers import is_ours_to_obey
 from dsa_des.block.wake import Wake
 from dsa_des.errors import RunRefused
 from dsa_des.running.block_environment import BlockEnvironment
@@ -105,7 +105,7 @@ class Node:
         except Abort:
             raise
         except BaseException as error:
-            if is_ours_to_obey(error):
+            if must_pass(error):
                 raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
@@ -244,7 +244,7 @@ class Node:
         except (Abort, RunRefused):
             raise
         except BaseException as error:
-            if is_ours_to_obey(error):
+            if must_pass(error):
                 raise
             self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 

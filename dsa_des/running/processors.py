@@ -17,7 +17,7 @@ import simpy
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, static
 from dsa_des.running.events import Bell, WakeUp
-from dsa_des.scene.processor import ProcessorParameters
+from dsa_des.scene.block_table import ProcessorParameters
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import Stream, key_of
 

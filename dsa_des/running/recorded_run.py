@@ -13,11 +13,11 @@ from typing import Any
 from dsa_des.errors import OutputError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.toml_text import to_toml
-from dsa_des.record.attempts import attempt
+from dsa_des.files.toml_files import to_toml
 from dsa_des.record.notes import notes_of
-from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
+from dsa_des.record.sinks import ObserverSink, attempt
 from dsa_des.record.version import __version__
 from dsa_des.running.long_run import say_if_long
 from dsa_des.running.pacing import PacedWindows, Pacer

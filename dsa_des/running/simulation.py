@@ -17,9 +17,9 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
+from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.block.message import Message
 from dsa_des.block.run_end import ends_its_run
-from dsa_des.block.strangers import is_ours_to_obey, told
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.running.assembly import Assembly, WrapEffect
@@ -72,7 +72,7 @@ class Outcome:
                 for section, content in component.report().items():
                     sections.setdefault(section, {}).update(content)
             except BaseException as error:
-                if is_ours_to_obey(error):
+                if must_pass(error):
                     raise
                 raise _failure(name, type(component), self.duration_s, error) from error
         return sections
@@ -336,4 +336,4 @@ class Simulation:
 def _failure(
     name: str, cls: type[Component], time_s: float, error: BaseException, scan: int = -1
 ) -> BlockFailure:
-    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, told(error))
+    return BlockFailure(name, cls.path(), time_s, scan if scan >= 0 else None, error_text(error))

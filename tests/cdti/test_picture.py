@@ -15,7 +15,8 @@ from components.cdti.scope import Scope, lost_area
 from components.messages.tracks import Tracks
 from components.optical.convex_hull import union_area
 from components.well_clear.volume import Volume, violates
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from tests.view.test_page import HOSTILE, SCENE
 

@@ -9,7 +9,8 @@ from engine_blocks import Cued, Pulse, Relay, beat
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.cli import main
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -5,7 +5,8 @@ import random
 import numpy as np
 import pytest
 
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.windows import ReplicaWindows
 from dsa_des.running.pacing import PacedWindows, Pacer
 from dsa_des.running.simulation import Simulation

@@ -9,7 +9,7 @@ import pytest
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.memory import LevelMemory, MemoryRule
 from components.tracking.stub import TrackerStub
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.scene.scene import load_scene

@@ -15,7 +15,8 @@ from random_scene import Case
 
 from dsa_des.block.message import Text
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import ColumnSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
