@@ -1,19 +1,59 @@
-"""How the ownship gets out of the bands around it, of an alerting block's message."""
+"""Bands of guidance in a scene (``guidance.daidalus``), and the ways out of them."""
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from pydantic import Field, field_validator
 
-from components.alert_configuration.configuration import Alerter, Configuration
-from components.alert_configuration.margins import Deviations, margins
-from components.guidance.bands import Guidance, guidance_of_many
+from components.alert_configuration.conf_file import read_conf
+from components.alert_configuration.configuration import Alerter, Configuration, Deviations, margins
+from components.guidance.bands import Guidance, guidance_of_many, resolution
 from components.guidance.intervals import FULL_TURN, same_place
 from components.guidance.regions import GuidedIntruders
-from components.guidance.resolution import resolution
 from components.guidance.situation import State
-from components.messages.alerts import AlertLevels
+from components.messages.alerts import BAND_KINDS, BAND_REGIONS, AlertLevels, GuidanceBands
 from dsa_des.arrays.types import IntArray
+from dsa_des.block.component import Component, Parameters, ScenePath
+from dsa_des.block.message import offsets_of
+from dsa_des.block.ports import Input, Output
+from dsa_des.block.wake import Wake
+
+
+class ConfParameters(Parameters):
+    """A configuration and the alerter of all targets."""
+
+    conf: ScenePath = Field(
+        description="Volumes, times and rate of turn: a .conf file of DAIDALUS."
+    )
+    alerter: int = Field(
+        default=1, ge=1, description="Which alerter of the file all targets belong to, from 1."
+    )
+
+    @field_validator("conf", mode="after")
+    @classmethod
+    def _readable(cls, value: Any) -> Any:
+        read_conf(value)
+        return value
+
+    def read(self) -> tuple[Configuration, Alerter]:
+        """Return the configuration and the alerter.
+
+        Raises
+        ------
+        ValueError
+            The file has fewer alerters.
+        """
+        configuration = read_conf(self.conf)
+        count = len(configuration.alerters)
+        if self.alerter > count:
+            raise ValueError(
+                f"alerter is {self.alerter}: it must be at most {count}, the number of alerters "
+                f"of {self.conf}"
+            )
+        return configuration, configuration.alerters[self.alerter - 1]
+
 
 _OWN = ("alt_m", "east_mps", "north_mps", "climb_mps")
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
@@ -120,3 +160,61 @@ def smaller(changes: tuple[float, float]) -> float | None:
     low, high = changes
     change = high if high <= -low or same_place(high, -low) else low
     return change if math.isfinite(change) else None
+
+
+_NAMES = {"direction": "hdir", "altitude": "alt"}
+
+
+class GuidanceParameters(ConfParameters):
+    """Parameters of guidance."""
+
+    level: int = Field(
+        default=1, ge=0, description="Bands are given where an alert is of this level or above."
+    )
+
+
+class DaidalusGuidance(Component):
+    """Which directions and altitudes lose separation, by the rules of DAIDALUS (RTCA DO-365).
+
+    Over all targets whose flights the alerting knows, at each of its scans by itself. It steers
+    nobody; `avoidance.daidalus` flies out of the same bands.
+    """
+
+    inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
+    outputs = {"bands": Output(GuidanceBands, "Directions and altitudes that lose separation.")}
+    Parameters = GuidanceParameters
+    windowed = True
+    lockstep = True
+    rewindable = True
+
+    def setup(self) -> None:
+        """Read the configuration."""
+        self._configuration, self._alerter = self.p.read()
+
+    def run(self, wake: Wake) -> GuidanceBands | None:
+        """Give the bands of every instant with an alert."""
+        alerts: AlertLevels | None = wake["alerts"]
+        if alerts is None:
+            return None
+        rows = np.flatnonzero(alerts.highest() >= self.p.level).tolist()
+        found: list[tuple[int, int, int, float, float]] = []
+        for number, kind in enumerate(BAND_KINDS):
+            every = bands_around(_NAMES[kind], self._configuration, self._alerter, alerts, rows)
+            for place, guided in enumerate(every):
+                found += [
+                    (place, number, BAND_REGIONS.index(band.region), band.low, band.high)
+                    for band in (() if guided is None else guided.bands)
+                    if band.region != "NONE"
+                ]
+        if not found:
+            return None
+        found.sort(key=lambda one: one[0])
+        table = np.array(found)
+        line, code = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
+        turned = code == BAND_KINDS.index("direction")
+        ends = [
+            np.where(where, table[:, k], math.nan) for where in (turned, ~turned) for k in (3, 4)
+        ]
+        region = table[:, 2].astype(np.int64)
+        ticks = wake.ticks[np.array(rows, dtype=np.int64)]
+        return GuidanceBands(ticks, offsets_of(line, len(rows)), code, region, *ends)
