@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import squared_length, times
-from components.estimation.frame import Place
+from components.estimation.batched import product, product_transposed, squared_length, times
+from components.estimation.frame import SensorPose
 from components.geometry.wrapping import wrap_pi_unchecked
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray
 
 # At the zenith of the body axes azimuth has no derivative: this far from it, as a share of the
 # range, derivatives are those of the edge.
@@ -34,22 +34,8 @@ class Kind:
         return 2 + self.has_range + self.has_range_rate
 
 
-def expected(kind: Kind, state: FloatArray, place: Place) -> FloatArray:
-    """Return what would be measured without error.
-
-    Parameters
-    ----------
-    kind : Kind
-    state : (d, n)
-        Position and velocity first, in the frame.
-    place : Place
-        Of n sensors.
-
-    Returns
-    -------
-    ndarray of shape (kind.size, n)
-        Azimuth in [-pi, pi] and elevation in rad, range in m, range rate in m/s.
-    """
+def expected(kind: Kind, state: FloatArray, place: SensorPose) -> FloatArray:
+    """Return what would be measured without error."""
     away = state[:3] - place.position_m
     x, y, z = times(place.to_body, away)
     found = np.empty((kind.size, state.shape[-1]))
@@ -65,15 +51,8 @@ def expected(kind: Kind, state: FloatArray, place: Place) -> FloatArray:
     return found
 
 
-def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Return what would be measured, and its derivative by position and velocity.
-
-    Returns
-    -------
-    expected : (kind.size, n)
-    jacobian : (kind.size, 6, n), or (kind.size, 3, n) where no range rate is measured
-        Exact but at the zenith of the body axes.
-    """
+def linearised(kind: Kind, state: FloatArray, place: SensorPose) -> tuple[FloatArray, FloatArray]:
+    """Return what would be measured, and its derivative by position and velocity."""
     away = state[:3] - place.position_m
     turned = place.to_body
     x, y, z = times(turned, away)
@@ -115,20 +94,7 @@ def linearised(kind: Kind, state: FloatArray, place: Place) -> tuple[FloatArray,
 def direction(
     away: FloatArray, covariance: Mapping[tuple[int, int], FloatArray] | FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances.
-
-    Parameters
-    ----------
-    away : (3, n)
-        North, east, down or nose, right, floor.
-    covariance : (3, 3, n), or its elements (n,) by row and column
-        Its upper triangle is read.
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad, azimuth_variance_rad2, elevation_variance_rad2 : (n,) arrays
-        Variances by the derivatives of `linearised`.
-    """
+    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances."""
     x, y, z = away
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     level = np.hypot(x, y)
@@ -146,33 +112,15 @@ def direction(
 
 
 def residual(measured: FloatArray, expected: FloatArray) -> FloatArray:
-    """Return measured less expected, azimuth and elevation wrapped into (-pi, pi].
-
-    Parameters
-    ----------
-    measured, expected : (m, n)
-    """
+    """Return measured less expected, azimuth and elevation wrapped into (-pi, pi]."""
     found = measured - expected
     found[0] = wrap_pi_unchecked(np.ascontiguousarray(found[0]))
     found[1] = wrap_pi_unchecked(np.ascontiguousarray(found[1]))
     return found
 
 
-def position_of(measured: FloatArray, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Return where in the frame a measurement with range lies, and the derivative by it.
-
-    Parameters
-    ----------
-    measured : (3 or 4, n)
-        Azimuth, elevation (rad), range (m); a range rate is not used.
-    place : Place
-
-    Returns
-    -------
-    position_m : (3, n)
-    jacobian : (3, 3, n)
-        By azimuth, elevation and range.
-    """
+def position_of(measured: FloatArray, place: SensorPose) -> tuple[FloatArray, FloatArray]:
+    """Return where in the frame a measurement with range lies, and the derivative by it."""
     azimuth, elevation, distance = measured[:3]
     cos_a, sin_a = np.cos(azimuth), np.sin(azimuth)
     cos_e, sin_e = np.cos(elevation), np.sin(elevation)
@@ -188,7 +136,7 @@ def position_of(measured: FloatArray, place: Place) -> tuple[FloatArray, FloatAr
     return place.position_m + distance * unit, jacobian
 
 
-def _closing(state: FloatArray, place: Place) -> FloatArray:
+def _closing(state: FloatArray, place: SensorPose) -> FloatArray:
     if place.velocity_m_s is None:
         raise ValueError("a range rate needs the velocity of the sensor")
     return state[3:6] - place.velocity_m_s
@@ -196,3 +144,36 @@ def _closing(state: FloatArray, place: Place) -> FloatArray:
 
 def _along(one: FloatArray, other: FloatArray) -> FloatArray:
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+
+
+def half_angle_rad(
+    position_m: FloatArray, covariance: FloatArray, place: SensorPose, sigmas: float
+) -> FloatArray:
+    """Return how far from its expected direction a target may be seen."""
+    seen, by_position = linearised(Kind(has_range=False), position_m, place)
+    spread = product_transposed(product(by_position, covariance), by_position)
+    level = np.cos(seen[1])
+    across, upward = spread[0, 0] * level * level, spread[1, 1]
+    both = spread[0, 1] * level
+    # The larger eigenvalue of two by two.
+    mean, half = 0.5 * (across + upward), 0.5 * (across - upward)
+    widest = mean + np.sqrt(half * half + both * both)
+    return np.minimum(sigmas * np.sqrt(np.maximum(widest, 0.0)), np.pi)
+
+
+def axis_in_body(
+    ahead_s: FloatArray,
+    state: FloatArray,
+    direction: FloatArray,
+    has_range: BoolArray,
+    place: SensorPose,
+) -> FloatArray:
+    """Return unit vectors from the one who looks along cones' axes, in body axes."""
+    level = np.cos(direction[1])
+    told = np.stack(
+        [level * np.cos(direction[0]), level * np.sin(direction[0]), -np.sin(direction[1])]
+    )
+    away = state[:3] + ahead_s * state[3:] - place.position_m
+    away = np.where(has_range, away, told)
+    length = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+    return times(place.to_body, away / np.maximum(length, 1e-9))

@@ -13,11 +13,7 @@ from components.messages.detections import SensorOffer
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_states import fused_states
-from components.track_fusion.heads import FusionHeads, later_heads
-from components.track_fusion.ladder import RULE
-from components.track_fusion.local_tracks import LocalTracks, local_tracks
-from components.track_fusion.matching import MatchRules, matched, without_strays
-from components.track_fusion.told_tracks import (
+from components.track_fusion.fused_tracks import (
     Told,
     joined,
     nothing_told,
@@ -25,10 +21,53 @@ from components.track_fusion.told_tracks import (
     taken,
     told_after,
 )
-from dsa_des.arrays.types import IntArray
+from components.track_fusion.local_tracks import FusionHeads, LocalTracks, later_heads, local_tracks
+from components.track_fusion.track_association import MatchRules, matched, without_strays
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
+from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.ports import Input, Output
 from dsa_des.block.wake import Arrivals, Wake
+
+# Fused tracks by number: as many as are compared.
+_TRACKS = 64
+_POSITION = ("north_m", "east_m", "down_m")
+
+
+def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Return the position of each fused track, and how uncertain it is."""
+    position = np.full((len(wake), _TRACKS, 3), np.nan)
+    spread = np.full((len(wake), _TRACKS), np.nan)
+    told: Any = block.run(wake)
+    if told is not None:
+        row = np.repeat(np.searchsorted(wake.ticks, told.tick), np.diff(told.offsets))
+        mine = np.flatnonzero(told.has_range & (told.track <= _TRACKS))
+        place = row[mine], told.track[mine] - 1
+        position[place] = np.stack([getattr(told, name)[mine] for name in _POSITION], axis=-1)
+        variance = sum(told.covariance[f"covariance_{i}{i}_m2"][mine] for i in range(3))
+        spread[place] = np.sqrt(np.asarray(variance))
+    return {"position": position, "spread": spread}
+
+
+def _distance(values: AnyArray, reference: AnyArray) -> FloatArray:
+    return np.asarray(np.sqrt(((values - reference) ** 2).sum(axis=-1)))
+
+
+RULE = Ladder(
+    "rule",
+    (
+        Rung("independent", "information added, as if errors had nothing in common",
+             parameters={"rule": "independent"}),
+        Rung("trace", "covariance intersection, least trace of the position",
+             parameters={"rule": "trace"}),
+        Rung("determinant", "covariance intersection, least determinant",
+             parameters={"rule": "determinant"}),
+    ),
+    "determinant",
+    (Quantity("position", "m", _distance), Quantity("spread", "m")),
+    measure,
+)  # fmt: skip
+
 
 _ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
 
@@ -73,20 +112,11 @@ class IntersectionParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class _Reports:
-    """What came from the trackers in a wake, in the frames of the replicas.
-
-    Parameters
-    ----------
-    tracks : LocalTracks
-    row : (tracks,)
-        Of the wake.
-    told_at : list of (reports,)
-        By tracker: the rows at which it told.
-    """
+    """What came from the trackers in a wake, in the frames of the replicas."""
 
     tracks: LocalTracks
-    row: IntArray
-    told_at: list[IntArray]
+    row: IntArray  # (tracks,): Of the wake
+    told_at: list[IntArray]  # list of (reports,): By tracker: the rows at which it told
 
 
 class CovarianceIntersection(Component):

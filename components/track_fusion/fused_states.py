@@ -9,41 +9,27 @@ from components.estimation.covariance_intersection import Rule, combined, invers
 from components.estimation.motion import ConstantVelocity
 from components.messages.state_tracks import COASTED, CONFIRMED, TENTATIVE
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.matching import bearing, leaders
+from components.track_fusion.track_association import bearing, leaders
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
 class FusedStates:
-    """Fused tracks by replica and number.
+    """Fused tracks by replica and number."""
 
-    Parameters
-    ----------
-    replica, number : (n,) of int
-    status : (n,) of int
-    existence : (n,)
-        The largest of any member: as much is sure whatever they have in common.
-    ranged : (n,) of bool
-    state, covariance : (6, n), (6, 6, n)
-        Of those without a range meaningless.
-    newest : (n,)
-        Index of the member whose direction is told where there is no range.
-    time_s, updated_s : (n,)
-    updated_by, contributors : (n,) of int
-    """
-
-    replica: IntArray
-    number: IntArray
-    status: IntArray
+    replica: IntArray  # (n,) of int
+    number: IntArray  # (n,) of int
+    status: IntArray  # (n,) of int
+    # (n,): The largest of any member: as much is sure whatever they have in common
     existence: FloatArray
-    ranged: BoolArray
-    state: FloatArray
-    covariance: FloatArray
-    newest: IntArray
-    time_s: FloatArray
-    updated_s: FloatArray
-    updated_by: IntArray
-    contributors: IntArray
+    ranged: BoolArray  # (n,) of bool
+    state: FloatArray  # (6, n), (6, 6, n): Of those without a range meaningless
+    covariance: FloatArray  # (6, n), (6, 6, n): Of those without a range meaningless
+    newest: IntArray  # (n,): Index of the member whose direction is told where there is no range
+    time_s: FloatArray  # (n,)
+    updated_s: FloatArray  # (n,)
+    updated_by: IntArray  # (n,) of int
+    contributors: IntArray  # (n,) of int
 
 
 def fused_states(
@@ -53,15 +39,6 @@ def fused_states(
 
     Members with a range come first, then those without, each group by tracker; each is combined
     with what those before it gave.
-
-    Parameters
-    ----------
-    tracks : LocalTracks
-        All belong to a fused track.
-    time_s : (n,)
-        The instant that the fused states speak of, the same for all of a replica.
-    motion : ConstantVelocity
-    rule : {"determinant", "trace", "independent"}
     """
     leader, of = leaders(tracks)
     count = len(leader)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.estimation.cue_cone import half_angle_rad
-from components.estimation.frame import Place
+from components.estimation.frame import SensorPose
+from components.estimation.measurement import half_angle_rad
 from components.messages.cues import CueCones
 from components.messages.state_tracks import COVARIANCE, DELETED, TENTATIVE, StateTracks
 from components.sensor.marks import TRACKER
@@ -138,7 +138,7 @@ class Cues(Component):
             spread[i, i] += self.p.acceleration_intensity_m2_s3 * lasts_s**3 / 3.0
         own = np.stack([getattr(tracks, name)[entry] for name in _OWN])
         axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(entry), axis=2)
-        half = half_angle_rad(state[:3], spread, Place(own, axes), self.p.sigmas)
+        half = half_angle_rad(state[:3], spread, SensorPose(own, axes), self.p.sigmas)
         level = np.cos(tracks.elevation_rad[entry])
         told = np.maximum(
             tracks.azimuth_variance_rad2[entry] * level * level,

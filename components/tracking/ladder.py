@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from components.estimation.covariance_intersection import distance_squared
-from components.estimation.frame import place_in_frame
+from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import position_of
 from components.messages.columns import POSE
 from components.messages.false_detections import true_entries
@@ -80,7 +80,7 @@ def _apart(
     lat, lon, alt, *attitude = (fused.pose_columns()[name][entry] for name in POSE)
     origin: Any = tuple(getattr(told, name)[mine] for name in _ORIGIN)
     turned: Any = tuple(attitude)
-    place = place_in_frame(origin, (lat, lon, alt), turned)
+    place = pose_in_frame(origin, (lat, lon, alt), turned)
     true = np.stack(
         [fused.true_azimuth_rad[entry], fused.true_elevation_rad[entry], fused.true_range_m[entry]]
     )

@@ -20,19 +20,14 @@ _QUANTITIES = ("azimuth", "elevation", "range", "range_rate")
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
-    """What of each sensor's errors lasts.
+    """What of each sensor's errors lasts."""
 
-    Parameters
-    ----------
-    step : (4 quantities, sensors)
-        Of the grid; 0 for none.
-    variance, lasts_s, across_m2 : (parts, 4 quantities, sensors)
-        As in `LastingPart`; 0 where there is none.
-    """
-
-    step: FloatArray
+    step: FloatArray  # (4 quantities, sensors): Of the grid; 0 for none
+    # (parts, 4 quantities, sensors): As in `LastingPart`; 0 where there is none
     variance: FloatArray
+    # (parts, 4 quantities, sensors): As in `LastingPart`; 0 where there is none
     lasts_s: FloatArray
+    # (parts, 4 quantities, sensors): As in `LastingPart`; 0 where there is none
     across_m2: FloatArray
 
     @classmethod
@@ -66,31 +61,7 @@ class LastingErrors:
         since_s: FloatArray,
         range_m: FloatArray,
     ) -> FloatArray:
-        """Return the covariance of measurements' errors with those of their sensors' last ones.
-
-        Parameters
-        ----------
-        rows : list of int
-            Which quantities are measured.
-        source : (m, n) of int
-            The sensor of each.
-        variance : (m, n)
-            Of the whole error.
-        moved : (m, n)
-            How far the value has moved since the sensor's last measurement of the track.
-        since_s : (m, n)
-            Time since then; infinite where there was none.
-        range_m : (m, n)
-            How far the track was then.
-
-        Returns
-        -------
-        ndarray of shape (m, n)
-            Rounding counts with its share that noise does not drown: an error of deviation σ before
-            rounding leaves less than exp(-4 π² (σ / step)²) of it (Widrow, Kollár, *Quantization
-            Noise* (2008), §19). Errors of values x steps apart have the correlation 1 - 6 x (1 - x)
-            up to one step; exp(-6 x) has its slope at 0, and is less only beyond 0.79 steps.
-        """
+        """Return the covariance of measurements' errors with those of their sensors' last ones."""
         quantity = np.array(rows)[:, np.newaxis]
         step, lasts_s = self.step[quantity, source], self.lasts_s[:, quantity, source]
         lasting = self.variance[:, quantity, source]

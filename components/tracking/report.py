@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation import modes
 from components.estimation.batched import selected
-from components.estimation.frame import Place
+from components.estimation.estimator import Estimates, combined
+from components.estimation.frame import SensorPose
 from components.estimation.measurement import direction
 from components.messages.state_tracks import COVARIANCE, StateTracks
-from components.tracking.life import existence
+from components.tracking.management import existence
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
@@ -29,20 +29,11 @@ _PROBABILITIES = {
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """Tracks as they are told after a look.
-
-    Parameters
-    ----------
-    store : TrackStore
-    look : (tracks,)
-        The last that was worked on.
-    row : (tracks,)
-        Row of the wake at which it is told.
-    """
+    """Tracks as they are told after a look."""
 
     store: TrackStore
-    look: IntArray
-    row: IntArray
+    look: IntArray  # (tracks,): The last that was worked on
+    row: IntArray  # (tracks,): Row of the wake at which it is told
 
     @classmethod
     def of(
@@ -56,26 +47,13 @@ class Reported:
 
 def state_tracks(
     reported: Sequence[Reported],
-    places: Place,
+    poses: SensorPose,
     origin: FloatArray,
     rows: IntArray,
     wake: Wake,
     sensors: tuple[str, ...],
 ) -> StateTracks:
-    """Return the message of what is told.
-
-    Parameters
-    ----------
-    reported : sequence of Reported
-    places : Place
-        Of every look.
-    origin : (3, looks)
-        Latitude, longitude (deg), height (m) of the frame.
-    rows : (n,)
-        Rows of the wake at which a message is sent.
-    wake : Wake
-    sensors : tuple of str
-    """
+    """Return the message of what is told."""
     ticks = wake.ticks[rows]
     if not reported:
         empty = StateTracks.initial({})
@@ -89,7 +67,7 @@ def state_tracks(
     store = _Columns(reported, order)
     models = len(reported[0].store.weights)
     state, covariance = store.state(models)
-    own, origin = selected(places.position_m, look), selected(origin, look)
+    own, origin = selected(poses.position_m, look), selected(origin, look)
     seen = direction(state[:3] - own, covariance)
     unknown = ~store.plain("ranged")
     hidden = bool(unknown.any())
@@ -163,7 +141,7 @@ class _Columns:
             np.stack([np.stack([one[min(i, j), max(i, j)] for j in range(6)]) for i in range(6)])
             for one in covariances
         ]
-        state, covariance = modes.combined(states, whole, weights)
+        state, covariance = combined(Estimates(states, whole, weights))
         return state, {place: covariance[place] for place in COVARIANCE}
 
     def extras(

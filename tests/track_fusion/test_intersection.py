@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from components.estimation.covariance_intersection import combined, inverse
-from components.estimation.frame_change import frame_change
+from components.estimation.frame import frame_change
 
 
 def covariances(seed, count):

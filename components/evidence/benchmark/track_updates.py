@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import dsa_des
-from components.tracking.ekf import ExtendedKalman
+from components.tracking.filters import ExtendedKalman
 from dsa_des.block.wake import Wake
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step

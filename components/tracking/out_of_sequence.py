@@ -13,14 +13,19 @@ window before any of it is done.
 """
 
 from bisect import bisect_left
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from components.messages.detections import SensorOffer
 from components.tracking.scans import Scans
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, IntArray
+from dsa_des.block.component import Producer
+from dsa_des.time.clock import ClockSpec
 
 #: When a look was made, and the first of its sensors: looks of one instant go by sensor.
 Key = tuple[int, int]
@@ -28,64 +33,67 @@ Key = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Before:
-    """How tracks of a replica were before a look was worked on.
+    """How tracks of a replica were before a look was worked on."""
 
-    Parameters
-    ----------
-    store : TrackStore
-        With this replica's tracks among others.
-    next_number : int
-    """
-
-    store: TrackStore
+    store: TrackStore  # With this replica's tracks among others
     next_number: int
 
 
 @dataclass
 class Memory:
-    """The looks of one replica that may still have to be worked on again, in order.
+    """The looks of one replica that may still have to be worked on again, in order."""
 
-    Parameters
-    ----------
-    keys, looks : lists
-        When each was made, and its number among the looks of the wake.
-    """
-
+    # When each was made, and its number among the looks of the wake
     keys: list[Key] = field(default_factory=list)
+    # When each was made, and its number among the looks of the wake
     looks: list[int] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The order in which looks are worked on.
+    """The order in which looks are worked on."""
 
-    Parameters
-    ----------
-    look : (works,)
-    back_to : (works,)
-        Look before which the tracks are gone back to first; -1 for none.
-    since : (works,)
-        Of a look that is worked on in one step, the first look of those made since; -1 of others.
-    seen_from : (works,)
-        Newest look by then: where tracks are seen from when they are told.
-    tells : (works,) of bool
-        Whether tracks are told after it: it is the last work that a row brings.
-    of : (works,)
-        Index of the replica.
-    row : (works,)
-        Row of the wake that brings it about.
-    forgotten : list of lists
-        Looks that need not be remembered after each.
-    """
-
-    look: IntArray
-    back_to: IntArray
+    look: IntArray  # (works,)
+    back_to: IntArray  # (works,): Look before which the tracks are gone back to first; -1 for none
+    # (works,): Of a look that is worked on in one step, the first look of those made since; -1
+    # of others
     since: IntArray
+    # (works,): Newest look by then: where tracks are seen from when they are told
     seen_from: IntArray
+    # (works,) of bool: Whether tracks are told after it: it is the last work that a row brings
     tells: BoolArray
-    of: IntArray
-    row: IntArray
-    forgotten: list[list[int]]
+    of: IntArray  # (works,): Index of the replica
+    row: IntArray  # (works,): Row of the wake that brings it about
+    forgotten: list[list[int]]  # Looks that need not be remembered after each
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """What a replica must remember of looks, for later ones that come late."""
+
+    replica: int
+    scans: Scans
+    before: dict[int, Before]
+
+    @classmethod
+    def of(
+        cls, scans: Scans, memory: Memory | None, before: dict[int, Before], replica: int
+    ) -> "Past | None":
+        """Return the looks in memory, numbered anew in their order."""
+        if memory is None:
+            return None
+        kept = {
+            new: Before(
+                before[old].store.take(before[old].store.replica == replica),
+                before[old].next_number,
+            )
+            for new, old in enumerate(memory.looks)
+        }
+        return cls(replica, scans.take(np.array(memory.looks, dtype=np.int64)), kept)
+
+    def memory(self) -> Memory:
+        """Return the looks in memory."""
+        return Memory(keys_of(self.scans), list(range(len(self.scans))))
 
 
 def keys_of(scans: Scans) -> list[Key]:
@@ -97,27 +105,7 @@ def keys_of(scans: Scans) -> list[Key]:
 def rerun_plan(
     scans: Scans, of: IntArray, begin: int, memory: dict[int, Memory], lag_ticks: int
 ) -> tuple[Plan, list[int]]:
-    """Return the order of work where late looks have all since them worked on again.
-
-    Parameters
-    ----------
-    scans : Scans
-        The looks remembered, then the new ones by arrival.
-    of : (looks,)
-        Index of the replica of each.
-    begin : int
-        The first new look.
-    memory : dict of Memory
-        By index of the replica; kept up to date.
-    lag_ticks : int
-        A look that is older than the newest by more than this is left out.
-
-    Returns
-    -------
-    plan : Plan
-    left_out : list of int
-        Looks that are not worked on.
-    """
+    """Return the order of work where late looks have all since them worked on again."""
     keys = keys_of(scans)
     row = scans.row.tolist()
     look: list[int] = []
@@ -212,17 +200,7 @@ def _planned(
 
 
 def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
-    """Return the order of work where late looks are left out.
-
-    Parameters
-    ----------
-    scans : Scans
-        By arrival.
-    of : (looks,)
-        Index of the replica of each.
-    newest : (replicas,)
-        When the newest look was made that was worked on before.
-    """
+    """Return the order of work where late looks are left out."""
     # Replicas lie end to end: what is before a replica's first look is older anyway.
     keep = (scans.tick >= np.maximum.accumulate(scans.tick)) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
@@ -244,16 +222,7 @@ def stores_before(before: dict[int, Before], looks: list[int], replicas: list[in
 
 
 def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> TrackStore:
-    """Return tracks with those of some replicas as they were.
-
-    Parameters
-    ----------
-    store : TrackStore
-    back : dict of Before
-        By number of the replica.
-    replicas : (n,)
-        Numbers of the replicas that go back.
-    """
+    """Return tracks with those of some replicas as they were."""
     by_store: dict[int, tuple[TrackStore, list[int]]] = {}
     for number in replicas:
         before = back[number].store
@@ -261,3 +230,92 @@ def gone_back(store: TrackStore, back: dict[int, Before], replicas: Any) -> Trac
     parts = [store.take(~np.isin(store.replica, replicas))]
     parts += [old.take(np.isin(old.replica, mine)) for old, mine in by_store.values()]
     return TrackStore.joined(parts)
+
+
+# Looks whose fate is worked out.
+_MOST_LOOKS = 2000
+
+
+def may_come_late(offers: Mapping[str, Any], producers: Iterable[Producer]) -> bool:
+    """Return whether a look may come after one that was made later."""
+    return (
+        not offers
+        or any(one.jitter_s > 0 or one.unforeseen for one in producers)
+        or any(
+            not isinstance(o, SensorOffer) or o.latest_s is None or o.latest_s > 0 or o.unforeseen
+            for o in offers.values()
+        )
+    )
+
+
+def latest_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fraction:
+    """Return how late a look may come at most, as far as the scene says; queues are not in it."""
+    told = [o.latest_s or 0 for o in offers.values() if isinstance(o, SensorOffer)]
+    return Fraction(max(told, default=0) + max((one.latest_s for one in producers), default=0))
+
+
+def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -> dict[str, float]:
+    """Return the share of each sensor's looks that come when a look newer by a lag is known."""
+    said = {
+        name: (o.clock(), o.latest_s, o.jitter_s)
+        for name, o in sorted(offers.items())
+        if isinstance(o, SensorOffer) and o.clock is not None and o.latest_s is not None
+    }
+    found = {}
+    for name, (clock, latest, jitter) in said.items():
+        others = [
+            (theirs, latest - (last - spread))
+            for other, (theirs, last, spread) in said.items()
+            if other != name
+        ]
+        # Its own looks overtake each other by jitter alone.
+        others.append((clock, jitter))
+        ahead_s = [(one, by_s) for one, by_s in others if by_s > lag_s]
+        if not ahead_s:
+            continue
+        looks = [t for k in range(_MOST_LOOKS) if (t := _instant(clock, k)) < duration_s]
+        late = sum(any(_overtaken(t, one, by_s, lag_s) for one, by_s in ahead_s) for t in looks)
+        if late:
+            found[name] = late / len(looks)
+    return found
+
+
+def _overtaken(t: Fraction, clock: ClockSpec, by_s: Fraction, lag_s: Fraction) -> bool:
+    """Return whether a clock has an instant between ``t + lag_s`` and ``t + by_s``."""
+    after = (t + lag_s - clock.offset_s) // clock.period_s + 1
+    return _instant(clock, max(int(after), 0)) < t + by_s
+
+
+def _instant(clock: ClockSpec, scan: int) -> Fraction:
+    return clock.offset_s + scan * clock.period_s
+
+
+def warning(name: str, share: float, why: str) -> str:
+    """Return a sentence about looks that will be left out."""
+    return f"{why}: up to {share:.0%} of the looks of {name} come too late and are left out"
+
+
+@dataclass(frozen=True, eq=False)
+class LookCount:
+    """How many looks of each sensor came, and how many of them too late."""
+
+    came: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor
+    left_out: Mapping[str, int] = field(default_factory=dict)  # By name of the sensor
+
+    def of(self, sensors: tuple[str, ...], came: IntArray, left_out: IntArray) -> "LookCount":
+        """Return the count with more looks, each a mask of its sensors."""
+        return LookCount(
+            {n: self.came.get(n, 0) + int((came >> i & 1).sum()) for i, n in enumerate(sensors)},
+            {
+                n: self.left_out.get(n, 0) + int((left_out >> i & 1).sum())
+                for i, n in enumerate(sensors)
+            },
+        )
+
+    def late(self) -> dict[str, dict[str, float]]:
+        """Return looks, those left out and their share, by sensor; of those that lost any."""
+        return {
+            name: {"looks": self.came[name], "left_out": lost, "share": lost / self.came[name]}
+            for name, lost in sorted(self.left_out.items())
+            if lost
+        }

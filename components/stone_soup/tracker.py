@@ -1,20 +1,23 @@
 """A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
 
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from components.estimation.frame import Place, place_in_frame
+from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearised
 from components.messages.detections import SensorOffer
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import COVARIANCE, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
-from components.tracking.lateness import LookCount, latest_s
+from components.stone_soup.objects import START
+from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -26,8 +29,118 @@ from dsa_des.block.strangers import Left, strangers_code
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
 
-if TYPE_CHECKING:
-    from components.stone_soup.followed import Followed
+
+@dataclass
+class Followed:
+    """A track as it is told."""
+
+    number: int  # Its own, from 1, in the order of appearance
+    status: int = CONFIRMED
+    state: FloatArray | None = None  # (6,): Position and velocity along north, east, down
+    covariance: FloatArray | None = None  # (6, 6)
+    state_s: float = 0.0
+    updated_s: float = 0.0
+    age_s: float = 0.0
+    contributors: int = 0  # Masks of sensors
+    updated_by: int = 0  # Masks of sensors
+    # Whether a range was measured; true of a tracker that does not say what it measured
+    ranged: bool = True
+    seen: int = 0  # How many of its states were looked at
+
+
+class Follower:
+    """Turns the tracks of a tracker into what is told of them."""
+
+    def __init__(self, position: "tuple[int, ...]", velocity: "tuple[int, ...]") -> None:
+        east, north, up = range(3)
+        order = (north, east, up)
+        self._rows = [position[i] for i in order] + [velocity[i] for i in order]
+        self._signs = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
+        self._tracks: dict[str, Followed] = {}
+        self._next = 1
+
+    def told(
+        self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
+    ) -> list[Followed]:
+        """Return all tracks after a look, by number; those that are gone a last time."""
+
+        def seconds(instant: datetime) -> float:
+            return time_s if instant == when else (instant - START).total_seconds()
+
+        alive = {track.id: track for track in tracks}
+        gone = [self._tracks.pop(name) for name in list(self._tracks) if name not in alive]
+        for one in gone:
+            one.status = DELETED
+        fresh = [track for name, track in alive.items() if name not in self._tracks]
+        for track in sorted(fresh, key=self._place):
+            self._tracks[track.id] = Followed(self._next)
+            self._next += 1
+        for name, one in self._tracks.items():
+            self._follow(one, alive[name], seconds, mask_of)
+        return sorted([*gone, *self._tracks.values()], key=lambda one: one.number)
+
+    def _place(self, track: Any) -> tuple[float, ...]:
+        """Return what orders tracks that appear at the same time: where they are."""
+        state, _ = self._moments(track)
+        return tuple(state.tolist())
+
+    def _moments(self, track: Any) -> tuple[FloatArray, FloatArray]:
+        try:
+            mean = np.array(track.state.mean, dtype=float).reshape(-1)
+            spread = np.array(track.state.covar, dtype=float)
+        except AttributeError as error:
+            raise ValueError(
+                f"its states ({type(track.state).__name__}) have no mean and covariance: {error}"
+            ) from error
+        if max(self._rows) >= len(mean):
+            raise ValueError(
+                f"its states have {len(mean)} components, and position_mapping or "
+                f"velocity_mapping names component {max(self._rows)}: they count from 0"
+            )
+        state = mean[self._rows] * self._signs
+        covariance = spread[np.ix_(self._rows, self._rows)] * np.outer(self._signs, self._signs)
+        if not (np.isfinite(state).all() and np.isfinite(covariance).all()):
+            raise ValueError("a state or covariance of its is not finite")
+        return state, covariance
+
+    def _follow(
+        self,
+        one: Followed,
+        track: Any,
+        seconds: Callable[[datetime], float],
+        mask_of: Mapping[str, int],
+    ) -> None:
+        one.state, one.covariance = self._moments(track)
+        one.state_s = seconds(track.timestamp)
+        one.age_s = one.state_s - seconds(track.states[0].timestamp)
+        if one.seen > len(track.states):  # a tracker may shorten the past
+            one.seen = 0
+        last = track.states[-1]
+        for state in track.states[one.seen :]:
+            measured = _measurements(state)
+            if not measured:
+                continue
+            one.updated_s = seconds(state.timestamp)
+            one.updated_by = 0
+            # Only angles so far, unless one of these has a range.
+            one.ranged = one.ranged and one.contributors != 0
+            for detection in measured:
+                one.updated_by |= mask_of.get(detection.metadata.get("sensor", ""), 0)
+                one.ranged |= len(detection.state_vector) > 2
+            one.contributors |= one.updated_by
+        one.seen = len(track.states)
+        one.status = CONFIRMED if _measurements(last) else COASTED
+
+
+def _measurements(state: Any) -> list[Any]:
+    """Return the detections that a state was updated with."""
+    hypothesis = getattr(state, "hypothesis", None)
+    if hypothesis is None:
+        return []
+    single = getattr(hypothesis, "single_hypotheses", None)
+    hypotheses = [hypothesis] if single is None else single
+    return [one.measurement for one in hypotheses if one]
+
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 
@@ -87,17 +200,9 @@ class StoneSoupTracker(Component):
     windowed = True
 
     def setup(self) -> None:
-        """Build the tracker.
-
-        Raises
-        ------
-        ImportError
-            The extra ``stonesoup`` is not installed.
-        ValueError
-            The builder cannot be imported, fails, or returns no tracker.
-        """
+        """Build the tracker."""
         needs_stone_soup("tracking.stonesoup")
-        from components.stone_soup.followed import Follower
+        from components.stone_soup.tracker import Follower
 
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
@@ -169,7 +274,7 @@ class StoneSoupTracker(Component):
             self._origin = scans.pose[:3, 0].copy()
         lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
         pose = scans.pose
-        places = place_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+        places = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
                                 (pose[3], pose[4], pose[5]))  # fmt: skip
         told: list[tuple[int, int, Followed]] = []
         rows: list[int] = []
@@ -192,7 +297,7 @@ class StoneSoupTracker(Component):
         return np.flatnonzero(in_time).tolist()
 
     def _looked(
-        self, fused: FusedDetections, scans: Scans, look: int, places: Place, wake: Wake
+        self, fused: FusedDetections, scans: Scans, look: int, places: SensorPose, wake: Wake
     ) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
@@ -221,7 +326,7 @@ class StoneSoupTracker(Component):
         sensors: tuple[str, ...],
         rows: list[int],
         entries: "list[tuple[int, int, Followed]]",
-        places: Place,
+        places: SensorPose,
     ) -> StateTracks:
         """Return tracks as a message: of each its row, the last look and how it is told."""
         told = [one for _, _, one in entries]
@@ -231,7 +336,7 @@ class StoneSoupTracker(Component):
         state = np.array([one.state for one in told], dtype=float).reshape(count, 6).T
         spread = np.array([one.covariance for one in told], dtype=float).reshape(count, 6, 6)
         spread = np.moveaxis(spread, 0, -1)
-        at = Place(
+        at = SensorPose(
             places.position_m[:, look],
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from components.estimation.batched import product, product_transposed
-from components.estimation.frame import Place
+from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind, linearised
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from components.track_fusion.fused_states import FusedStates
@@ -55,20 +55,7 @@ def told_after(
     replica: IntArray,
     row_of_replica: IntArray,
 ) -> Told:
-    """Return what is told of fused tracks, and once of those that are no more.
-
-    Parameters
-    ----------
-    before : Told
-        What was told last of the same replicas, without what was deleted.
-    found : FusedStates
-    members : LocalTracks
-        That they were made of.
-    origin_deg_m, own_m : (3, n)
-        Of the frame, and where the ownship is in it, for each fused track.
-    replica, row_of_replica : (replicas,)
-        The replicas that are told of, ascending, and the row of the wake of each.
-    """
+    """Return what is told of fused tracks, and once of those that are no more."""
     row = row_of_replica[np.searchsorted(replica, found.replica)]
     count = len(found.replica)
     held = {
@@ -84,7 +71,7 @@ def told_after(
     born_s[known] = before["born_s"][old[known]]
     contributors[known] |= before["contributors"][old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
-    seen, by_state = linearised(Kind(False), found.state, Place(own_m, axes))
+    seen, by_state = linearised(Kind(False), found.state, SensorPose(own_m, axes))
     spread = product_transposed(product(by_state, found.covariance[:3, :3]), by_state)
     newest = members.take(found.newest)
     azimuth, elevation = newest.direction()
@@ -124,16 +111,7 @@ def told_after(
 def state_tracks(
     told: Told, rows: IntArray, ticks: IntArray, sensors: tuple[str, ...]
 ) -> StateTracks:
-    """Return the message of what is told at some rows.
-
-    Parameters
-    ----------
-    told : Told
-    rows : (n,)
-        Of the wake, ascending, with and without tracks.
-    ticks : (n,)
-    sensors : tuple of str
-    """
+    """Return the message of what is told at some rows."""
     order = np.lexsort((told["track"], told["row"]))
     told = taken(told, order)
     names = [name for name in (*_WHOLE, *_NUMBERS) if name not in ("replica", "row", "born_s")]

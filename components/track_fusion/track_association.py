@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.association.assignment import global_nearest
-from components.association.gates import gate_threshold
+from components.association.assignment import gate_threshold, global_nearest
 from components.estimation.batched import product, product_transposed
 from components.estimation.covariance_intersection import distance_squared
 from components.estimation.measurement import Kind, linearised, residual
@@ -24,42 +23,25 @@ _DIRECTION = Kind(has_range=False)
 
 @dataclass(frozen=True)
 class MatchRules:
-    """When tracks are of one target.
+    """When tracks are of one target."""
 
-    Parameters
-    ----------
-    gate_probability : float
-        That two tracks of one target lie in each other's gate.
-    motion : ConstantVelocity
-        How targets move from the instant of one track to that of another.
-    bearing_rate_rad_s : float
-        Standard deviation of the rate at which a line of sight turns that has no range.
-    stay_factor : float
-        How many times as far as the gate a member may drift from its leader before it leaves.
-    """
-
-    gate_probability: float
-    motion: ConstantVelocity
+    gate_probability: float  # That two tracks of one target lie in each other's gate
+    motion: ConstantVelocity  # How targets move from the instant of one track to that of another
+    # Standard deviation of the rate at which a line of sight turns that has no range
     bearing_rate_rad_s: float
+    # How many times as far as the gate a member may drift from its leader before it leaves
     stay_factor: float
 
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """What a direction says of states at another instant.
+    """What a direction says of states at another instant."""
 
-    Parameters
-    ----------
-    residual : (2, n)
-        Azimuth and elevation as told, less those of the state carried back to their instant.
-    jacobian : (2, 6, n)
-        Of the direction by the state.
-    variance : (2, n)
-    """
-
+    # (2, n): Azimuth and elevation as told, less those of the state carried back to their
+    # instant
     residual: FloatArray
-    jacobian: FloatArray
-    variance: FloatArray
+    jacobian: FloatArray  # (2, 6, n): Of the direction by the state
+    variance: FloatArray  # (2, n)
 
 
 def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
@@ -79,16 +61,7 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
 def gate_share(
     rules: MatchRules, leader: LocalTracks, other: LocalTracks, time_s: FloatArray
 ) -> FloatArray:
-    """Return the squared distances of pairs over those of their gates.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    leader, other : LocalTracks
-        Of each pair.
-    time_s : (pairs,)
-        The instant at which they are compared.
-    """
+    """Return the squared distances of pairs over those of their gates."""
     share = np.empty(len(leader))
     both, one = leader.ranged & other.ranged, leader.ranged ^ other.ranged
     none = ~(leader.ranged | other.ranged)
@@ -131,20 +104,7 @@ def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -
 
 
 def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return the leader of every fused track, and of every track the place of its leader.
-
-    Parameters
-    ----------
-    tracks : LocalTracks
-        All belong to a fused track.
-
-    Returns
-    -------
-    leader : (fused tracks,)
-        Index into `tracks`, by replica and number of the fused track.
-    of : (n,)
-        Index into `leader`.
-    """
+    """Return the leader of every fused track, and of every track the place of its leader."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -155,15 +115,7 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
 
 
 def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
-    """Return tracks, of which those no longer belong that are too far from their leader.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    tracks : LocalTracks
-    time_s : (n,)
-        The instant at which they are compared.
-    """
+    """Return tracks, of which those no longer belong that are too far from their leader."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return tracks
@@ -193,17 +145,7 @@ def matched(
     Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
     tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
     alone goes to older ones only. What is left starts fused tracks of its own.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    tracks : LocalTracks
-    time_s : (n,)
-    trackers : int
-    next_number : (replicas,)
-    replica : (replicas,)
-        Ascending.
-    """  # fmt: skip
+    """
     system = tracks.system.copy()
     next_number = next_number.copy()
     for tracker in range(trackers):
