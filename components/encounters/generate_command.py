@@ -103,7 +103,8 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
         # Shares of horizontal distances are of a step as a whole, those of heights its chance.
         wide = np.diff(edges) if option == "--horizontal" and len(edges) == len(parts) + 1 else 1.0
         try:
-            density = StepDensity(edges, parts / wide)
+            with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
+                density = StepDensity(edges, parts / wide)
         except ValueError as error:
             raise UsageError(f"{said}: {error}") from None
         if edges[0] > 0.0 or edges[-1] < 0.0:

@@ -41,27 +41,27 @@ class Look:
     tail: FloatArray | None = None
 
     def check(self, cells: int) -> None:
-        """Refuse arrays without one value for each cell, and detections that are no truth values.
+        """Refuse arrays without one value for each cell, and those of another kind than theirs.
 
         Raises
         ------
         TypeError, ValueError
             With the field, its length and that which it must have.
         """
-        tables = (
-            {"detected": self.detected, "confidence": self.confidence},
-            self.extras,
-            self.signal,
-        )
-        noise = () if self.noise is None else ({"noise": self.noise},)
-        for table in (*tables, *noise):
+        truths = {"detected": self.detected, "noise": self.noise}
+        numbers = {**self.signal, "tail": self.tail}
+        for table in (truths, {"confidence": self.confidence}, self.extras, numbers):
             for name, value in table.items():
+                if value is None and name in ("noise", "tail"):
+                    continue
                 if not isinstance(value, np.ndarray) or value.shape != (cells,):
                     given = getattr(value, "shape", type(value).__name__)
                     message = f"an array of {cells} cells is needed"
                     raise ValueError(f"look gave {name} of shape or type {given}: {message}")
-        if self.detected.dtype != np.bool_:
-            raise TypeError(f"look gave detected of {self.detected.dtype}: bool is needed")
+        for table, kinds, needed in ((truths, "b", "bool is"), (numbers, "biuf", "numbers are")):
+            for name, value in table.items():
+                if value is not None and value.dtype.kind not in kinds:
+                    raise TypeError(f"look gave {name} of {value.dtype}: {needed} needed")
 
 
 class Cells:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from difflib import unified_diff
 from hashlib import sha256
 from itertools import chain, pairwise
-from pathlib import Path
+
+from definitions import spliced
 
 _COMPARED = {
     ast.Lt: (ast.LtE, ast.GtE), ast.LtE: (ast.Lt, ast.Gt), ast.Gt: (ast.GtE, ast.LtE),
@@ -102,10 +103,10 @@ class DrawnFault:
 
     @staticmethod
     def digest_of(name: str, change: str) -> str:
-        """Return the digest of a fault of this name and change."""
-        return sha256(f"{name}\0{change}".encode()).hexdigest()[:16]
+        """Return the digest of a fault of this name and change, in whatever file it stands."""
+        return sha256(f"{name.partition('::')[2]}\0{change}".encode()).hexdigest()[:16]
 
-    def applied(self, root: Path | None = None) -> str:
+    def applied(self) -> str:
         """Return the text of the file with the mistake in it.
 
         Raises
@@ -113,14 +114,11 @@ class DrawnFault:
         ValueError
             If that is no Python, or the same.
         """
-        there, lines = self.written, [line.encode() for line in self.text.splitlines(True)]
-        begin = sum(map(len, lines[: there.lineno - 1])) + there.col_offset
-        end = sum(map(len, lines[: there.end_lineno - 1])) + there.end_col_offset
+        there = self.written
         text = ast.unparse(_replaced(there, self.old, self.new))
         if isinstance(there, ast.BinOp | ast.BoolOp | ast.Compare | ast.UnaryOp | ast.IfExp):
             text = f"({text})"  # what takes its place may bind less
-        whole = b"".join(lines)
-        source = (whole[:begin] + text.encode() + whole[end:]).decode()
+        source = spliced(self.text, there, there, text)
         with warnings.catch_warnings(action="ignore"):
             try:
                 tree = ast.parse(source)

@@ -22,9 +22,14 @@ python tests/mutation/run_faults.py --workers 2 --json /tmp/faults.json --page d
 ```
 
 It first runs those tests without a fault, and ends with 1 if one of the faults is not noticed.
-`--only frames` tries one group, `--only TEXT` the faults of a file or of that name; with `--json`
-what was found before is kept for the page. The suite itself checks only that every fault still fits
-its file.
+`--only metrics` tries one group, `--only TEXT` the faults of a file, of a class or function, or of
+that name; with `--json` what was found before is kept for the page.
+
+The lists are `tests/mutation/faults/*.txt`. A fault is named by the class, method, function or
+constant that it is in (with the module before it where several are called alike), by what stands
+there once and by what takes its place. That is compared as a syntax tree, so neither its layout nor
+its file matters; tests are named without their folders. The suite checks only that every fault
+still fits, and that its tests are there.
 
 """
 
@@ -110,11 +115,13 @@ def page(faults: Sequence[Fault], outcomes: Mapping[str, Outcome]) -> str:
     left = [f for f in faults if not f.equivalent and _result(f, outcomes) == SURVIVED]
     if left:
         lines += ["", "Not noticed:", ""]
-        lines += [f"- `{f.name}` in `{f.file}`: `{_flat(f.old)}` as `{_flat(f.new)}`" for f in left]
+        lines += [
+            f"- `{f.name}` in `{f.where}`: `{_flat(f.old)}` as `{_flat(f.new)}`" for f in left
+        ]
     same_ones = [f for f in faults if f.equivalent]
     if same_ones:
         lines += ["", "Equivalent, which no test can notice:", ""]
-        lines += [f"- `{f.name}` in `{f.file}`: {f.equivalent}" for f in same_ones]
+        lines += [f"- `{f.name}` in `{f.where}`: {f.equivalent}" for f in same_ones]
     return "\n".join(lines) + "\n"
 
 

@@ -16,9 +16,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from definitions import ROOT
 from fault import Fault
 
-ROOT = Path(__file__).resolve().parents[2]
 CAUGHT, SURVIVED, OF_THE_LIST = "caught", "survived", "error of the list"
 _PARTS = (
     "dsa_des", "components", "configs", "tests", "docs", "pyproject.toml", "README.md",
@@ -173,7 +173,7 @@ class FaultyCopy:
         ValueError
             If it does not fit the file.
         """
-        text = fault.applied(ROOT)
+        text = fault.applied()
         path = self.folder / fault.file
         path.write_text(text, encoding="utf-8")
         # Bytecode is kept by time and size: each version of the file gets a time of its own.

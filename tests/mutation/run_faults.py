@@ -3,8 +3,8 @@
     python tests/mutation/run_faults.py [--only TEXT ...] [--workers N] [--json FILE] [--page FILE]
 
 A development tool that needs `os.fork`; all of them take half an hour. The suite only checks that
-every fault still fits its file, and that copying and running work. With `--json` outcomes are added
-to those of earlier runs, for the page to be made of all of them.
+every fault still fits what it is in, and that copying and running work. With `--json` outcomes are
+added to those of earlier runs, for the page to be made of all of them.
 """
 
 import json
@@ -12,12 +12,11 @@ import sys
 import tempfile
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import fault_page
-from fault import Fault
-from faults import FAULTS
+from fault import FAULTS, Fault
 from faulty_copy import CAUGHT, SURVIVED, Outcome, copies_in, tried
 
 
@@ -31,8 +30,13 @@ def main() -> int:
     if not faults:
         print("there is no such fault")
         return 2
+    try:
+        tests = {test for fault in faults for test in fault.tests}
+    except ValueError as error:
+        print(error)
+        return 2
     with tempfile.TemporaryDirectory() as folder:
-        outcomes = _run_all(faults, asked, Path(folder))
+        outcomes = _run_all(faults, tests, asked, Path(folder))
     if not outcomes:
         return 1
     known = {outcome.name: outcome for outcome in [*_earlier(asked.json), *outcomes]}
@@ -58,7 +62,10 @@ def _earlier(file: Path | None) -> list[Outcome]:
 
 def _has(fault: Fault, test: str) -> bool:
     """Whether what noticed a fault is among its tests (or is none, but the time limit)."""
-    return "::" not in test or any(test.startswith(known) for known in fault.tests)
+    file, _, inner = test.partition("::")
+    named = f"{Path(file).stem}::{inner}"
+    near = [each.rpartition("/")[2] for each in fault.near]
+    return not inner or any(named.startswith(t if "::" in t else f"{t}::") for t in near)
 
 
 def _keep(outcome: Outcome, file: Path | None) -> None:
@@ -72,7 +79,10 @@ def _keep(outcome: Outcome, file: Path | None) -> None:
 def _arguments() -> Namespace:
     parser = ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--only", nargs="+", metavar="TEXT", help="groups, files or parts of faults' names"
+        "--only",
+        nargs="+",
+        metavar="TEXT",
+        help="groups, files or parts of names (of a fault, or of what it is in)",
     )
     parser.add_argument("--workers", type=int, default=1, help="faults tried at once")
     parser.add_argument("--json", type=Path, metavar="FILE", help="add the outcomes to a file")
@@ -89,16 +99,29 @@ def _arguments() -> Namespace:
 def _is_one(fault: Fault, only: Sequence[str]) -> bool:
     groups = {known.group for known in FAULTS}
     return any(
-        text == fault.group if text in groups else text == fault.file or text in fault.name
+        text == fault.group
+        if text in groups
+        else text in fault.name
+        or text in fault.where
+        or (text.endswith(".py") and _is_in(fault, text))
         for text in only
     )
 
 
-def _run_all(faults: Sequence[Fault], asked: Namespace, folder: Path) -> list[Outcome]:
+def _is_in(fault: Fault, file: str) -> bool:
+    try:
+        return fault.file == file
+    except ValueError:  # its definition is not found, which is told where it is tried
+        return False
+
+
+def _run_all(
+    faults: Sequence[Fault], tests: Iterable[str], asked: Namespace, folder: Path
+) -> list[Outcome]:
     """Return outcomes in the order of the faults; none if the tests fail without a fault."""
     copies = copies_in(folder, asked.workers)
     if not asked.unchecked:
-        said = copies[0].clean(test for fault in faults for test in fault.tests)
+        said = copies[0].clean(tests)
         if said:
             print(said, "\nthe tests fail without any fault", sep="")
             return []

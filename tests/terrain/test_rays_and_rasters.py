@@ -205,6 +205,8 @@ def test_tiles_side_by_side_are_one_raster():
     [
         ("S42W180.hgt", [[1, 2], [3, -32768]], r"1 hole .* latitude -42, longitude -179"),
         ("S42W180.hgt", [[1, 2, 3]], "6 bytes: an .hgt file holds as many rows as columns"),
+        ("S42W180.hgt", [[1, 2, 3, 4, 5]], "10 bytes: an .hgt file holds as many rows as"),
+        ("S42W180.hgt", [[7]], "2 bytes: an .hgt file holds as many rows as columns"),
         ("island.hgt", [[1, 2], [3, 4]], "must say its south-west corner"),
         ("S42W180.png", [[1, 2], [3, 4]], "must be .hgt .SRTM., .tif or .tiff"),
         ("N90W180.hgt", [[1, 2], [3, 4]], "must lie within -90 to 90"),

@@ -164,6 +164,22 @@ def test_another_table_is_another_operator(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("wrong", "more"), [(4, ""), (5, ""), (6, "and 1 more"), (8, "and 3 more")]
+)
+def test_five_problems_of_a_table_are_told_and_the_rest_counted(tmp_path, wrong, more):
+    path = tmp_path / "table.csv"
+    path.write_text("time_s,decision\n" + "1,trun\n" * wrong)
+    with pytest.raises(ValueError) as refused:
+        read_decisions(path)
+    said = str(refused.value).removeprefix(f"{path}: ").split("; ")
+    told = [part for part in said if "decision is 'trun'" in part]
+    assert [part.partition(":")[0] for part in told] == [
+        f"line {number + 2}" for number in range(min(wrong, 5))
+    ]
+    assert [part for part in said if " more" in part] == [more] * bool(more)
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("time_s,what\n1,turn\n", "has no column 'decision'"),

@@ -46,6 +46,10 @@ LOOKS = {
     "confidence": lambda c, look: Look(look.detected, np.append(look.confidence, 0.0)),
     "extras": lambda c, look: Look(look.detected, look.confidence, {"x": np.zeros(len(c) + 1)}),
     "noise": lambda c, look: Look(look.detected, look.confidence, noise=look.detected[:0]),
+    "tail": lambda c, look: Look(look.detected, look.confidence, tail=np.ones(len(c) + 1)),
+    "text": lambda c, look: Look(look.detected, look.confidence, tail=np.full(len(c), "x")),
+    "signal": lambda c, look: Look(look.detected, look.confidence, signal={"x": 1j * c.range_m}),
+    "counts": lambda c, look: Look(look.detected, look.confidence, noise=np.zeros(len(c), int)),
     "a list": lambda c, look: Look(list(look.detected), look.confidence),
     "two axes": lambda c, look: Look(look.detected[:, np.newaxis], look.confidence),
     "indices": lambda c, look: Look(np.arange(len(c)), look.confidence),
@@ -67,7 +71,10 @@ def run(block, stranger, window=None):
 @pytest.mark.parametrize("wrong", LOOKS)
 def test_a_look_gives_one_value_for_each_cell(wrong, window):
     stranger = type("Stranger", (Looking,), {"gives": staticmethod(LOOKS[wrong])})
-    said = {"indices": "int64: bool", "nothing": "NoneType"}.get(wrong, r"an array of \d+ cells")
+    said = {
+        "indices": "int64: bool", "counts": "noise of int64: bool", "text": "tail of <U1: numbers",
+        "signal": "x of complex128: numbers", "nothing": "NoneType",
+    }.get(wrong, r"an array of \d+ cells")  # fmt: skip
     with pytest.raises(BlockFailure, match=rf"radar \({HERE}:Stranger\).*look gave .*{said}"):
         run("radar", stranger, window)
 
