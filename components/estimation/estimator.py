@@ -78,8 +78,8 @@ class PairMeasurement:
 
     innovations: list[Innovation]  # Of the pairs, for every model
     residuals: list[FloatArray]  # list of (m, pairs)
-    distance: FloatArray  # (pairs,): Least squared Mahalanobis distance of any model
-    # (models, pairs): Of the detection, were it the track's and the model right
+    distance: FloatArray  # (pairs,), least squared Mahalanobis distance of any model
+    # (models, pairs), of the detection, were it the track's and the model right
     log_likelihoods: FloatArray
     # Those by which tracks and models' odds are updated, where errors are not all new
     learning: list[Innovation] | None = None

@@ -20,8 +20,8 @@ from dsa_des.arrays.types import FloatArray, IntArray
 class SensorPose:
     """Where sensors are and how they are turned, in frames."""
 
-    position_m: FloatArray  # (3, n): Of the sensor in the frame
-    # (3, 3, n): Turns a vector of the frame into body axes: nose, right wing, floor
+    position_m: FloatArray  # (3, n), of the sensor in the frame
+    # (3, 3, n), turns a vector of the frame into body axes: nose, right wing, floor
     to_body: FloatArray
     # (3, n) or None: Of the sensor in the frame; needed where range rates are measured
     velocity_m_s: FloatArray | None = None
@@ -73,8 +73,8 @@ def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
 class FrameChange:
     """The way from frames to others."""
 
-    shift_m: FloatArray  # (3, n): Where the old frame's origin is in the new frame
-    turn: FloatArray  # (3, 3, n): Turns a vector of the old frame into the new one's axes
+    shift_m: FloatArray  # (3, n), where the old frame's origin is in the new frame
+    turn: FloatArray  # (3, 3, n), turns a vector of the old frame into the new one's axes
 
     def positions(self, position_m: FloatArray) -> FloatArray:
         """Return positions (3, n) of the old frame in the new one."""

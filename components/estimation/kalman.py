@@ -31,9 +31,9 @@ class Innovation:
     """What a filter expects of a measurement, and how its covariance relates to it."""
 
     expected: FloatArray  # (m, n)
-    root: FloatArray  # (m, m, n): Lower triangular root of the covariance of the residual
-    cross: FloatArray  # (d, m, n): Covariance of the state with the measurement
-    # (m, d, n): Of the measurement by the state; for an unscented filter the regression's slope
+    root: FloatArray  # (m, m, n), lower triangular root of the covariance of the residual
+    cross: FloatArray  # (d, m, n), covariance of the state with the measurement
+    # (m, d, n), of the measurement by the state; for an unscented filter the regression's slope
     jacobian: FloatArray
     # (m, n) or (m, m, n): Variances of the measurement's own errors; for an unscented filter
     # with what the regression leaves over, which makes it a matrix
@@ -52,7 +52,7 @@ class Moments:
     """What a filter expects of any measurement of its tracks, before that one's own errors."""
 
     expected: FloatArray  # (m, n)
-    total: FloatArray  # (m, m, n): Covariance of what is expected
+    total: FloatArray  # (m, m, n), covariance of what is expected
     cross: FloatArray  # As in `Innovation`
     jacobian: FloatArray  # As in `Innovation`
     # (m, m, n) or None: What the slope leaves of `total`; None where it is exact

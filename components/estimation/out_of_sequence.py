@@ -33,7 +33,7 @@ class Retrodiction:
 
     state: FloatArray  # (d, n)
     covariance: FloatArray  # (d, d, n)
-    # (d, d, n): How much of a correction of the state then is one of the state now
+    # (d, d, n), how much of a correction of the state then is one of the state now
     gain: FloatArray
 
     def carried_over(

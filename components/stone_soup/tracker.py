@@ -16,7 +16,6 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
-from components.stone_soup.objects import START
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -36,7 +35,7 @@ class Followed:
 
     number: int  # Its own, from 1, in the order of appearance
     status: int = CONFIRMED
-    state: FloatArray | None = None  # (6,): Position and velocity along north, east, down
+    state: FloatArray | None = None  # (6,), position and velocity along north, east, down
     covariance: FloatArray | None = None  # (6, 6)
     state_s: float = 0.0
     updated_s: float = 0.0
@@ -63,6 +62,8 @@ class Follower:
         self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
     ) -> list[Followed]:
         """Return all tracks after a look, by number; those that are gone a last time."""
+
+        from components.stone_soup.objects import START
 
         def seconds(instant: datetime) -> float:
             return time_s if instant == when else (instant - START).total_seconds()

@@ -23,31 +23,31 @@ _NUMBERS = 1 << 36
 class LocalTracks:
     """Tracks of several trackers, in the frame of the replica that they belong to."""
 
-    # (n,) of int: The tracker by its place among all of the scene, and its own number of the
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
     # track
     replica: IntArray
-    # (n,) of int: The tracker by its place among all of the scene, and its own number of the
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
     # track
     tracker: IntArray
-    # (n,) of int: The tracker by its place among all of the scene, and its own number of the
+    # (n,) of int, the tracker by its place among all of the scene, and its own number of the
     # track
     number: IntArray
-    system: IntArray  # (n,) of int: Number of the fused track that it belongs to; 0 for none yet
-    status: IntArray  # (n,) of int
-    existence: FloatArray  # (n,)
-    ranged: BoolArray  # (n,) of bool
+    system: IntArray  # (n,) of int, number of the fused track that it belongs to; 0 for none yet
+    status: IntArray
+    existence: FloatArray
+    ranged: BoolArray
     state: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
     covariance: FloatArray  # (6, n), (6, 6, n): Of a track without a range 0 and the identity
-    azimuth_rad: FloatArray  # (n,): Direction along the tracker's own axes, and its variances
-    elevation_rad: FloatArray  # (n,): Direction along the tracker's own axes, and its variances
-    azimuth_variance_rad2: FloatArray  # (n,)
-    elevation_variance_rad2: FloatArray  # (n,)
-    own_m: FloatArray  # (3, n): Where the ownship believed to be then
-    turn: FloatArray  # (3, 3, n): Turns the tracker's axes into those of the frame
-    time_s: FloatArray  # (n,): The instant that all this speaks of
-    updated_s: FloatArray  # (n,)
-    contributors: IntArray  # (n,) of int: Masks over all sensors
-    updated_by: IntArray  # (n,) of int: Masks over all sensors
+    azimuth_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
+    elevation_rad: FloatArray  # (n,), direction along the tracker's own axes, and its variances
+    azimuth_variance_rad2: FloatArray
+    elevation_variance_rad2: FloatArray
+    own_m: FloatArray  # (3, n), where the ownship believed to be then
+    turn: FloatArray  # (3, 3, n), turns the tracker's axes into those of the frame
+    time_s: FloatArray  # (n,), the instant that all this speaks of
+    updated_s: FloatArray
+    contributors: IntArray  # (n,) of int, masks over all sensors
+    updated_by: IntArray  # (n,) of int, masks over all sensors
 
     def __len__(self) -> int:
         return len(self.replica)
@@ -176,38 +176,38 @@ def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
 
 
 @dataclass(frozen=True, eq=False)
-class FusionHeads:
+class FusionRecords:
     """What is kept of each replica beside its tracks, replicas ascending."""
 
-    replica: IntArray  # (n,)
-    # (3, n): Of its frame (latitude, longitude in deg, height in m); NaN before the first track
+    replica: IntArray
+    # (3, n), of its frame (latitude, longitude in deg, height in m); NaN before the first track
     origin: FloatArray
-    next_number: IntArray  # (n,)
-    time_s: FloatArray  # (n,): The newest instant that any track spoke of
-    own_m: FloatArray  # (3, n): Where in the frame the ownship was then
+    next_number: IntArray
+    time_s: FloatArray  # (n,), the newest instant that any track spoke of
+    own_m: FloatArray  # (3, n), where in the frame the ownship was then
 
-    def take(self, which: Any) -> "FusionHeads":
+    def take(self, which: Any) -> "FusionRecords":
         """Return those of some replicas."""
-        return FusionHeads(
+        return FusionRecords(
             self.replica[which], self.origin[:, which], self.next_number[which],
             self.time_s[which], self.own_m[:, which],
         )  # fmt: skip
 
-    def kept_with(self, newer: "FusionHeads") -> "FusionHeads":
+    def kept_with(self, newer: "FusionRecords") -> "FusionRecords":
         """Return those of all replicas, as they are in `newer` where they are among them."""
         old = self.take(~np.isin(self.replica, newer.replica))
         names = [field.name for field in fields(self)]
-        both = (np.concatenate([getattr(h, n) for h in (old, newer)], axis=-1) for n in names)
-        whole = FusionHeads(*both)
+        both = (np.concatenate([getattr(part, n) for part in (old, newer)], axis=-1) for n in names)
+        whole = FusionRecords(*both)
         return whole.take(np.argsort(whole.replica, kind="stable"))
 
 
-def later_heads(heads: FusionHeads, new: LocalTracks) -> FusionHeads:
-    """Return heads that know the newest instant, and where the ownship is then."""
-    time_s, own_m = heads.time_s.copy(), heads.own_m.copy()
+def with_newest(records: FusionRecords, new: LocalTracks) -> FusionRecords:
+    """Return records that know the newest instant, and where the ownship is then."""
+    time_s, own_m = records.time_s.copy(), records.own_m.copy()
     order = np.lexsort((-new.tracker, new.time_s))
-    of = np.searchsorted(heads.replica, new.replica[order])
+    of = np.searchsorted(records.replica, new.replica[order])
     late = new.time_s[order] >= time_s[of]
     time_s[of[late]] = new.time_s[order][late]
     own_m[:, of[late]] = new.own_m[:, order][:, late]
-    return replace(heads, time_s=time_s, own_m=own_m)
+    return replace(records, time_s=time_s, own_m=own_m)

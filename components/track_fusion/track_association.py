@@ -1,9 +1,10 @@
-"""Which tracks of different trackers are of one target: by what they say of it, never by truth.
+"""Track-to-track association: which tracks of different trackers are of one target.
 
-A fused track has a leader: the first of its members that has a range, or else the first. A track
-belongs to it if it lies in the gate around the leader, and a fused track has at most one member of
-every tracker. Distances take the errors of two trackers as independent: they share the motion's
-noise, which makes the true differences smaller, so that the gate errs on the wide side.
+They are associated by their estimates, never by truth. A fused track has a leader: the first of its
+members that has a range, or else the first. A track belongs to it if it lies in the gate around the
+leader, and a fused track has at most one member of every tracker. Distances take the errors of two
+trackers as independent: they share the motion's noise, which makes the true differences smaller, so
+that the gate errs on the wide side.
 """
 
 from dataclasses import dataclass, replace
@@ -37,10 +38,10 @@ class MatchRules:
 class Bearing:
     """What a direction says of states at another instant."""
 
-    # (2, n): Azimuth and elevation as told, less those of the state carried back to their
+    # (2, n), azimuth and elevation as told, less those of the state carried back to their
     # instant
     residual: FloatArray
-    jacobian: FloatArray  # (2, 6, n): Of the direction by the state
+    jacobian: FloatArray  # (2, 6, n), of the direction by the state
     variance: FloatArray  # (2, n)
 
 
@@ -50,9 +51,9 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     then = state.copy()
     then[:3] += back_s * state[3:]
     seen, by_place = linearised(_DIRECTION, then, tracks.place())
-    told = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
+    measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
     return Bearing(
-        residual(told, seen),
+        residual(measured, seen),
         np.concatenate([by_place, back_s * by_place], axis=1),
         np.stack([tracks.azimuth_variance_rad2, tracks.elevation_variance_rad2]),
     )
@@ -77,11 +78,11 @@ def gate_share(
         theirs = LocalTracks.joined([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
         x, p = mine.at(when, rules.motion)
-        told = bearing(theirs, x, when)
-        spread = product_transposed(product(told.jacobian, p), told.jacobian)
+        angles = bearing(theirs, x, when)
+        spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
-            spread[i, i] += told.variance[i]
-        found = distance_squared(told.residual, spread) / two
+            spread[i, i] += angles.variance[i]
+        found = distance_squared(angles.residual, spread) / two
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = found
     if none.any():

@@ -53,17 +53,17 @@ class Memory:
 class Plan:
     """The order in which looks are worked on."""
 
-    look: IntArray  # (works,)
-    back_to: IntArray  # (works,): Look before which the tracks are gone back to first; -1 for none
-    # (works,): Of a look that is worked on in one step, the first look of those made since; -1
+    look: IntArray
+    back_to: IntArray  # (works,), look before which the tracks are gone back to first; -1 for none
+    # (works,), of a look that is worked on in one step, the first look of those made since; -1
     # of others
     since: IntArray
-    # (works,): Newest look by then: where tracks are seen from when they are told
+    # (works,), newest look by then: where tracks are seen from when they are told
     seen_from: IntArray
-    # (works,) of bool: Whether tracks are told after it: it is the last work that a row brings
+    # (works,) of bool, whether tracks are told after it: it is the last work that a row brings
     tells: BoolArray
-    of: IntArray  # (works,): Index of the replica
-    row: IntArray  # (works,): Row of the wake that brings it about
+    of: IntArray  # (works,), index of the replica
+    row: IntArray  # (works,), row of the wake that brings it about
     forgotten: list[list[int]]  # Looks that need not be remembered after each
 
 

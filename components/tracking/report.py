@@ -32,8 +32,8 @@ class Reported:
     """Tracks as they are told after a look."""
 
     store: TrackStore
-    look: IntArray  # (tracks,): The last that was worked on
-    row: IntArray  # (tracks,): Row of the wake at which it is told
+    look: IntArray  # (tracks,), the last that was worked on
+    row: IntArray  # (tracks,), row of the wake at which it is told
 
     @classmethod
     def of(

@@ -25,23 +25,23 @@ _VARIANCES = (
 class Scans:
     """Looks in the order of their arrival, and their detections."""
 
-    row: IntArray  # (looks,): At which row of the wake each arrived, ascending
-    tick: IntArray  # (looks,): When it was made
-    sensors: IntArray  # (looks,): Mask of the sensors that looked
-    tells_misses: BoolArray  # (looks,) of bool: Whether what is not among its detections was missed
-    # (6, looks): Of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll
+    row: IntArray  # (looks,), at which row of the wake each arrived, ascending
+    tick: IntArray  # (looks,), when it was made
+    sensors: IntArray  # (looks,), mask of the sensors that looked
+    tells_misses: BoolArray  # (looks,) of bool, whether what is not among its detections was missed
+    # (6, looks), of the ownship: latitude, longitude (deg), height (m), heading, pitch, roll
     # (rad)
     pose: FloatArray
-    # (3, looks): Of the ownship over ground (north, east, down of its own place, m/s); NaN
+    # (3, looks), of the ownship over ground (north, east, down of its own place, m/s); NaN
     # where a look measured no range rate
     velocity: FloatArray
-    offsets: IntArray  # (looks + 1,): Detections ``offsets[i]:offsets[i + 1]`` belong to look i
-    # (4, detections): Azimuth, elevation, range, range rate; NaN where not measured
+    offsets: IntArray  # (looks + 1,), detections ``offsets[i]:offsets[i + 1]`` belong to look i
+    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
     measured: FloatArray
-    # (4, detections): Azimuth, elevation, range, range rate; NaN where not measured
+    # (4, detections), azimuth, elevation, range, range rate; NaN where not measured
     variance: FloatArray
-    contributors: IntArray  # (detections,)
-    source: IntArray  # (4, detections): Index of the sensor that gave each quantity; -1 for none
+    contributors: IntArray
+    source: IntArray  # (4, detections), index of the sensor that gave each quantity; -1 for none
 
     def __len__(self) -> int:
         return len(self.row)
