@@ -13,7 +13,8 @@ import dsa_des
 from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, OperatorDecision
 from components.operator.decision_table import read_decisions
 from components.operator.desk import MOST_WAITING, Desk, Laid
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation

@@ -17,7 +17,8 @@ from components.radar.fading import fading_power
 from components.radar.scatterers import Scatterers
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.time.randomness import Stream, target_keys
