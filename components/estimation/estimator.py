@@ -115,7 +115,7 @@ class Estimator(Protocol):
         """Return tracks after times (n,), not negative."""
         ...
 
-    def expect(self, kind: Kind, tracks: Estimates, place: SensorPose) -> list[Moments]:
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
         """Return what every model expects to be measured of predicted tracks."""
         ...
 
@@ -127,10 +127,10 @@ class Estimator(Protocol):
         whole = is_everything(which, pairs.residuals[0].shape[1])
         moved = [
             updated(
-                x, p, found if whole else found.take(which),
+                x, p, innovation if whole else innovation.take(which),
                 apart if whole else selected(apart, which),
             )
-            for x, p, found, apart in zip(
+            for x, p, innovation, apart in zip(
                 before.states, before.covariances, pairs.learning or pairs.innovations,
                 pairs.residuals, strict=True,
             )
@@ -201,9 +201,9 @@ class ExtendedKalmanFilter(Estimator):
         state, covariance = predict(self.model, tracks.states[0], tracks.covariances[0], dt_s)
         return Estimates([state], [covariance], tracks.weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, place: SensorPose) -> list[Moments]:
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
         """Return what is expected to be measured."""
-        seen, jacobian = linearised(kind, tracks.states[0], place)
+        seen, jacobian = linearised(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
 
 
@@ -228,9 +228,9 @@ def pair_measurement(
     if common is None:
         return PairMeasurement(innovations, residuals, distance, likelihoods)
     spread = np.zeros(variance.shape)
-    for weight, said in zip(weights, moments, strict=True):
+    for weight, expected in zip(weights, moments, strict=True):
         for i in range(len(spread)):
-            spread[i] += selected(weight * said.total[i, i], track)
+            spread[i] += selected(weight * expected.total[i, i], track)
     new = variance_of_what_is_new(variance, common, spread)
     learning = [found.innovation(new, track) for found in moments]
     odds = np.empty_like(likelihoods)

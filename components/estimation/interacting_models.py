@@ -54,10 +54,10 @@ class InteractingMultipleModels(Estimator):
         ]
         return Estimates([e.states[0] for e in moved], [e.covariances[0] for e in moved], weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, place: SensorPose) -> list[Moments]:
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
         """Return what every model expects to be measured."""
         return [
-            one.expect(kind, Estimates([x], [p], tracks.weights), place)[0]
+            one.expect(kind, Estimates([x], [p], tracks.weights), pose)[0]
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
         ]
 

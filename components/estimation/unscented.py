@@ -74,10 +74,10 @@ class UnscentedKalmanFilter(Estimator):
         state, covariance = predict_unscented(self.model, state, covariance, dt_s, self.sigma)
         return Estimates([state], [covariance], weights)
 
-    def expect(self, kind: Kind, tracks: Estimates, place: SensorPose) -> list[Moments]:
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
         """Return what is expected to be measured."""
         (state,), (covariance,), _ = tracks
-        return [unscented_moments(kind, state, covariance, place, self.sigma)]
+        return [unscented_moments(kind, state, covariance, pose, self.sigma)]
 
 
 def predict_unscented(
@@ -100,7 +100,7 @@ def predict_unscented(
 
 
 def unscented_moments(
-    kind: Kind, state: FloatArray, covariance: FloatArray, place: SensorPose, sigma: SigmaPoints
+    kind: Kind, state: FloatArray, covariance: FloatArray, pose: SensorPose, sigma: SigmaPoints
 ) -> Moments:
     """Return the moments of what sigma points would be measured as.
 
@@ -111,12 +111,12 @@ def unscented_moments(
     of_mean, of_covariance, _ = sigma.weights(size)
     points = sigma.of(state, covariance)
     many = points.shape[1]
-    places = SensorPose(
-        np.tile(place.position_m, many),
-        np.tile(place.to_body, many),
-        None if place.velocity_m_s is None else np.tile(place.velocity_m_s, many),
+    poses = SensorPose(
+        np.tile(pose.position_m, many),
+        np.tile(pose.to_body, many),
+        None if pose.velocity_m_s is None else np.tile(pose.velocity_m_s, many),
     )
-    seen = expected(kind, points.reshape(size, -1), places).reshape(kind.size, many, count)
+    seen = expected(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
     mean = _weighted(seen, of_mean)
     for angle in range(2):
         sin = _weighted(np.sin(seen[angle])[np.newaxis], of_mean)[0]

@@ -193,7 +193,7 @@ class Fusion(Component):
 
 
 def poses(message: Detections) -> FloatArray:
-    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is told."""
+    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is stated."""
     columns = message.pose_columns()
     if columns:
         return np.stack(list(columns.values()))
@@ -201,7 +201,7 @@ def poses(message: Detections) -> FloatArray:
 
 
 def velocities(message: Detections) -> FloatArray:
-    """Return the ownship's velocity at each entry, (3, entries); NaN where none is told."""
+    """Return the ownship's velocity at each entry, (3, entries); NaN where none is stated."""
     velocity = message.velocity_columns()
     if velocity is None:
         return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)

@@ -251,7 +251,7 @@ class Gated(Fusion):
         in_order = self._in_order(rows, anchors, arrivals)
         row = np.concatenate(rows)[in_order]
         entries = {name: np.concatenate(parts)[in_order] for name, parts in gathered.items()}
-        target = self._who(entries, arrivals, order)
+        target = self._targets(entries, arrivals, order)
         return self.combine(wake.ticks, row, target, arrivals, entries)
 
     def _in_order(
@@ -269,10 +269,10 @@ class Gated(Fusion):
         rank = np.repeat(np.arange(len(anchors)), [len(mine) for _, mine in anchors])
         return np.lexsort((*measured, rank, np.concatenate(rows)))
 
-    def _who(
+    def _targets(
         self, entries: dict[str, IntArray], arrivals: dict[str, Arrivals], order: list[str]
     ) -> IntArray:
-        """Return whom each fused detection is of, for the record: nothing here rests on it."""
+        """Return the target of each fused detection, for the record: nothing here rests on it."""
         target = np.full(len(next(iter(entries.values()))), FALSE_TARGET, dtype=np.int64)
         for name in reversed(order):
             entry = entries[name]

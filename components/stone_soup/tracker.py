@@ -31,7 +31,7 @@ from dsa_des.time.randomness import key_of
 
 @dataclass
 class Followed:
-    """A track as it is told."""
+    """A track as it is reported."""
 
     number: int  # Its own, from 1, in the order of appearance
     status: int = CONFIRMED
@@ -48,7 +48,7 @@ class Followed:
 
 
 class Follower:
-    """Turns the tracks of a tracker into what is told of them."""
+    """Turns the tracks of a tracker into what is reported of them."""
 
     def __init__(self, position: "tuple[int, ...]", velocity: "tuple[int, ...]") -> None:
         east, north, up = range(3)
@@ -58,11 +58,10 @@ class Follower:
         self._tracks: dict[str, Followed] = {}
         self._next = 1
 
-    def told(
+    def after(
         self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
     ) -> list[Followed]:
         """Return all tracks after a look, by number; those that are gone a last time."""
-
         from components.stone_soup.objects import START
 
         def seconds(instant: datetime) -> float:
@@ -185,7 +184,7 @@ class StoneSoupParameters(Parameters):
 
 
 class StoneSoupTracker(Component):
-    """Hands every look to a tracker of Stone Soup's, and tells its tracks.
+    """Hands every look to a tracker of Stone Soup's, and reports its tracks.
 
     The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
     Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
@@ -221,18 +220,18 @@ class StoneSoupTracker(Component):
 
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
-        found = []
+        said = []
         for name, offer in sorted(self._offers().items()):
-            told = offer.lasting if isinstance(offer, SensorOffer) else None
-            if told is None or told:
+            lasting = offer.lasting if isinstance(offer, SensorOffer) else None
+            if lasting is None or lasting:
                 what = (
                     "what lasts of its errors is not said"
-                    if told is None
-                    else (f"errors of its {', '.join(sorted(told))} last from look to look")
+                    if lasting is None
+                    else (f"errors of its {', '.join(sorted(lasting))} last from look to look")
                 )
-                found.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
+                said.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
                              "too sure where errors are the same again")  # fmt: skip
-        return super().warnings() + found
+        return super().warnings() + said
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -264,7 +263,7 @@ class StoneSoupTracker(Component):
         return tracker
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Hand over what came, look by look, and tell all tracks."""
+        """Hand over what came, look by look, and report all tracks."""
         fused = wake["fused"]
         if fused is None:
             return None
@@ -275,19 +274,19 @@ class StoneSoupTracker(Component):
             self._origin = scans.pose[:3, 0].copy()
         lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
         pose = scans.pose
-        places = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+        poses = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
                                 (pose[3], pose[4], pose[5]))  # fmt: skip
-        told: list[tuple[int, int, Followed]] = []
+        followed: list[tuple[int, int, Followed]] = []
         rows: list[int] = []
         for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):
             here: dict[int, Followed] = {}
             for look in looks:
-                here |= {one.number: one for one in self._looked(fused, scans, look, places, wake)}
+                here |= {one.number: one for one in self._looked(fused, scans, look, poses, wake)}
             rows.append(row)
-            told += [(row, looks[-1], replace(one)) for one in here.values()]
+            followed += [(row, looks[-1], replace(one)) for one in here.values()]
         if not rows:
             return None
-        return self._message(wake, fused.sensors, rows, told, places)
+        return self._message(wake, fused.sensors, rows, followed, poses)
 
     def _in_time(self, scans: Scans, sensors: tuple[str, ...]) -> list[int]:
         """Return the looks that come after no later one; the others are counted."""
@@ -298,7 +297,7 @@ class StoneSoupTracker(Component):
         return np.flatnonzero(in_time).tolist()
 
     def _looked(
-        self, fused: FusedDetections, scans: Scans, look: int, places: SensorPose, wake: Wake
+        self, fused: FusedDetections, scans: Scans, look: int, poses: SensorPose, wake: Wake
     ) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
@@ -309,17 +308,17 @@ class StoneSoupTracker(Component):
         which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
         masks = [int(mask) for mask in scans.contributors[which]]
         names = ["+".join(n for i, n in enumerate(fused.sensors) if m >> i & 1) for m in masks]
-        poses = Poses(
-            places.take(np.array([look])), self.p.position_mapping, self.p.state_size
+        models = Poses(
+            poses.take(np.array([look])), self.p.position_mapping, self.p.state_size
         )  # fmt: skip
         found = detections(
-            poses, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
+            models, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
             [{"sensor": name} for name in names],
         )  # fmt: skip
         with self._repeatable.working():
             _, tracks = self._tracker.update_tracker(when, found)
             self._masks.update(zip(names, masks, strict=True))
-            return self._follower.told(tracks, time_s, when, self._masks)
+            return self._follower.after(tracks, time_s, when, self._masks)
 
     def _message(
         self,
@@ -327,29 +326,29 @@ class StoneSoupTracker(Component):
         sensors: tuple[str, ...],
         rows: list[int],
         entries: "list[tuple[int, int, Followed]]",
-        places: SensorPose,
+        poses: SensorPose,
     ) -> StateTracks:
-        """Return tracks as a message: of each its row, the last look and how it is told."""
-        told = [one for _, _, one in entries]
-        count = len(told)
+        """Return tracks as a message: of each its row, the last look and its report."""
+        tracks = [one for _, _, one in entries]
+        count = len(tracks)
         look = np.array([last for _, last, _ in entries], dtype=np.int64)
         of_row = np.searchsorted(rows, np.array([row for row, _, _ in entries], dtype=np.int64))
-        state = np.array([one.state for one in told], dtype=float).reshape(count, 6).T
-        spread = np.array([one.covariance for one in told], dtype=float).reshape(count, 6, 6)
+        state = np.array([one.state for one in tracks], dtype=float).reshape(count, 6).T
+        spread = np.array([one.covariance for one in tracks], dtype=float).reshape(count, 6, 6)
         spread = np.moveaxis(spread, 0, -1)
         at = SensorPose(
-            places.position_m[:, look],
+            poses.position_m[:, look],
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
         seen, by_state = linearised(Kind(False), state, at)
         angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
-        ranged = np.array([one.ranged for one in told], dtype=bool)
+        ranged = np.array([one.ranged for one in tracks], dtype=bool)
 
         def known(values: FloatArray) -> FloatArray:
             return np.where(ranged, values, np.nan)
 
         def column(name: str, kind: type = float) -> Any:
-            return np.array([getattr(one, name) for one in told], dtype=kind)
+            return np.array([getattr(one, name) for one in tracks], dtype=kind)
 
         moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(_STATE)}
         assert self._origin is not None

@@ -145,7 +145,7 @@ class CovarianceIntersection(Component):
     ladders = (RULE,)
 
     def setup(self) -> None:
-        """Start with no tracks, and learn who sends them."""
+        """Start with no tracks, and learn which trackers send them."""
         self.trackers = tuple(sorted(producer.block for producer in self.context.producers))
         offers = self._offers()
         ranged = {n for n, o in offers.items() if isinstance(o, SensorOffer) and o.measures_range}

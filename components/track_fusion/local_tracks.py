@@ -1,4 +1,4 @@
-"""The tracks of several trackers in one frame: what each told last, and how that goes on."""
+"""The tracks of several trackers in one frame: what each reported last, and how that goes on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -103,7 +103,7 @@ class LocalTracks:
         return replace(self, system=np.where(known[place] == mine, old.system[place], 0))
 
     def place(self) -> SensorPose:
-        """Return from where, and along which axes, each tells its direction."""
+        """Return from where, and along which axes, each reports its direction."""
         return SensorPose(self.own_m, self.turn.swapaxes(0, 1))
 
     def direction(self) -> tuple[FloatArray, FloatArray]:

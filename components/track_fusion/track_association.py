@@ -38,7 +38,7 @@ class MatchRules:
 class Bearing:
     """What a direction says of states at another instant."""
 
-    # (2, n), azimuth and elevation as told, less those of the state carried back to their
+    # (2, n), azimuth and elevation as reported, less those of the state carried back to their
     # instant
     residual: FloatArray
     jacobian: FloatArray  # (2, 6, n), of the direction by the state
@@ -194,16 +194,18 @@ def _join(
     lead = member[leader[~taken]]
     begin = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="left")
     many = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="right") - begin
-    who = np.repeat(np.arange(len(free)), many)
+    candidate = np.repeat(np.arange(len(free)), many)
     start = np.cumsum(many) - many
-    which = np.arange(len(who)) - np.repeat(start - begin, many)
-    home = tracks.system[free[who]]
+    which = np.arange(len(candidate)) - np.repeat(start - begin, many)
+    home = tracks.system[free[candidate]]
     older = (home == 0) | (tracks.system[lead[which]] < home)
-    who, which = who[older], which[older]
-    if len(who) == 0:
+    candidate, which = candidate[older], which[older]
+    if len(candidate) == 0:
         return
-    share = gate_share(rules, tracks.take(lead[which]), tracks.take(free[who]), time_s[free[who]])
+    share = gate_share(
+        rules, tracks.take(lead[which]), tracks.take(free[candidate]), time_s[free[candidate]]
+    )
     inside = share <= 1.0
-    who, which, share = who[inside], which[inside], share[inside]
-    won = global_nearest(which, who, share, 1.0)
-    system[free[who[won]]] = tracks.system[lead[which[won]]]
+    candidate, which, share = candidate[inside], which[inside], share[inside]
+    won = global_nearest(which, candidate, share, 1.0)
+    system[free[candidate[won]]] = tracks.system[lead[which[won]]]

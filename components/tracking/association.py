@@ -1,4 +1,4 @@
-"""Data association in a tracker: which detections are whose, and what tracks are after them.
+"""Data association in a tracker: which detections belong to which tracks, and correct them.
 
 An association is a class with `update`; one that gives every track at most one detection is an
 `OneToOne` that says which pairs are taken. Pairs come kind by kind, as angle-only detections and
@@ -32,7 +32,7 @@ Associated = tuple[TrackStore, BoolArray, FloatArray]
 
 
 class Association(Protocol):
-    """Decides which detections are whose."""
+    """Decides which detections belong to which tracks."""
 
     def update(
         self,

@@ -1,9 +1,9 @@
-"""Looks that come late: in which order looks are worked on, and what is gone back to.
+"""Out-of-sequence measurements: in which order looks are worked on, and what is gone back to.
 
 A look is late if one that was made after it has been worked on. Rungs, from crude to exact:
 
 - ``drop``: it is left out.
-- ``one_step``: tracks go one step back to its instant, are corrected there, and what that tells of
+- ``one_step``: tracks go one step back to its instant, are corrected there, and what that says of
   them now is carried over; nothing is worked on again, and no track is started.
 - ``rerun``: tracks go back to how they were before it, and every look since is worked on again in
   the order in which they were made. What comes out is what would have been had all come in time.
@@ -58,10 +58,10 @@ class Plan:
     # (works,), of a look that is worked on in one step, the first look of those made since; -1
     # of others
     since: IntArray
-    # (works,), newest look by then: where tracks are seen from when they are told
+    # (works,), newest look by then: where tracks are seen from when they are reported
     seen_from: IntArray
-    # (works,) of bool, whether tracks are told after it: it is the last work that a row brings
-    tells: BoolArray
+    # (works,) of bool, whether tracks are reported after it: it is the last work that a row brings
+    reports: BoolArray
     of: IntArray  # (works,), index of the replica
     row: IntArray  # (works,), row of the wake that brings it about
     forgotten: list[list[int]]  # Looks that need not be remembered after each
@@ -114,8 +114,8 @@ def rerun_plan(
     replica: list[int] = []
     forgotten: list[list[int]] = []
     left_out: list[int] = []
-    for new, place in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
-        known = memory.setdefault(place, Memory())
+    for new, number in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
+        known = memory.setdefault(number, Memory())
         key = keys[new]
         if known.keys and key[0] < known.keys[-1][0] - lag_ticks:
             left_out.append(new)
@@ -134,7 +134,7 @@ def rerun_plan(
         look += works
         back_to += [again[0] if again else -1, *([-1] * len(again))]
         brought_by += [row[new]] * len(works)
-        replica += [place] * len(works)
+        replica += [number] * len(works)
         forgotten += [[] for _ in again] + [past]
     return _planned(look, back_to, None, look, brought_by, replica, forgotten), left_out
 
@@ -153,8 +153,8 @@ def one_step_plan(
     replica: list[int] = []
     forgotten: list[list[int]] = []
     left_out: list[int] = []
-    for new, place in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
-        known = memory.setdefault(place, Memory())
+    for new, number in zip(range(begin, len(scans)), of[begin:].tolist(), strict=True):
+        known = memory.setdefault(number, Memory())
         key, first, gone = keys[new], -1, 0
         newest = known.keys[-1][0] if known.keys else key[0]
         if key[0] < newest - lag_ticks:
@@ -171,7 +171,7 @@ def one_step_plan(
         look.append(new)
         since.append(first)
         seen_from.append(known.looks[-1])
-        replica.append(place)
+        replica.append(number)
         forgotten.append(past)
     row = scans.row[look].tolist()
     return _planned(look, None, since, seen_from, row, replica, forgotten), left_out
@@ -187,15 +187,15 @@ def _planned(
     forgotten: list[list[int]],
 ) -> Plan:
     none = np.full(len(look), -1)
-    rows, place_of = np.array(row, dtype=np.int64), np.array(replica, dtype=np.int64)
-    tells = np.ones(len(look), dtype=bool)
+    rows, replica_of = np.array(row, dtype=np.int64), np.array(replica, dtype=np.int64)
+    reports = np.ones(len(look), dtype=bool)
     if len(look):
-        tells[:-1] = (rows[1:] != rows[:-1]) | (place_of[1:] != place_of[:-1])
+        reports[:-1] = (rows[1:] != rows[:-1]) | (replica_of[1:] != replica_of[:-1])
     return Plan(
         np.array(look, dtype=np.int64),
         none if back_to is None else np.array(back_to, dtype=np.int64),
         none if since is None else np.array(since, dtype=np.int64),
-        np.array(seen_from, dtype=np.int64), tells, place_of, rows, forgotten,
+        np.array(seen_from, dtype=np.int64), reports, replica_of, rows, forgotten,
     )  # fmt: skip
 
 
@@ -205,9 +205,9 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, l
     keep = (scans.tick >= np.maximum.accumulate(scans.tick)) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
     row = scans.row[look]
-    tells = np.append(row[1:] != row[:-1], True)[: len(look)]
+    reports = np.append(row[1:] != row[:-1], True)[: len(look)]
     none = np.full(len(look), -1)
-    plan = Plan(look, none, none, look, tells, of[look], row, [])
+    plan = Plan(look, none, none, look, reports, of[look], row, [])
     return plan, np.flatnonzero(~keep).tolist()
 
 
@@ -250,8 +250,8 @@ def may_come_late(offers: Mapping[str, Any], producers: Iterable[Producer]) -> b
 
 def latest_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fraction:
     """Return how late a look may come at most, as far as the scene says; queues are not in it."""
-    told = [o.latest_s or 0 for o in offers.values() if isinstance(o, SensorOffer)]
-    return Fraction(max(told, default=0) + max((one.latest_s for one in producers), default=0))
+    late_s = [o.latest_s or 0 for o in offers.values() if isinstance(o, SensorOffer)]
+    return Fraction(max(late_s, default=0) + max((one.latest_s for one in producers), default=0))
 
 
 def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -> dict[str, float]:
@@ -261,7 +261,7 @@ def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -
         for name, o in sorted(offers.items())
         if isinstance(o, SensorOffer) and o.clock is not None and o.latest_s is not None
     }
-    found = {}
+    shares = {}
     for name, (clock, latest, jitter) in said.items():
         others = [
             (theirs, latest - (last - spread))
@@ -276,8 +276,8 @@ def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -
         looks = [t for k in range(_MOST_LOOKS) if (t := _instant(clock, k)) < duration_s]
         late = sum(any(_overtaken(t, one, by_s, lag_s) for one, by_s in ahead_s) for t in looks)
         if late:
-            found[name] = late / len(looks)
-    return found
+            shares[name] = late / len(looks)
+    return shares
 
 
 def _overtaken(t: Fraction, clock: ClockSpec, by_s: Fraction, lag_s: Fraction) -> bool:

@@ -1,4 +1,4 @@
-"""What a tracker tells: the columns of its message, made once for all looks of a wake."""
+"""The message of a tracker: its columns, made once for all looks of a wake."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,20 +29,20 @@ _PROBABILITIES = {
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """Tracks as they are told after a look."""
+    """Tracks as they are reported after a look."""
 
     store: TrackStore
     look: IntArray  # (tracks,), the last that was worked on
-    row: IntArray  # (tracks,), row of the wake at which it is told
+    row: IntArray  # (tracks,), row of the wake at which it is reported
 
     @classmethod
     def of(
         cls, store: TrackStore, replica: IntArray, looks: IntArray, rows: IntArray
     ) -> "Reported":
         """Return the tracks of some replicas (ascending) after their looks."""
-        place = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
-        mine = replica[place] == store.replica
-        return cls(store.take(mine), looks[place[mine]], rows[place[mine]])
+        index = np.minimum(np.searchsorted(replica, store.replica), len(replica) - 1)
+        mine = replica[index] == store.replica
+        return cls(store.take(mine), looks[index[mine]], rows[index[mine]])
 
 
 def state_tracks(
@@ -53,7 +53,7 @@ def state_tracks(
     wake: Wake,
     sensors: tuple[str, ...],
 ) -> StateTracks:
-    """Return the message of what is told."""
+    """Return the message of what is reported."""
     ticks = wake.ticks[rows]
     if not reported:
         empty = StateTracks.initial({})
@@ -111,7 +111,7 @@ def state_tracks(
 
 
 class _Columns:
-    """What was told look by look, as columns in the order of the message."""
+    """What was reported look by look, as columns in the order of the message."""
 
     def __init__(self, reported: Sequence[Reported], order: IntArray) -> None:
         self._parts = [part.store.columns for part in reported]

@@ -38,23 +38,23 @@ class LastingErrors:
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
         """Return those of the sensors, or None where all errors are new at every look."""
-        told = {
+        known = {
             (_QUANTITIES.index(quantity), j): one
             for j, name in enumerate(sensors)
             if isinstance(offer := offers.get(name), SensorOffer)
             for quantity, one in (offer.lasting or {}).items()
         }
-        if not told:
+        if not known:
             return None
-        most = max(len(one.parts) for one in told.values())
+        most = max(len(one.parts) for one in known.values())
         step = np.zeros((len(_QUANTITIES), len(sensors)))
         variance, across_m2 = np.zeros((2, most, *step.shape))
         lasts_s = np.full(variance.shape, np.inf)
-        for place, one in told.items():
-            step[place] = one.step
+        for cell, one in known.items():
+            step[cell] = one.step
             for k, part in enumerate(one.parts):
-                variance[k][place], across_m2[k][place] = part.variance, part.across_m2
-                lasts_s[k][place] = part.lasts_s
+                variance[k][cell], across_m2[k][cell] = part.variance, part.across_m2
+                lasts_s[k][cell] = part.lasts_s
         return cls(step, variance, lasts_s, across_m2)
 
     def common(

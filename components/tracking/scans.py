@@ -124,8 +124,9 @@ def kind_of(code: int) -> tuple[Kind, list[int]]:
 def scans_of(fused: FusedDetections) -> Scans:
     """Return the looks behind a message, and their detections, by arrival and then by instant.
 
-    A fusion that passes reports on tells every look, also those in vain. Of other fusions a look is
-    what was measured at one instant among the entries of a row, and a row without entries is none.
+    A fusion that passes reports on states every look, also those in vain. Of other fusions a look
+    is what was measured at one instant among the entries of a row, and a row without entries is
+    none.
     """
     row = np.repeat(np.arange(len(fused)), np.diff(fused.offsets))
     mask = np.asarray(fused.contributors, dtype=np.int64)
@@ -135,19 +136,19 @@ def scans_of(fused: FusedDetections) -> Scans:
         np.stack([pose[name] for name in POSE]) if pose else np.full((len(POSE), len(row)), np.nan)
     )
     looks = fused.looks
-    told = 0
+    looked = 0
     key = [row, tick, np.zeros_like(row)]
-    sensors, place = mask, own
+    sensors, poses = mask, own
     if looks is not None:
         look_row = np.repeat(np.arange(len(fused)), np.diff(looks.offsets))
-        told = len(look_row)
+        looked = len(look_row)
         key = [
             np.concatenate([look_row, row]),
             np.concatenate([fused.tick[look_row] - looks.age_ticks, tick]),
             np.concatenate([looks.sensor, fused.angle_source]),
         ]
         sensors = np.concatenate([np.int64(1) << looks.sensor, mask])
-        place = np.concatenate([looks.pose, own], axis=1)
+        poses = np.concatenate([looks.pose, own], axis=1)
     order = np.lexsort(key[::-1])
     fresh = np.ones(len(order), dtype=bool)
     same = [values[order][1:] == values[order][:-1] for values in key]
@@ -156,19 +157,19 @@ def scans_of(fused: FusedDetections) -> Scans:
     count = int(fresh.sum())
     begins = order[fresh]
     whole = np.zeros(count, dtype=bool)
-    whole[number[order < told]] = True
+    whole[number[order < looked]] = True
     if looks is None:
         whole[:] = True
     of_entry = np.empty(len(order), dtype=np.int64)
     of_entry[order] = number
-    of_entry = of_entry[told:]
+    of_entry = of_entry[looked:]
     union = np.zeros(count, dtype=np.int64)
     np.bitwise_or.at(union, number, sensors[order])
     # Stable: the sorted order keeps a look's detections in the order of the message.
     entries = np.argsort(of_entry, kind="stable")
     measured = np.stack([getattr(fused, name) for name in _MEASURED])
     variance = np.stack([getattr(fused, name) for name in _VARIANCES])
-    seen_from = selected(place, begins)
+    seen_from = selected(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
@@ -186,12 +187,12 @@ def scans_of(fused: FusedDetections) -> Scans:
 
 
 def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
-    """Return the ownship's velocity at each look, as the first of its entries tells it."""
+    """Return the ownship's velocity at each look, as the first of its entries has it."""
     velocity = np.full((3, count), np.nan)
     if fused.own_velocity is not None:
-        told = np.stack(list(fused.own_velocity.values()))
-        known = np.flatnonzero(~np.isnan(told).any(axis=0))[::-1]
-        velocity[:, look[known]] = told[:, known]
+        velocities = np.stack(list(fused.own_velocity.values()))
+        known = np.flatnonzero(~np.isnan(velocities).any(axis=0))[::-1]
+        velocity[:, look[known]] = velocities[:, known]
     return velocity
 
 

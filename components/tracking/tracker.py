@@ -55,8 +55,8 @@ class Tracker(Component):
     """Estimates where targets are and how they move, from measured values alone.
 
     Tracks bear numbers of their own. Every look of every sensor is processed at its own instant;
-    tracks are told at every instant at which something came. States are in a fixed frame: north,
-    east, down where the ownship believed to be at the first look (`StateTracks`).
+    tracks are reported at every instant at which something came. States are in a fixed frame:
+    north, east, down where the ownship believed to be at the first look (`StateTracks`).
     """
 
     mark = TRACKER
@@ -72,7 +72,7 @@ class Tracker(Component):
         return ExtendedKalmanFilter(ConstantVelocity(self.p.acceleration_intensity_m2_s3))
 
     def association(self) -> Association:
-        """Return what decides which detections are whose; a subclass may give another."""
+        """Return what assigns detections to tracks; a subclass may give another."""
         return ASSOCIATIONS[self.p.association]
 
     def setup(self) -> None:
@@ -155,7 +155,7 @@ class Tracker(Component):
         return TrackStore.empty([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what came, look by look, and tell all tracks."""
+        """Take in what came, look by look, and report all tracks."""
         fused = wake["fused"]
         if fused is None:
             return None
@@ -218,14 +218,14 @@ class Tracker(Component):
                     records.next_number[mine],
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]
-            tell = plan.tells[works]
-            if len(store) and tell.any():
+            reports = plan.reports[works]
+            if len(store) and reports.any():
                 reported.append(
                     Reported.of(
                         store,
-                        records.replica[plan.of[works[tell]]],
-                        plan.seen_from[works[tell]],
-                        plan.row[works[tell]],
+                        records.replica[plan.of[works[reports]]],
+                        plan.seen_from[works[reports]],
+                        plan.row[works[reports]],
                     )
                 )
         if wake.side_by_side:
