@@ -241,7 +241,7 @@ def with_estimates(folder: Path) -> str:
     return "estimates.toml"
 
 
-# Of traffic and loops that the small scene has not; tests/encounters and tests/wiring have them.
+# Of traffic and loops that the small scene has not; tests/encounters and tests/metrics have them.
 ELSEWHERE = {"encounter_weight", "mitigated", "risk_ratio"}
 
 

@@ -12,7 +12,7 @@ import dsa_des
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.warnings import warnings_of
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[3] / "configs"
 #: Where a block says that it is a radar; scenes that extend these have the same.
 FILES = [
     CONFIGS / "sensors" / "oasys_specification.toml",
