@@ -1,20 +1,22 @@
 """A tracker of Stone Soup's that a user builds in a file of his own (``tracking.stonesoup``)."""
 
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from components.estimation.frame import Place, place_in_frame
+from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearised
 from components.messages.detections import SensorOffer
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import COVARIANCE, StateTracks
+from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
-from components.tracking.lateness import LookCount, latest_s
+from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -26,8 +28,119 @@ from dsa_des.block.source_file import absolute
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
 
-if TYPE_CHECKING:
-    from components.stone_soup.followed import Followed
+
+@dataclass
+class Followed:
+    """A track as it is reported."""
+
+    number: int  # Its own, from 1, in the order of appearance
+    status: int = CONFIRMED
+    state: FloatArray | None = None  # (6,), position and velocity along north, east, down
+    covariance: FloatArray | None = None  # (6, 6)
+    state_s: float = 0.0
+    updated_s: float = 0.0
+    age_s: float = 0.0
+    contributors: int = 0  # Masks of sensors
+    updated_by: int = 0  # Masks of sensors
+    # Whether a range was measured; true of a tracker that does not say what it measured
+    ranged: bool = True
+    seen: int = 0  # How many of its states were looked at
+
+
+class Follower:
+    """Turns the tracks of a tracker into what is reported of them."""
+
+    def __init__(self, position: "tuple[int, ...]", velocity: "tuple[int, ...]") -> None:
+        east, north, up = range(3)
+        order = (north, east, up)
+        self._rows = [position[i] for i in order] + [velocity[i] for i in order]
+        self._signs = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
+        self._tracks: dict[str, Followed] = {}
+        self._next = 1
+
+    def after(
+        self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
+    ) -> list[Followed]:
+        """Return all tracks after a look, by number; those that are gone a last time."""
+        from components.stone_soup.objects import START
+
+        def seconds(instant: datetime) -> float:
+            return time_s if instant == when else (instant - START).total_seconds()
+
+        alive = {track.id: track for track in tracks}
+        gone = [self._tracks.pop(name) for name in list(self._tracks) if name not in alive]
+        for one in gone:
+            one.status = DELETED
+        fresh = [track for name, track in alive.items() if name not in self._tracks]
+        for track in sorted(fresh, key=self._place):
+            self._tracks[track.id] = Followed(self._next)
+            self._next += 1
+        for name, one in self._tracks.items():
+            self._follow(one, alive[name], seconds, mask_of)
+        return sorted([*gone, *self._tracks.values()], key=lambda one: one.number)
+
+    def _place(self, track: Any) -> tuple[float, ...]:
+        """Return what orders tracks that appear at the same time: where they are."""
+        state, _ = self._moments(track)
+        return tuple(state.tolist())
+
+    def _moments(self, track: Any) -> tuple[FloatArray, FloatArray]:
+        try:
+            mean = np.array(track.state.mean, dtype=float).reshape(-1)
+            spread = np.array(track.state.covar, dtype=float)
+        except AttributeError as error:
+            raise ValueError(
+                f"its states ({type(track.state).__name__}) have no mean and covariance: {error}"
+            ) from error
+        if max(self._rows) >= len(mean):
+            raise ValueError(
+                f"its states have {len(mean)} components, and position_mapping or "
+                f"velocity_mapping names component {max(self._rows)}: they count from 0"
+            )
+        state = mean[self._rows] * self._signs
+        covariance = spread[np.ix_(self._rows, self._rows)] * np.outer(self._signs, self._signs)
+        if not (np.isfinite(state).all() and np.isfinite(covariance).all()):
+            raise ValueError("a state or covariance of its is not finite")
+        return state, covariance
+
+    def _follow(
+        self,
+        one: Followed,
+        track: Any,
+        seconds: Callable[[datetime], float],
+        mask_of: Mapping[str, int],
+    ) -> None:
+        one.state, one.covariance = self._moments(track)
+        one.state_s = seconds(track.timestamp)
+        one.age_s = one.state_s - seconds(track.states[0].timestamp)
+        if one.seen > len(track.states):  # a tracker may shorten the past
+            one.seen = 0
+        last = track.states[-1]
+        for state in track.states[one.seen :]:
+            measured = _measurements(state)
+            if not measured:
+                continue
+            one.updated_s = seconds(state.timestamp)
+            one.updated_by = 0
+            # Only angles so far, unless one of these has a range.
+            one.ranged = one.ranged and one.contributors != 0
+            for detection in measured:
+                one.updated_by |= mask_of.get(detection.metadata.get("sensor", ""), 0)
+                one.ranged |= len(detection.state_vector) > 2
+            one.contributors |= one.updated_by
+        one.seen = len(track.states)
+        one.status = CONFIRMED if _measurements(last) else COASTED
+
+
+def _measurements(state: Any) -> list[Any]:
+    """Return the detections that a state was updated with."""
+    hypothesis = getattr(state, "hypothesis", None)
+    if hypothesis is None:
+        return []
+    single = getattr(hypothesis, "single_hypotheses", None)
+    hypotheses = [hypothesis] if single is None else single
+    return [one.measurement for one in hypotheses if one]
+
 
 _STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
 
@@ -71,7 +184,7 @@ class StoneSoupParameters(Parameters):
 
 
 class StoneSoupTracker(Component):
-    """Hands every look to a tracker of Stone Soup's, and tells its tracks.
+    """Hands every look to a tracker of Stone Soup's, and reports its tracks.
 
     The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
     Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
@@ -87,17 +200,9 @@ class StoneSoupTracker(Component):
     windowed = True
 
     def setup(self) -> None:
-        """Build the tracker.
-
-        Raises
-        ------
-        ImportError
-            The extra ``stonesoup`` is not installed.
-        ValueError
-            The builder cannot be imported, fails, or returns no tracker.
-        """
+        """Build the tracker."""
         needs_stone_soup("tracking.stonesoup")
-        from components.stone_soup.followed import Follower
+        from components.stone_soup.tracker import Follower
 
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
@@ -115,18 +220,18 @@ class StoneSoupTracker(Component):
 
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
-        found = []
+        said = []
         for name, offer in sorted(self._offers().items()):
-            told = offer.lasting if isinstance(offer, SensorOffer) else None
-            if told is None or told:
+            lasting = offer.lasting if isinstance(offer, SensorOffer) else None
+            if lasting is None or lasting:
                 what = (
                     "what lasts of its errors is not said"
-                    if told is None
-                    else (f"errors of its {', '.join(sorted(told))} last from look to look")
+                    if lasting is None
+                    else (f"errors of its {', '.join(sorted(lasting))} last from look to look")
                 )
-                found.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
+                said.append(f"{name}: {what}, and its variances stand for new ones: tracks are "
                              "too sure where errors are the same again")  # fmt: skip
-        return super().warnings() + found
+        return super().warnings() + said
 
     def _offers(self) -> dict[str, Any]:
         offers: dict[str, Any] = {}
@@ -158,7 +263,7 @@ class StoneSoupTracker(Component):
         return tracker
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Hand over what came, look by look, and tell all tracks."""
+        """Hand over what came, look by look, and report all tracks."""
         fused = wake["fused"]
         if fused is None:
             return None
@@ -169,19 +274,19 @@ class StoneSoupTracker(Component):
             self._origin = scans.pose[:3, 0].copy()
         lat, lon, alt = (np.full(len(scans), value) for value in self._origin)
         pose = scans.pose
-        places = place_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
+        poses = pose_in_frame((lat, lon, alt), (pose[0], pose[1], pose[2]),
                                 (pose[3], pose[4], pose[5]))  # fmt: skip
-        told: list[tuple[int, int, Followed]] = []
+        followed: list[tuple[int, int, Followed]] = []
         rows: list[int] = []
         for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):
             here: dict[int, Followed] = {}
             for look in looks:
-                here |= {one.number: one for one in self._looked(fused, scans, look, places, wake)}
+                here |= {one.number: one for one in self._looked(fused, scans, look, poses, wake)}
             rows.append(row)
-            told += [(row, looks[-1], replace(one)) for one in here.values()]
+            followed += [(row, looks[-1], replace(one)) for one in here.values()]
         if not rows:
             return None
-        return self._message(wake, fused.sensors, rows, told, places)
+        return self._message(wake, fused.sensors, rows, followed, poses)
 
     def _in_time(self, scans: Scans, sensors: tuple[str, ...]) -> list[int]:
         """Return the looks that come after no later one; the others are counted."""
@@ -192,7 +297,7 @@ class StoneSoupTracker(Component):
         return np.flatnonzero(in_time).tolist()
 
     def _looked(
-        self, fused: FusedDetections, scans: Scans, look: int, places: Place, wake: Wake
+        self, fused: FusedDetections, scans: Scans, look: int, poses: SensorPose, wake: Wake
     ) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
@@ -203,17 +308,17 @@ class StoneSoupTracker(Component):
         which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
         masks = [int(mask) for mask in scans.contributors[which]]
         names = ["+".join(n for i, n in enumerate(fused.sensors) if m >> i & 1) for m in masks]
-        poses = Poses(
-            places.take(np.array([look])), self.p.position_mapping, self.p.state_size
+        models = Poses(
+            poses.take(np.array([look])), self.p.position_mapping, self.p.state_size
         )  # fmt: skip
         found = detections(
-            poses, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
+            models, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
             [{"sensor": name} for name in names],
         )  # fmt: skip
         with self._repeatable.working():
             _, tracks = self._tracker.update_tracker(when, found)
             self._masks.update(zip(names, masks, strict=True))
-            return self._follower.told(tracks, time_s, when, self._masks)
+            return self._follower.after(tracks, time_s, when, self._masks)
 
     def _message(
         self,
@@ -221,29 +326,29 @@ class StoneSoupTracker(Component):
         sensors: tuple[str, ...],
         rows: list[int],
         entries: "list[tuple[int, int, Followed]]",
-        places: Place,
+        poses: SensorPose,
     ) -> StateTracks:
-        """Return tracks as a message: of each its row, the last look and how it is told."""
-        told = [one for _, _, one in entries]
-        count = len(told)
+        """Return tracks as a message: of each its row, the last look and its report."""
+        tracks = [one for _, _, one in entries]
+        count = len(tracks)
         look = np.array([last for _, last, _ in entries], dtype=np.int64)
         of_row = np.searchsorted(rows, np.array([row for row, _, _ in entries], dtype=np.int64))
-        state = np.array([one.state for one in told], dtype=float).reshape(count, 6).T
-        spread = np.array([one.covariance for one in told], dtype=float).reshape(count, 6, 6)
+        state = np.array([one.state for one in tracks], dtype=float).reshape(count, 6).T
+        spread = np.array([one.covariance for one in tracks], dtype=float).reshape(count, 6, 6)
         spread = np.moveaxis(spread, 0, -1)
-        at = Place(
-            places.position_m[:, look],
+        at = SensorPose(
+            poses.position_m[:, look],
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
         seen, by_state = linearised(Kind(False), state, at)
         angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
-        ranged = np.array([one.ranged for one in told], dtype=bool)
+        ranged = np.array([one.ranged for one in tracks], dtype=bool)
 
         def known(values: FloatArray) -> FloatArray:
             return np.where(ranged, values, np.nan)
 
         def column(name: str, kind: type = float) -> Any:
-            return np.array([getattr(one, name) for one in told], dtype=kind)
+            return np.array([getattr(one, name) for one in tracks], dtype=kind)
 
         moments: dict[str, Any] = {name: known(state[i]) for i, name in enumerate(_STATE)}
         assert self._origin is not None

@@ -1,17 +1,17 @@
-"""Which tracks of different trackers are of one target: by what they say of it, never by truth.
+"""Track-to-track association: which tracks of different trackers are of one target.
 
-A fused track has a leader: the first of its members that has a range, or else the first. A track
-belongs to it if it lies in the gate around the leader, and a fused track has at most one member of
-every tracker. Distances take the errors of two trackers as independent: they share the motion's
-noise, which makes the true differences smaller, so that the gate errs on the wide side.
+They are associated by their estimates, never by truth. A fused track has a leader: the first of its
+members that has a range, or else the first. A track belongs to it if it lies in the gate around the
+leader, and a fused track has at most one member of every tracker. Distances take the errors of two
+trackers as independent: they share the motion's noise, which makes the true differences smaller, so
+that the gate errs on the wide side.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.association.assignment import global_nearest
-from components.association.gates import gate_threshold
+from components.association.assignment import gate_threshold, global_nearest
 from components.estimation.batched import product, product_transposed
 from components.estimation.covariance_intersection import distance_squared
 from components.estimation.measurement import Kind, linearised, residual
@@ -24,42 +24,25 @@ _DIRECTION = Kind(has_range=False)
 
 @dataclass(frozen=True)
 class MatchRules:
-    """When tracks are of one target.
+    """When tracks are of one target."""
 
-    Parameters
-    ----------
-    gate_probability : float
-        That two tracks of one target lie in each other's gate.
-    motion : ConstantVelocity
-        How targets move from the instant of one track to that of another.
-    bearing_rate_rad_s : float
-        Standard deviation of the rate at which a line of sight turns that has no range.
-    stay_factor : float
-        How many times as far as the gate a member may drift from its leader before it leaves.
-    """
-
-    gate_probability: float
-    motion: ConstantVelocity
+    gate_probability: float  # That two tracks of one target lie in each other's gate
+    motion: ConstantVelocity  # How targets move from the instant of one track to that of another
+    # Standard deviation of the rate at which a line of sight turns that has no range
     bearing_rate_rad_s: float
+    # How many times as far as the gate a member may drift from its leader before it leaves
     stay_factor: float
 
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """What a direction says of states at another instant.
+    """What a direction says of states at another instant."""
 
-    Parameters
-    ----------
-    residual : (2, n)
-        Azimuth and elevation as told, less those of the state carried back to their instant.
-    jacobian : (2, 6, n)
-        Of the direction by the state.
-    variance : (2, n)
-    """
-
+    # (2, n), azimuth and elevation as reported, less those of the state carried back to their
+    # instant
     residual: FloatArray
-    jacobian: FloatArray
-    variance: FloatArray
+    jacobian: FloatArray  # (2, 6, n), of the direction by the state
+    variance: FloatArray  # (2, n)
 
 
 def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
@@ -68,9 +51,9 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     then = state.copy()
     then[:3] += back_s * state[3:]
     seen, by_place = linearised(_DIRECTION, then, tracks.place())
-    told = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
+    measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
     return Bearing(
-        residual(told, seen),
+        residual(measured, seen),
         np.concatenate([by_place, back_s * by_place], axis=1),
         np.stack([tracks.azimuth_variance_rad2, tracks.elevation_variance_rad2]),
     )
@@ -79,16 +62,7 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
 def gate_share(
     rules: MatchRules, leader: LocalTracks, other: LocalTracks, time_s: FloatArray
 ) -> FloatArray:
-    """Return the squared distances of pairs over those of their gates.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    leader, other : LocalTracks
-        Of each pair.
-    time_s : (pairs,)
-        The instant at which they are compared.
-    """
+    """Return the squared distances of pairs over those of their gates."""
     share = np.empty(len(leader))
     both, one = leader.ranged & other.ranged, leader.ranged ^ other.ranged
     none = ~(leader.ranged | other.ranged)
@@ -104,11 +78,11 @@ def gate_share(
         theirs = LocalTracks.joined([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
         x, p = mine.at(when, rules.motion)
-        told = bearing(theirs, x, when)
-        spread = product_transposed(product(told.jacobian, p), told.jacobian)
+        angles = bearing(theirs, x, when)
+        spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
-            spread[i, i] += told.variance[i]
-        found = distance_squared(told.residual, spread) / two
+            spread[i, i] += angles.variance[i]
+        found = distance_squared(angles.residual, spread) / two
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = found
     if none.any():
@@ -131,20 +105,7 @@ def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -
 
 
 def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return the leader of every fused track, and of every track the place of its leader.
-
-    Parameters
-    ----------
-    tracks : LocalTracks
-        All belong to a fused track.
-
-    Returns
-    -------
-    leader : (fused tracks,)
-        Index into `tracks`, by replica and number of the fused track.
-    of : (n,)
-        Index into `leader`.
-    """
+    """Return the leader of every fused track, and of every track the place of its leader."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -155,15 +116,7 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
 
 
 def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
-    """Return tracks, of which those no longer belong that are too far from their leader.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    tracks : LocalTracks
-    time_s : (n,)
-        The instant at which they are compared.
-    """
+    """Return tracks, of which those no longer belong that are too far from their leader."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return tracks
@@ -193,17 +146,7 @@ def matched(
     Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
     tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
     alone goes to older ones only. What is left starts fused tracks of its own.
-
-    Parameters
-    ----------
-    rules : MatchRules
-    tracks : LocalTracks
-    time_s : (n,)
-    trackers : int
-    next_number : (replicas,)
-    replica : (replicas,)
-        Ascending.
-    """  # fmt: skip
+    """
     system = tracks.system.copy()
     next_number = next_number.copy()
     for tracker in range(trackers):
@@ -251,16 +194,18 @@ def _join(
     lead = member[leader[~taken]]
     begin = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="left")
     many = np.searchsorted(tracks.replica[lead], tracks.replica[free], side="right") - begin
-    who = np.repeat(np.arange(len(free)), many)
+    candidate = np.repeat(np.arange(len(free)), many)
     start = np.cumsum(many) - many
-    which = np.arange(len(who)) - np.repeat(start - begin, many)
-    home = tracks.system[free[who]]
+    which = np.arange(len(candidate)) - np.repeat(start - begin, many)
+    home = tracks.system[free[candidate]]
     older = (home == 0) | (tracks.system[lead[which]] < home)
-    who, which = who[older], which[older]
-    if len(who) == 0:
+    candidate, which = candidate[older], which[older]
+    if len(candidate) == 0:
         return
-    share = gate_share(rules, tracks.take(lead[which]), tracks.take(free[who]), time_s[free[who]])
+    share = gate_share(
+        rules, tracks.take(lead[which]), tracks.take(free[candidate]), time_s[free[candidate]]
+    )
     inside = share <= 1.0
-    who, which, share = who[inside], which[inside], share[inside]
-    won = global_nearest(which, who, share, 1.0)
-    system[free[who[won]]] = tracks.system[lead[which[won]]]
+    candidate, which, share = candidate[inside], which[inside], share[inside]
+    won = global_nearest(which, candidate, share, 1.0)
+    system[free[candidate[won]]] = tracks.system[lead[which[won]]]

@@ -2,20 +2,19 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from components.association.gates import gate_threshold
-from components.estimation.batched import is_everything, selected
-from components.estimation.frame import Place
+from components.association.assignment import gate_threshold
+from components.estimation.batched import selected
+from components.estimation.estimator import PairMeasurement, log_mixture, pair_measurement
+from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected
 from components.geometry.wrapping import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
-from components.tracking.filter_bank import PairMeasurement, log_mixture
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import Scans, kind_of
+from components.tracking.scans import LookBatch, Scans, kind_of
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -34,70 +33,49 @@ class GatedPairs:
     kind: Kind
     track: IntArray
     detection: IntArray
-    said: PairMeasurement
+    measured: PairMeasurement
     #: What else was measured, of tracks without a range: ranges and their variances.
     ranges: tuple[FloatArray, FloatArray] | None = None
 
+    @property
+    def measures_range(self) -> bool:
+        """Whether the detections have a range."""
+        return self.kind.has_range or self.ranges is not None
+
 
 def gated_pairs(
-    rules: TrackerRules,
-    part: TrackStore,
-    of: IntArray,
-    place: Place,
-    scans: Scans,
-    codes: IntArray,
-    detection: IntArray,
-    of_detection: IntArray,
-    looks: int,
+    rules: TrackerRules, part: TrackStore, of: IntArray, pose: SensorPose, batch: LookBatch
 ) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
-    """Return the pairs of one look in whose gate they are, kind by kind.
+    """Return the pairs of predicted tracks and of detections in their gates, kind by kind.
 
-    Parameters
-    ----------
-    rules : TrackerRules
-    part : TrackStore
-        Predicted.
-    of : (tracks,)
-        The look of each, ascending.
-    place : Place
-        Of every track's look.
-    scans : Scans
-    codes : (detections,)
-    detection, of_detection : (detections,)
-        Their numbers in `scans`, and the look of each.
-    looks : int
-
-    Returns
-    -------
-    pairs : list of GatedPairs
-    direction : (2, tracks) or None
-        Azimuth and elevation in body axes that the first model expects, where they were needed.
-    held : (detections,) of bool
-        Which lie in the gate of a track, or in the wider one of a track that is confirmed.
+    `of` is the look of each track, ascending, and `pose` that look's. Also returned are the
+    direction that the first model expects of every track, (2, tracks) in body axes, where it was
+    needed and is that of the state; and which detections are held: in the gate of a track, or in
+    the wider one of a track that is confirmed.
     """
-    found: list[GatedPairs] = []
-    held = np.zeros(len(detection), dtype=bool)
+    kinds: list[GatedPairs] = []
+    scans = batch.scans
+    held = np.zeros(len(batch.detection), dtype=bool)
     direction = None
-    blind = bool((~part.ranged).any())
-    whole = _WholeVariance(rules, part, place, scans)
-    for code in np.flatnonzero(np.bincount(codes, minlength=4)).tolist():
-        mine = np.flatnonzero(codes == code)
-        # What a track without a range expects of one says nothing: there the direction decides.
-        for of_whom in (True, False) if blind and code & 1 else (None,):
-            kind, rows = kind_of(0 if of_whom is False else code)
-            moments = rules.bank.moments(kind, part.states(), part.covariances(), place)
-            direction = moments[0].expected[:2]
-            track, entry = _near(
-                rules, kind, moments, of, of_detection, mine, scans, detection, rows, looks, whole
-            )
-            if of_whom is not None:
-                chosen = part.ranged[track] == of_whom
+    some_angle_only = bool((~part.ranged).any())
+    spread = _PairVariance(rules, part, pose, scans)
+    for code in np.flatnonzero(np.bincount(batch.code, minlength=4)).tolist():
+        mine = np.flatnonzero(batch.code == code)
+        # What an angle-only track expects of a range says nothing: there the direction decides.
+        for ranged in (True, False) if some_angle_only and code & 1 else (None,):
+            kind, rows = kind_of(0 if ranged is False else code)
+            moments = rules.estimator.expect(kind, part.estimates(), pose)
+            # Moments of sigma points are means over them: not where the state itself is seen.
+            direction = moments[0].expected[:2] if moments[0].left_over is None else None
+            track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread)
+            if ranged is not None:
+                chosen = part.ranged[track] == ranged
                 track, entry = track[chosen], entry[chosen]
             if len(track) == 0:
                 continue
-            cells = detection[entry]
-            variance = whole(track, cells, rows)
-            said = rules.bank.measure(
+            cells = batch.detection[entry]
+            variance = spread(track, cells, rows)
+            pairs = pair_measurement(
                 moments,
                 track,
                 _picked(scans.measured, rows, cells),
@@ -107,47 +85,43 @@ def gated_pairs(
                 ),
                 part.weights,
             )
-            gated = said.distance <= gate_threshold(rules.gate_probability, kind.size)
+            gated = pairs.distance <= gate_threshold(rules.p.gate_probability, kind.size)
             held[entry[gated]] = True
             if not gated.all():
                 settled = (part.status == CONFIRMED) | (part.status == COASTED)
-                near = said.distance <= gate_threshold(rules.widest_gate, kind.size)
+                near = pairs.distance <= gate_threshold(rules.widest_gate, kind.size)
                 held[entry[near & settled[track]]] = True
             (inside,) = gated.nonzero()
             cells = cells[inside]
-            found.append(
+            ranges = (scans.measured[2][cells], scans.variance[2][cells])
+            kinds.append(
                 GatedPairs(
-                    kind, track[inside], entry[inside], taken_pairs(said, inside),
-                    (scans.measured[2][cells], scans.variance[2][cells])
-                    if of_whom is False else None,
+                    kind, track[inside], entry[inside], pairs.take(inside),
+                    ranges if ranged is False else None,
                 )
             )  # fmt: skip
-    # Moments of sigma points are means over the points: not where the state itself is seen.
-    return found, direction if rules.bank.sigma is None else None, held
+    return kinds, direction, held
 
 
 def _near(
     rules: TrackerRules,
     kind: Kind,
+    rows: list[int],
     moments: list[Moments],
     of: IntArray,
-    of_detection: IntArray,
+    batch: LookBatch,
     mine: IntArray,
-    scans: Scans,
-    detection: IntArray,
-    rows: list[int],
-    looks: int,
-    whole: "_WholeVariance",
+    spread: "_PairVariance",
 ) -> tuple[IntArray, IntArray]:
     """Return pairs of one look whose angles and range lie in a box about the gate."""
-    counts = np.bincount(of, minlength=looks)
+    counts = np.bincount(of, minlength=len(batch.look))
     first = np.cumsum(counts) - counts
-    many = counts[of_detection[mine]]
+    many = counts[batch.of[mine]]
     threshold = gate_threshold(rules.widest_gate, kind.size)
-    cells = detection[mine]
-    measured = _picked(scans.measured, rows[:3], cells)
-    variance = _picked(scans.variance, rows[:3], cells)
-    boxes = [_box(found, variance, threshold, whole.most) for found in moments]
+    cells = batch.detection[mine]
+    measured = _picked(batch.scans.measured, rows[:3], cells)
+    variance = _picked(batch.scans.variance, rows[:3], cells)
+    boxes = [_box(one, variance, threshold, spread.most) for one in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
     part = np.cumsum(many) // _MOST_PAIRS
@@ -155,9 +129,7 @@ def _near(
         size = many[begin:end]
         entry = np.repeat(np.arange(begin, end), size)
         start = np.cumsum(size) - size
-        track = np.arange(len(entry)) - np.repeat(
-            start - first[of_detection[mine[begin:end]]], size
-        )
+        track = np.arange(len(entry)) - np.repeat(start - first[batch.of[mine[begin:end]]], size)
         kept = [_inside(*box, measured, entry, track) for box in boxes]
         near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
         tracks.append(track[near])
@@ -167,27 +139,29 @@ def _near(
     return np.concatenate(tracks), np.concatenate(entries)
 
 
-class _WholeVariance:
+class _PairVariance:
     """Variances of pairs: as reported, and of the ownship's place as far as the track is."""
 
-    def __init__(self, rules: TrackerRules, part: TrackStore, place: Place, scans: Scans) -> None:
+    def __init__(
+        self, rules: TrackerRules, part: TrackStore, pose: SensorPose, scans: Scans
+    ) -> None:
         self._scans, self._untold = scans, rules.untold_across_m2
         #: What is added at most to each track's azimuth and elevation.
         self.most: FloatArray | None = None
         if self._untold is not None:
-            _, elevation, range_m = expected(Kind(True), part.state0, place)
+            _, elevation, range_m = expected(Kind(True), part.state0, pose)
             range2 = np.maximum(range_m, 1.0) ** 2
             level2 = np.maximum(np.cos(elevation), _LEAST_COS) ** 2
             self._by_m2 = np.stack([1.0 / (range2 * level2), 1.0 / range2])
             self.most = self._untold.max() * self._by_m2
 
     def __call__(self, track: IntArray, cells: IntArray, rows: list[int]) -> FloatArray:
-        found = _picked(self._scans.variance, rows, cells)
+        variance = _picked(self._scans.variance, rows, cells)
         if self._untold is not None:
             source = self._scans.source[:2][:, cells]
             across_m2 = np.where(source < 0, 0.0, self._untold[source])
-            found[:2] += across_m2 * selected(self._by_m2, track)
-        return found
+            variance[:2] += across_m2 * selected(self._by_m2, track)
+        return variance
 
 
 def _box(
@@ -244,19 +218,6 @@ def _parts(part: IntArray) -> list[tuple[int, int]]:
     return list(pairwise(cuts))
 
 
-def taken_pairs(said: PairMeasurement, which: IntArray) -> PairMeasurement:
-    if len(which) == len(said.distance):
-        return said
-    return PairMeasurement(
-        [found.take(which) for found in said.innovations],
-        [selected(apart, which) for apart in said.residuals],
-        said.distance[which],
-        selected(said.log_likelihoods, which),
-        said.learning and [found.take(which) for found in said.learning],
-        None if said.log_odds is None else selected(said.log_odds, which),
-    )
-
-
 def common_errors(
     rules: TrackerRules,
     part: TrackStore,
@@ -279,9 +240,9 @@ def common_errors(
     apart_s = np.abs(part.tick[track] - when) / rules.ticks_per_s
     since_s = np.where((when < 0) | (source < 0), np.inf, apart_s)
     moved = np.zeros(source.shape)
-    for place, row in enumerate(rows):
+    for i, row in enumerate(rows):
         if row < 3:
-            moved[place] = selected(foreseen[place], track) - part.seen[row, there[place], track]
+            moved[i] = selected(foreseen[i], track) - part.seen[row, there[i], track]
     moved[0] = wrap_pi_unchecked(np.ascontiguousarray(moved[0]))
     moved = np.where(np.isfinite(since_s), np.abs(moved), 0.0)
     range_m = np.where(np.isfinite(since_s), part.seen[2, there, track], np.inf)
@@ -302,23 +263,5 @@ def log_gain(
 ) -> FloatArray:
     """Return ln(Pd N(z) / λ) of every pair."""
     density = log_density(rules, one, sensors)
-    mixed = log_mixture(selected(part.weights, one.track), one.said.log_likelihoods)
-    return np.asarray(np.log(rules.detection_probability) + mixed - density)
-
-
-def named(states: list[FloatArray], covariances: list[FloatArray]) -> dict[str, FloatArray]:
-    """Return states and covariances as columns of a store."""
-    columns = {f"state{i}": x for i, x in enumerate(states)}
-    return columns | {f"covariance{i}": p for i, p in enumerate(covariances)}
-
-
-def put(part: TrackStore, which: IntArray, new: dict[str, Any]) -> TrackStore:
-    """Return tracks with other values in some columns of some of them."""
-    if is_everything(which, len(part)):
-        return part.with_columns(**new)
-    changed = {}
-    for name, values in new.items():
-        whole = part.columns[name].copy()
-        whole[..., which] = values
-        changed[name] = whole
-    return part.with_columns(**changed)
+    mixed = log_mixture(selected(part.weights, one.track), one.measured.log_likelihoods)
+    return np.asarray(np.log(rules.p.detection_probability) + mixed - density)

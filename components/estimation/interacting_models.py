@@ -12,32 +12,64 @@ that is not true is sure that there is no turn, and would learn of one late.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from components.estimation.batched import symmetric
+from components.estimation.estimator import LEAST, Estimates, Estimator, sum_of
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import Moments
+from components.estimation.measurement import Kind
+from components.estimation.motion import Motion
 from dsa_des.arrays.types import FloatArray
 
 # Terms of the exponential's series, exact to a double for |rate · time| of at most 1/8.
 _TERMS = 12
-#: No mode is less likely than this before a look: its chance to come back is not lost to underflow.
-LEAST = 1e-250
+
+
+@dataclass(frozen=True)
+class InteractingMultipleModels(Estimator):
+    """Several filters of one model each that share what they know by the models' odds."""
+
+    filters: tuple[Estimator, ...]
+    #: From the row's model to the column's, 1/s; the diagonal is not read.
+    rates_per_s: FloatArray = field(compare=False)
+    # Variance of what each has besides position and velocity, in a target that enters it; empty
+    # where that is what the model's own filter thinks.
+    fresh: tuple[float, ...] = ()
+
+    @property
+    def models(self) -> tuple[Motion, ...]:
+        """The model of each filter."""
+        return tuple(one.models[0] for one in self.filters)
+
+    def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
+        """Return tracks after times (n,): the models are mixed, then each goes on."""
+        steps = transition_probabilities(self.rates_per_s, dt_s)
+        states, covariances, weights = mixed(*tracks, steps, self.fresh)
+        moved = [
+            one.predict(Estimates([x], [p], weights), dt_s)
+            for one, x, p in zip(self.filters, states, covariances, strict=True)
+        ]
+        return Estimates([e.states[0] for e in moved], [e.covariances[0] for e in moved], weights)
+
+    def expect(self, kind: Kind, tracks: Estimates, pose: SensorPose) -> list[Moments]:
+        """Return what every model expects to be measured."""
+        return [
+            one.expect(kind, Estimates([x], [p], tracks.weights), pose)[0]
+            for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
+        ]
+
+    def models_then(
+        self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
+    ) -> FloatArray:
+        """Return how likely each model was at a past instant, for each of now, (then, now, n)."""
+        return before(self.rates_per_s, weights, until_s, since_s)
 
 
 def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
-    """Return the probabilities to go from one model to another within a time.
-
-    Parameters
-    ----------
-    rates_per_s : (modes, modes)
-        Rates from the row's model to the column's; the diagonal is not read.
-    dt_s : (n,)
-
-    Returns
-    -------
-    ndarray of shape (modes, modes, n)
-        The exponential of the generator; rows sum to 1.
-    """
+    """Return the probabilities to go from one model to another within a time."""
     generator = np.array(rates_per_s, dtype=float)
     np.fill_diagonal(generator, 0.0)
     np.fill_diagonal(generator, -generator.sum(axis=1))
@@ -69,27 +101,10 @@ def mixed(
     transitions: FloatArray,
     fresh: Sequence[float] = (),
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    """Return what each model starts from, and the models' probabilities before the look.
-
-    Parameters
-    ----------
-    states : sequence of (d_i, n)
-        Position and velocity first; components after the sixth are shared by models of the same
-        size only.
-    covariances : sequence of (d_i, d_i, n)
-    probabilities : (modes, n)
-    transitions : (modes, modes, n)
-    fresh : (modes,) of float, optional
-        Variance of what a model has besides position and velocity, in a target that enters it; by
-        default that is the model's own.
-
-    Returns
-    -------
-    states, covariances, probabilities
-    """
+    """Return what each model starts from, and the models' probabilities before the look."""
     many = len(states)
     predicted = np.stack(
-        [_sum([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+        [sum_of([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
     )
     predicted = np.maximum(predicted, LEAST)
     new_states, new_covariances = [], []
@@ -97,7 +112,7 @@ def mixed(
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
         sizes = [_shared(states[i], states[j]) for i in range(many)]
         given = [_filled(states[i], states[j], sizes[i], bool(fresh)) for i in range(many)]
-        state = _sum([w * x for w, x in zip(weights, given, strict=True)])
+        state = sum_of([w * x for w, x in zip(weights, given, strict=True)])
         covariance = np.zeros_like(covariances[j])
         for i in range(many):
             apart = given[i] - state
@@ -113,57 +128,14 @@ def mixed(
 def before(
     rates_per_s: FloatArray, probabilities: FloatArray, until_s: FloatArray, since_s: FloatArray
 ) -> FloatArray:
-    """Return how likely each model was at an instant that is past, for each model of now.
-
-    Parameters
-    ----------
-    rates_per_s : (modes, modes)
-    probabilities : (modes, n)
-        Before that instant.
-    until_s, since_s : (n,)
-        Times from then to the instant, and from the instant to now.
-
-    Returns
-    -------
-    ndarray of shape (modes then, modes now, n)
-        Over the models of then it sums to 1.
-    """
+    """Return how likely each model was at an instant that is past, for each model of now."""
     many = len(probabilities)
     steps = transition_probabilities(rates_per_s, until_s)
     then = np.stack(
-        [_sum([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+        [sum_of([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
     )
     joint = np.maximum(then, LEAST)[:, np.newaxis] * transition_probabilities(rates_per_s, since_s)
-    return np.asarray(joint / np.maximum(_sum(list(joint)), LEAST))
-
-
-def combined(
-    states: Sequence[FloatArray], covariances: Sequence[FloatArray], probabilities: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and covariance of position and velocity over the models.
-
-    Returns
-    -------
-    state : (6, n)
-    covariance : (6, 6, n)
-    """
-    many = len(states)
-    state = _sum([probabilities[i] * states[i][:6] for i in range(many)])
-    covariance = np.zeros((6, 6, state.shape[1]))
-    for i in range(many):
-        apart = states[i][:6] - state
-        covariance += probabilities[i] * (
-            covariances[i][:6, :6] + apart[:, np.newaxis] * apart[np.newaxis]
-        )
-    return state, symmetric(covariance)
-
-
-def reweighted(probabilities: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
-    """Return the models' probabilities after a look, (modes, n), from those before it."""
-    with np.errstate(divide="ignore"):
-        logs = np.log(probabilities) + log_likelihoods
-    weights = np.exp(logs - logs.max(axis=0))
-    return weights / _sum(list(weights))
+    return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
 
 
 def _shared(one: FloatArray, other: FloatArray) -> int:
@@ -196,17 +168,10 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
         [
             np.stack(
                 [
-                    _sum([left[i, k] * right[k, j] for k in range(len(left))])
+                    sum_of([left[i, k] * right[k, j] for k in range(len(left))])
                     for j in range(len(left))
                 ]
             )
             for i in range(len(left))
         ]
     )
-
-
-def _sum(parts: list[FloatArray]) -> FloatArray:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total

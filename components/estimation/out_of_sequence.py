@@ -28,19 +28,12 @@ from dsa_des.arrays.types import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class StateThen:
-    """The state at an instant that is past, given all that is known now.
+class Retrodiction:
+    """The state at an instant that is past, given all that is known now."""
 
-    Parameters
-    ----------
-    state : (d, n)
-    covariance : (d, d, n)
-    gain : (d, d, n)
-        How much of a correction of the state then is one of the state now.
-    """
-
-    state: FloatArray
-    covariance: FloatArray
+    state: FloatArray  # (d, n)
+    covariance: FloatArray  # (d, d, n)
+    # (d, d, n), how much of a correction of the state then is one of the state now
     gain: FloatArray
 
     def carried_over(
@@ -50,15 +43,7 @@ class StateThen:
         corrected: FloatArray,
         corrected_covariance: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the state now after the state then was corrected.
-
-        Parameters
-        ----------
-        state, covariance
-            Now, before.
-        corrected, corrected_covariance
-            Then.
-        """
+        """Return the state now after the state then was corrected."""
         less = product_transposed(
             product(self.gain, corrected_covariance - self.covariance), self.gain
         )
@@ -66,24 +51,14 @@ class StateThen:
         return moved, symmetric(covariance + less)
 
 
-def state_then(
+def retrodiction(
     model: Motion,
     before: tuple[FloatArray, FloatArray],
     now: tuple[FloatArray, FloatArray],
     until_then_s: FloatArray,
     since_then_s: FloatArray,
-) -> StateThen:
-    """Return the state at an instant between one before and now.
-
-    Parameters
-    ----------
-    model : Motion
-        One of several models takes the state for its own all the time.
-    before, now : (state (d, n), covariance (d, d, n))
-        The state that was known before the instant, at its own time; and the state now.
-    until_then_s, since_then_s : (n,)
-        Times from the state before to the instant, and from there to now.
-    """
+) -> Retrodiction:
+    """Return the state at an instant between one before and now."""
     then, spread = predict(model, *before, until_then_s)
     step, noise = model.jacobian(then, since_then_s), model.noise(since_then_s)
     ahead, spread_ahead = predict(model, then, spread, since_then_s)
@@ -95,23 +70,19 @@ def state_then(
     total += product_transposed(product(back, noise + now[1]), back)
     covariance = symmetric(total)
     across = product_transposed(back, now[1])  # of the state then with the state now
-    return StateThen(then + times(back, now[0] - ahead), covariance, _divided(across, covariance))
+    return Retrodiction(
+        then + times(back, now[0] - ahead), covariance, _divided(across, covariance)
+    )
 
 
-def state_back(model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray) -> StateThen:
-    """Return the state at an instant before anything was known of it, by what it is now.
-
-    Parameters
-    ----------
-    model : Motion
-    now : (state (d, n), covariance (d, d, n))
-    since_s : (n,)
-        Time from the instant to now.
-    """
+def retrodiction_by_motion(
+    model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray
+) -> Retrodiction:
+    """Return the state at an instant before anything was known of it, by what it is now."""
     state, spread = now
     step = model.jacobian(state, -since_s)
     covariance = symmetric(product_transposed(product(step, spread + model.noise(since_s)), step))
-    return StateThen(
+    return Retrodiction(
         model.move(state, -since_s), covariance, _divided(product(step, spread), covariance)
     )
 
