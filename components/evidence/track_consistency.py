@@ -24,7 +24,7 @@ from components.geometry.enu import enu_to_geodetic
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.true_states import RecordedTruth
 from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary
-from components.radar.range_boundary import RangeBoundary as RadarBoundary
+from components.radar.radar import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.recording import MemorySink, Recorder

@@ -9,7 +9,7 @@ import pytest
 import dsa_des
 from components.evidence.scan_rate import page
 from components.evidence.scan_rate.expected import certain_range_m, mean_range_m
-from components.radar.cumulative_detection import first_declared
+from components.radar.detection import first_declared
 
 
 @pytest.mark.parametrize(("m", "n"), [(1, 1), (1, 3), (2, 2), (3, 5), (2, 4)])

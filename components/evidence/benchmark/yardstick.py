@@ -24,7 +24,7 @@ from components.evidence.benchmark.scalar_motion import (
     silhouette,
     straight_flight,
 )
-from components.radar.threshold import detection_threshold
+from components.radar.detection.threshold import detection_threshold
 from dsa_des.running.simulation import Simulation
 
 #: Latitude, longitude, altitude and yaw, and pitch and roll.

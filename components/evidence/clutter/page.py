@@ -10,10 +10,10 @@ import numpy as np
 from components.evidence.clutter.ranges import RADAR, detections, half_range_m
 from components.evidence.thesis.plotting import BLUE, GREY, PINK, legend_below, panels
 from components.evidence.thesis.plotting import RADAR as RADAR_COLOUR
-from components.radar.cfar import cfar_loss_db
-from components.radar.moving_target_filter import MovingTargetFilter
-from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
-from components.radar.volume_clutter import rain_reflectivity_per_m, rain_volume_m3
+from components.radar.detection.cfar import cfar_loss_db
+from components.radar.doppler import MovingTargetFilter
+from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.rain import rain_reflectivity_per_m, rain_volume_m3
 
 FIGURE = "clutter.png"
 _GAMMAS_DB = (-60, -55, -50, -45, -40, -35, -30, -25, -20, -15, -10)

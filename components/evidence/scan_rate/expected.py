@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.arguments.checks import FloatArray
-from components.radar.cumulative_detection import first_declared
-from components.radar.detection import detection_probability
+from components.radar.detection import detection_probability, first_declared
 
 # Phases of the scan clock against the encounter; more change no digit that is shown.
 _PHASES = 32

@@ -14,8 +14,8 @@ from components.evidence.thesis.printed import printed
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.radar_range import CLASSES, LARGE_DIFFERS, ROUNDED, pd_at, rounding
 from components.evidence.thesis.row import Row
+from components.radar.detection import required_snr
 from components.radar.link_budget import LinkBudget, with_bandwidth
-from components.radar.required_snr import required_snr
 
 
 def make() -> Made:

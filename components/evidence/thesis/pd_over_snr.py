@@ -9,9 +9,8 @@ from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.evidence.thesis.project_files import radar
 from components.evidence.thesis.row import Row
-from components.radar.detection import detection_probability
-from components.radar.detection_table import detection_table
-from components.radar.required_snr import required_snr
+from components.radar.detection import detection_probability, required_snr
+from components.radar.detection.approximations import detection_table
 
 MODELS = {"Swerling I": "swerling1", "Swerling V": "swerling5"}
 

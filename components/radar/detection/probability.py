@@ -1,8 +1,10 @@
-"""The probability that the radar detects, or misses, an echo of a given SNR."""
+"""The probability that a radar detects or misses an echo, and the SNR that it needs."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,20 +12,24 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     FloatArray,
+    as_numbers,
     broadcast_flat,
     checked_model,
     checked_probability,
     checked_pulses,
     checked_snr,
     one_of,
+    refuse,
     unflatten,
 )
-from components.radar.detection_albersheim import albersheim_probability
-from components.radar.detection_exact import exact_probability
-from components.radar.detection_gram_charlier import gram_charlier_probability
-from components.radar.detection_shnidman import shnidman_probability
-from components.radar.detection_table import table_probability
-from components.radar.threshold import detection_threshold
+from components.radar.detection.approximations import (
+    albersheim_probability,
+    gram_charlier_probability,
+    shnidman_probability,
+    table_probability,
+)
+from components.radar.detection.exact import exact_probability
+from components.radar.detection.threshold import detection_threshold
 
 __all__ = ["METHODS", "detection_probability", "detection_threshold", "miss_probability"]
 
@@ -169,3 +175,129 @@ def _group(
     member = member.reshape(-1)
     groups = [(member == i, pairs[0, i], pairs[1, i]) for i in range(pairs.shape[1])]
     return shape, flat, groups
+
+
+# Every round evaluates this many points at once and keeps the interval between two of them.
+_POINTS = 33
+
+
+def required_snr(
+    pd: float, *, pulses: int = 1, false_alarm_probability: float, model: str = "swerling1"
+) -> float:
+    """Return the mean SNR per pulse at which the exact Pd is `pd`.
+
+    Parameters
+    ----------
+    pd : float
+        Wanted probability of detection, above the false-alarm probability and below 1.
+    pulses, false_alarm_probability, model
+        As for `components.radar.detection.probability.detection_probability`, scalars.
+
+    Returns
+    -------
+    float
+        Linear power ratio, to about 1e-15 relative.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range or no SNR up to 1e30 gives `pd`.
+
+    Notes
+    -----
+    Swerling I (and II) with one pulse in closed form, from Pd = Pfa^(1/(1+SNR)); the others by
+    repeated subdivision of ln SNR.
+    """
+    wanted = float(checked_probability("pd", pd))
+    pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
+    n = int(checked_pulses(pulses))
+    name = checked_model(model)
+    if wanted <= pfa:
+        raise ValueError(
+            f"pd is {wanted:g}: it must be above the false-alarm probability {pfa:g}, which noise "
+            "alone reaches"
+        )
+    return _solved(wanted, pfa, n, name)
+
+
+@lru_cache(maxsize=1024)
+def _solved(wanted: float, pfa: float, n: int, name: str) -> float:
+    if n == 1 and name in ("swerling1", "swerling2"):
+        return math.log(pfa / wanted) / math.log(wanted)
+    low, high = math.log(1e-30), math.log(1e30)
+    for _ in range(40):
+        grid = np.linspace(low, high, _POINTS)
+        # Near 1 the miss tells neighbouring SNR apart, Pd does not.
+        if wanted < 0.5:
+            reached = exact_probability(np.exp(grid), n, pfa, name, miss=False) >= wanted
+        else:
+            reached = exact_probability(np.exp(grid), n, pfa, name, miss=True) <= 1.0 - wanted
+        if not reached[-1]:
+            raise ValueError(f"pd is {wanted!r}: it must be reachable with an SNR of at most 1e30")
+        first = int(np.argmax(reached))
+        if first == 0:
+            # Only in the first round: `wanted` is the false-alarm probability to the last digits.
+            high = low
+            break
+        low, high = float(grid[first - 1]), float(grid[first])
+        if high - low <= 4e-16 * max(1.0, abs(high)):
+            break
+    return math.exp(0.5 * (low + high))
+
+
+#: Looks of the rule; the looks before are a state of their own each.
+MOST_LOOKS = 12
+
+
+def first_declared(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
+    """Return the probability that m detections within n looks are first there at each look.
+
+    Looks are independent, as those of scan-to-scan fluctuation are. Before the first look there
+    are misses.
+
+    Parameters
+    ----------
+    pd : (..., looks) array_like
+        Probability of detection of each look in order of time, [0, 1].
+    m, n : int
+        1 <= m <= n <= 12; with m = n = 1 the first detection.
+
+    Returns
+    -------
+    array of the shape of `pd`
+        Adds up along the last axis to the cumulative probability of declaration.
+
+    Raises
+    ------
+    ValueError
+        If the rule or a probability is out of range.
+
+    Notes
+    -----
+    A Markov chain over the last n - 1 looks, exact. With m = n = 1 its sum is the cumulative
+    probability of detection 1 - Π(1 - Pd): J. D. Mallett and L. E. Brennan, "Cumulative
+    probability of detection for targets approaching a uniformly scanning search radar", Proc. IEEE
+    51(4), 1963.
+    """
+    if not (1 <= m <= n <= MOST_LOOKS):
+        raise ValueError(f"m is {m} and n is {n}: they must be 1 <= m <= n <= {MOST_LOOKS}")
+    chance = as_numbers("pd", pd)
+    refuse("pd", chance, ~((chance >= 0.0) & (chance <= 1.0)), "lie in [0, 1]")
+    states = 2 ** (n - 1)
+    seen = np.array([state.bit_count() for state in range(states)])
+    after_miss = (np.arange(states) << 1) & (states - 1)
+    after_hit = after_miss | (1 if n > 1 else 0)
+    declares = seen + 1 >= m
+    weight = np.zeros((*chance.shape[:-1], states))
+    weight[..., 0] = 1.0
+    found = np.empty_like(chance)
+    for look in range(chance.shape[-1]):
+        hit = weight * chance[..., look, np.newaxis]
+        found[..., look] = hit[..., declares].sum(axis=-1)
+        moved = np.zeros_like(weight)
+        for state in range(states):
+            moved[..., after_miss[state]] += weight[..., state] - hit[..., state]
+            if not declares[state]:
+                moved[..., after_hit[state]] += hit[..., state]
+        weight = moved
+    return found

@@ -1,6 +1,7 @@
-"""The loss of a radar's echo in the air: gas, rain and fog, on the way there and back."""
+"""What the way takes from a radar's echo: gas, rain and fog, and the blind range."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,39 @@ from components.atmosphere.altitude_table import AttenuationTable, attenuation_t
 from components.atmosphere.gas import gas_specific_attenuation
 from components.atmosphere.slant_path import one_way_attenuation_db, two_way_transmission
 from components.environment.tables import Weather
-from components.radar.clutter_effects import no_rain_echo
-from components.radar.radar_block import CellFactor
-from components.radar.radar_equation import SPEED_OF_LIGHT_M_S
-from components.radar.volume_clutter import HIGHEST_RAYLEIGH_HZ
+from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
+
+#: From cells to the factor of each one's SNR.
+CellFactor = Callable[[Cells], FloatArray]
+
+
+class BlindRange(Effect):
+    """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
+
+    lockstep = True
+    name = "blind range"
+    acts_on = "SNR"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``minimum_range_m``."""
+        nearest = block.p.minimum_range_m
+        if nearest is None:
+            return Verdict(False, "minimum_range_m is not given")
+        return Verdict(True, f"minimum_range_m is {nearest:g}")
+
+    def build(self, block: Any) -> CellFactor:
+        """Return the factor on every cell's SNR: 0 closer than the minimum range, else 1."""
+        nearest_m = 0.0 if block.p.minimum_range_m is None else block.p.minimum_range_m
+
+        def factor(cells: Cells) -> FloatArray:
+            return np.where(cells.range_m < nearest_m, 0.0, 1.0)
+
+        return factor
+
 
 _NO_CARRIER = "frequency_hz is not given"
 
