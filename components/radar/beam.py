@@ -42,38 +42,13 @@ def illumination_offset_s(
     sweep_fraction: float = 1.0,
     azimuth_rate_rad_s: ArrayLike = 0.0,
 ) -> Any:
-    """Return how long after the start of its scan a target is illuminated.
+    """Return how long after the start of its scan a target is illuminated, s.
 
-    Parameters
-    ----------
-    azimuth_rad : array_like, rad
-        The target's azimuth at the start of the scan, clockwise, in the frame in which the beam
-        sweeps. Outside the field of view the nearer edge counts.
-    start_rad, width_rad : float, rad
-        The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π].
-    scan_period_s : float, s
-        Above 0.
-    sweep_fraction : float
-        Share of the period spent sweeping, in (0, 1]; the rest is fly-back.
-    azimuth_rate_rad_s : array_like, rad/s
-        How fast the target's azimuth changes; it must be below the beam's own rate. With it the
-        result is the first-order answer for a moving target: exact for a constant rate.
-
-    Returns
-    -------
-    array of the broadcast shape, s
-        In [0, sweep_fraction · scan_period_s].
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    The beam is at start + w t, the target at azimuth + r t: they meet at
-    (azimuth - start) / (w - r). Without the rate, a target that crosses at r is dated early or
-    late by about r/w of the offset: 0.5 % for 1 deg/s under a beam of 220 deg/s.
+    The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π], within
+    `sweep_fraction` of the period; a target outside counts as at the nearer edge. It is at start +
+    w t, the target at azimuth + r t: they meet at (azimuth - start) / (w - r), exact for a constant
+    rate. Without the rate, a target that crosses at r is dated early or late by about r/w of the
+    offset: 0.5 % for 1 deg/s under a beam of 220 deg/s.
     """
     positive("width_rad", width_rad)
     if not width_rad <= TWO_PI * (1.0 + 1e-12):
@@ -106,38 +81,17 @@ def first_illumination(
     width_rad: float,
     scan_period_s: float,
 ) -> tuple[FloatArray, BoolArray]:
-    """Return when in its scan the beam first meets each target, wherever that flies meanwhile.
+    """Return when in its scan (s) the beam first meets each target as it flies, and if it does.
 
-    Parameters
-    ----------
-    azimuth_at : callable
-        The targets' azimuths (rad, clockwise, in the frame in which the beam sweeps) at times of
-        their own after the start of the scan: takes and returns arrays like `azimuth_rad`.
-    azimuth_rad : ndarray, rad
-        Their azimuths at the start of the scan.
-    start_rad, width_rad : float, rad
-        The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π].
-    scan_period_s : float, s
-        The sweep takes all of it.
+    `azimuth_at` gives the targets' azimuths (rad, clockwise) at times of their own after the start
+    of the scan. One that lies outside the field of view, came in behind the beam or kept ahead of
+    it is not lit; its time is that of the nearer end. One that crosses the seam of a full circle
+    against the sweep is lit twice, and the first counts.
 
-    Returns
-    -------
-    offset_s : ndarray, s
-        In [0, scan_period_s].
-    lit : ndarray of bool
-        False where the beam does not meet the target in this scan: it lies outside the field of
-        view, came in behind the beam, or kept ahead of it. The offset is then that of the nearer
-        end.
-
-    Notes
-    -----
     Each element is solved by itself, by the secant method inside a shrinking bracket, until beam
-    and target are within 1e-9 rad; a target at 0.1 rad/s under a beam of 3.8 rad/s takes three or
-    four evaluations. So the answer is that of the flight as given, not of a rate: against a brute
-    force search over exact trajectories it errs by less than 1 ns of illumination time and 1 µm
-    of position, where the position at the start of the scan is off by up to speed times period.
-    A target that crosses the seam of a full circle against the sweep is lit twice in one scan;
-    the first counts.
+    and target are within 1e-9 rad: three or four evaluations for 0.1 rad/s under a beam of 3.8
+    rad/s. Against a brute force search over exact trajectories it errs by less than 1 ns and 1 µm,
+    where the position at the start of the scan is off by up to speed times period.
     """
     beam_rate = width_rad / scan_period_s
     # The bare remainder: what lies a rounding before the start is lit last, not first.
@@ -184,15 +138,7 @@ def two_way_gain(off_axis_rad: FloatArray, beamwidth_rad: float) -> FloatArray:
 
 
 def off_nearest(angle_rad: FloatArray, width_rad: float, beams: int) -> FloatArray:
-    """Return how far a direction is off the nearest of some beams that share a width evenly.
-
-    Parameters
-    ----------
-    angle_rad : ndarray
-        From the edge of the width.
-    width_rad : float
-    beams : int
-    """
+    """Return how far an angle from the edge is off the nearest beam, where beams share a width."""
     step = width_rad / beams
     number = np.clip(np.floor(angle_rad / step), 0, beams - 1)
     return np.asarray(angle_rad - (number + 0.5) * step)
@@ -286,13 +232,7 @@ class OffAxis:
 
 @dataclass(eq=False)
 class LitTargets(GatedTargets):
-    """Targets at the instants at which a beam lights them.
-
-    Parameters
-    ----------
-    offset_s : (rows, targets)
-        Time since the start of the scan.
-    """
+    """Targets at the instants at which a beam lights them, and the time since the scan began."""
 
     offset_s: FloatArray = per_row(kw_only=True)
 
@@ -315,13 +255,8 @@ class Sweep:
     ) -> LitTargets:
         """Return the targets as the beam meets them, one row per scan.
 
-        Those that lie in a cue cone it meets as the scan begins, if the radar's beam visits such
-        cones first.
-
-        Raises
-        ------
-        ValueError
-            If the targets can be known only at the instants of the rows.
+        Those in a cue cone it meets as the scan begins, if the radar's beam visits such cones
+        first.
         """
         if targets.revisit is None:
             raise ValueError(
@@ -417,12 +352,6 @@ MOST_GAIN_DISAGREEMENT_DB = 3.0
 def beam_against_gain(parameters: Any) -> list[str]:
     """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
 
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-
-    Notes
-    -----
     A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are
     built (M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 9.2, has 26,000; C. A.
     Balanis, Antenna Theory, section 2.6, 30,000).

@@ -53,27 +53,11 @@ _WEIGHTS = {"single_canceller": (1.0, -1.0), "double_canceller": (1.0, -2.0, 1.0
 
 @dataclass(frozen=True)
 class MovingTargetFilter:
-    """Describe a moving-target filter of one radar.
+    """A moving-target filter of one radar, of one of the `FILTERS`.
 
-    Parameters
-    ----------
-    kind : str
-        One of `FILTERS`.
-    prf_hz : float
-        Pulse repetition frequency, above 0.
-    wavelength_m : float
-        Above 0.
-    pulses : int
-        Of the filter bank, 8 to 256; the cancellers have 2 and 3.
-    notch_m_s : float, optional
-        Filters of the bank whose centres are nearer to the clutter than this are not used, 0 or
-        more; the one at the clutter never is. By default two filters' spacing, the half width of
-        the window's main lobe.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of range, or no filter of the bank is left.
+    The filter bank has 8 to 256 pulses (the cancellers 2 and 3). Of its filters those whose centres
+    are nearer to the clutter than `notch_m_s` are not used, and the one at the clutter never; by
+    default two filters' spacing, the half width of the window's main lobe.
     """
 
     kind: str
@@ -125,24 +109,10 @@ class MovingTargetFilter:
         clutter_m_s: ArrayLike = 0.0,
         spread_m_s: ArrayLike = 0.0,
     ) -> tuple[Any, Any]:
-        """Return the gain of a target's power, and of the clutter's where the target is sought.
+        """Return the gains of a target's power, and of the clutter's where the target is sought.
 
-        Parameters
-        ----------
-        target_m_s, clutter_m_s : array_like
-            Range rates against the velocity at which the notch lies.
-        spread_m_s : array_like
-            Standard deviation of the clutter's range rates, 0 or more.
-
-        Returns
-        -------
-        (target, clutter) : arrays of the broadcast shape
-            Factors of the power over noise, 0 or more.
-
-        Raises
-        ------
-        ValueError
-            If an argument is not finite or a spread negative.
+        Factors of the power over noise. Range rates are against the velocity at which the notch
+        lies, and `spread_m_s` is the standard deviation of the clutter's.
         """
         shape, (target, clutter, spread) = broadcast_flat(
             target_m_s=finite("target_m_s", target_m_s),
@@ -165,18 +135,10 @@ class MovingTargetFilter:
         return unflatten(passed, shape), unflatten(residue, shape)
 
     def improvement(self, spread_m_s: float) -> float:
-        """Return the clutter improvement factor: mean gain of targets over that of clutter.
+        """Return the clutter improvement factor: mean gain of targets over that of clutter, linear.
 
-        Parameters
-        ----------
-        spread_m_s : float
-            Of clutter whose mean lies in the notch.
-
-        Returns
-        -------
-        float
-            Linear. For cancellers and a small spread 2 (PRF / 2 pi s)² and 2 (PRF / 2 pi s)⁴, with
-            s = 2 spread / λ (Skolnik, section 3.7).
+        The clutter's mean lies in the notch. For cancellers and a small spread it is 2 (PRF / 2 pi
+        s)² and 2 (PRF / 2 pi s)⁴, with s = 2 spread / λ (Skolnik, section 3.7).
         """
         every = (np.arange(4096) + 0.5) / 4096 * self.blind_speed_m_s
         target, clutter = self.gains(every, 0.0, spread_m_s)
@@ -211,24 +173,9 @@ def _power(lags: tuple[float, ...], turn: FloatArray, width: FloatArray) -> Floa
 
 
 def folded_range_rate(range_rate_m_s: ArrayLike, unambiguous_m_s: ArrayLike) -> Any:
-    """Return the range rate that a radar of one PRF takes a range rate for.
+    """Return the range rate that a radar of one PRF takes a range rate for, m/s.
 
-    Parameters
-    ----------
-    range_rate_m_s : array_like
-        NaN stays NaN.
-    unambiguous_m_s : array_like
-        λ·PRF/4, above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, m/s
-        In [-unambiguous, unambiguous), off by a multiple of twice that.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
+    In [-unambiguous, unambiguous), off by a multiple of twice that; NaN stays NaN.
     """
     limit = as_numbers("unambiguous_m_s", unambiguous_m_s)
     refuse("unambiguous_m_s", limit, ~(limit > 0.0), "be above 0")
@@ -269,24 +216,8 @@ class RangeRate(Effect):
 
 
 def range_rates(cells: Cells, found: IntArray) -> FloatArray:
-    """Return the rate of the slant range of some cells, positive when it opens.
+    """Return the rate of the slant range of some cells, m/s, positive when it opens.
 
-    Parameters
-    ----------
-    cells : Cells
-    found : (n,) of int
-
-    Returns
-    -------
-    (n,) array, m/s
-
-    Raises
-    ------
-    ValueError
-        If the targets are not known at other instants than those of the rows.
-
-    Notes
-    -----
     Differences of the range itself over a few hundredths of a second, by the scene's own model of
     the Earth, whatever the two fly. Where one of them changes its velocity at once within that
     time, the rate is between the one before and the one after.
@@ -296,23 +227,10 @@ def range_rates(cells: Cells, found: IntArray) -> FloatArray:
 
 
 def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return the rate of each cell's slant range, and how the ownship moves then.
+    """Return the rate of each cell's slant range, and the ownship's velocity over ground then, m/s.
 
-    Parameters
-    ----------
-    cells : Cells
-
-    Returns
-    -------
-    range_rate_m_s : (cells,)
-        Positive when it opens.
-    velocity_m_s : (north, east, down), each (cells,)
-        Of the ownship over ground, in its own north-east-down frame.
-
-    Raises
-    ------
-    ValueError
-        As for `range_rates`.
+    The rate is positive when the range opens, the velocity in the ownship's own north-east-down
+    frame.
     """
 
     def quantities(seen: Mapping[str, Any], times: int) -> tuple[FloatArray, ...]:
@@ -392,18 +310,7 @@ class DopplerProcessing:
         self._terrain = terrain_of(block)
 
     def __call__(self, cells: Cells, echoes: Sequence[Echo]) -> tuple[FloatArray, list[FloatArray]]:
-        """Return the factors on the power of each cell's target and of each echo beside it.
-
-        Parameters
-        ----------
-        cells : Cells
-        echoes : sequence of Echo
-
-        Returns
-        -------
-        target : (cells,)
-        beside : list of (cells,)
-        """
+        """Return the factors on the power of each cell's target and of each echo beside it."""
         if len(cells) == 0:
             return np.empty(0), [np.empty(0)] * len(echoes)
         range_rate_m_s, velocity_m_s = motion_of_cells(cells)

@@ -32,20 +32,10 @@ _OF_CUED = 2**40
 
 @dataclass(frozen=True, eq=False)
 class Alarms:
-    """Hold what crossed a threshold without a target.
+    """What crossed a threshold without a target, in ascending order of the reports' rows.
 
-    Parameters
-    ----------
-    row : (n,) of int
-        Of the report that each belongs to, ascending.
-    key : (n,) of uint64
-        Of its draws.
-    where : mapping of (n,)
-        Place by quantity, in the sensor's axes.
-    snr : (n,)
-        How strong it came out, linear, above 0.
-    rate : (n,)
-        Uniform in [0, 1), that says its range rate.
+    `key` is that of its draws, `where` its place by quantity in the sensor's axes, `snr` how strong
+    it came out (linear, above 0) and `rate` a uniform number that says its range rate.
     """
 
     row: IntArray
@@ -92,16 +82,6 @@ class NoiseReports:
     """Draws each scan's false alarms with keys of their own.
 
     Within cue cones, where a radar looks otherwise, noise crosses the threshold of there.
-
-    Parameters
-    ----------
-    block : LinkBudgetRadar
-
-    Raises
-    ------
-    ValueError
-        If the resolution cells are not known, or, by `refuse_too_many`, more than 1e5 false alarms
-        are expected by scan.
     """
 
     def __init__(self, block: Any) -> None:
@@ -240,12 +220,7 @@ class _CellsOf:
 
 
 class GroundReports:
-    """Draws for every cell that holds ground, keyed by cell and scan.
-
-    Parameters
-    ----------
-    block : LinkBudgetRadar
-    """
+    """Draws for every cell that holds ground, keyed by cell and scan."""
 
     def __init__(self, block: Any) -> None:
         self._block, self._terrain = block, terrain_of(block)
@@ -394,14 +369,7 @@ NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
 def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
-    """Say that a radar detects echoes below its noise because so many false alarms are allowed.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    snr_db : float
-        At which half of the looks detect.
-    """
+    """Say that a radar detects echoes below its noise, as so many false alarms are allowed."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
         return []
@@ -414,19 +382,7 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
 
 
 def unlikely_false_alarms(noise_key: str, pfa: float, cells: int, by_default: bool) -> list[str]:
-    """Say how many false alarms a scan has where there are many, or practically none.
-
-    Parameters
-    ----------
-    noise_key : str
-        The key that sets how often noise crosses the threshold, and its value.
-    pfa : float
-        By look and cell, as the threshold has it.
-    cells : int
-        Resolution cells of a scan.
-    by_default : bool
-        Whether the key has the value that it has where nobody gives one.
-    """
+    """Say how many false alarms a scan has where there are many, or practically none."""
     comes_to = (
         f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"
     )

@@ -30,22 +30,7 @@ _LN_2 = math.log(2.0)
 
 
 def height_above_terrain_m(own_alt_m: ArrayLike, terrain_alt_m: ArrayLike) -> Any:
-    """Return the height above terrain, or refuse terrain above the ownship.
-
-    Parameters
-    ----------
-    own_alt_m, terrain_alt_m : array_like, m
-        Above sea level.
-
-    Returns
-    -------
-    array of the broadcast shape, m
-
-    Raises
-    ------
-    ValueError
-        If the terrain is as high as the ownship or higher.
-    """
+    """Return the height above terrain, or refuse terrain as high as the ownship or higher."""
     shape, (own, terrain) = broadcast_flat(
         own_alt_m=finite("own_alt_m", own_alt_m),
         terrain_alt_m=finite("terrain_alt_m", terrain_alt_m),
@@ -72,42 +57,17 @@ def ground_clutter_rcs_m2(
 ) -> Any:
     """Return the RCS of the ground in the range cell of a target at which the beam points.
 
-    Parameters
-    ----------
-    range_m : array_like, m
-        Slant range of the target, so of its cell.
-    elevation_rad : array_like, rad
-        Elevation of the beam's axis above the local horizontal.
-    height_m : array_like, m
-        Height above terrain, above 0.
-    gamma_db : float, dB
-        Reflectivity γ of the terrain in σ0 = γ sin(grazing): about -20 for a smooth desert or
-        sea, -15 for farmland, -10 for woodland and -5 for a town, with ±5 dB between places.
-    azimuth_beamwidth_rad, elevation_beamwidth_rad : float, rad
-        One-way half-power beamwidths, above 0.
-    range_resolution_m : float, m
-        Depth of a range cell, above 0.
+    `gamma_db` is the reflectivity γ of σ0 = γ sin(grazing): about -20 for a smooth desert or sea,
+    -15 for farmland, -10 for woodland and -5 for a town, with ±5 dB between places. Beamwidths are
+    one-way half-power ones. The RCS goes into the radar equation as the target's, the beam's gain
+    towards the ground included; it is 0 where the cell holds no ground (nearer than the height) or
+    the ground is more than `BEAM_REACH_BEAMWIDTHS` beamwidths off the axis.
 
-    Returns
-    -------
-    array of the broadcast shape, m²
-        As the target's RCS goes into the radar equation, the beam's gain towards the ground
-        included. 0 where the cell holds no ground (nearer than the height) or the ground is more
-        than `BEAM_REACH_BEAMWIDTHS` beamwidths off the axis.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    σ = σ0 · A · g: constant-γ reflectivity (D. K. Barton, "Land clutter models for radar design
-    and analysis", Proc. IEEE 73(2), 1985); patch A = R θ_az · min(ΔR / cos ψ, R θ_el / sin ψ),
-    limited by the range cell or, looking steeply down, by the beam; two-way gain of a Gaussian
-    beam g = exp(-8 ln 2 (Δ/θ_el)²), Δ between the beam's axis and the ground at that range.
-    Sidelobes (`ground_ring_rcs_m2`) are left out, and the spread of the ground's depression over
-    the patch.
+    σ = σ0 · A · g: constant-γ reflectivity (D. K. Barton, "Land clutter models for radar design and
+    analysis", Proc. IEEE 73(2), 1985); patch A = R θ_az · min(ΔR / cos ψ, R θ_el / sin ψ), limited
+    by the range cell or, looking steeply down, by the beam; two-way gain of a Gaussian beam g =
+    exp(-8 ln 2 (Δ/θ_el)²), Δ between the beam's axis and the ground at that range. Sidelobes
+    (`ground_ring_rcs_m2`) are left out, and the spread of the ground's depression over the patch.
     """
     for name, value in (
         ("azimuth_beamwidth_rad", azimuth_beamwidth_rad),
@@ -143,20 +103,8 @@ def ground_ring_rcs_m2(
 ) -> Any:
     """Return the RCS of the ground at a slant range in all directions, which sidelobes meet.
 
-    Parameters
-    ----------
-    range_m, height_m : array_like, m
-        Slant range, and height above terrain, above 0.
-    gamma_db : float, dB
-        As for `ground_clutter_rcs_m2`.
-    range_resolution_m : float, m
-        Above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, m²
-        σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area
-        whatever the height. 0 nearer than the height.
+    σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area whatever
+    the height. 0 nearer than the height.
     """
     positive("range_resolution_m", range_resolution_m)
     shape, (distance, height) = broadcast_flat(
@@ -230,14 +178,9 @@ class GroundClutter(Effect):
 
 @dataclass(frozen=True)
 class Clutter:
-    """Power of clutter over noise, by the cells of a look.
+    """Power over noise by the cells of a look: of the ground amid the beam, and of diffuse clutter.
 
-    Parameters
-    ----------
-    mean : (cells,)
-        Of the patch of ground amid the beam.
-    diffuse : (cells,)
-        Of what is more noise: rain, and what sidelobes meet.
+    Diffuse is what is more noise: rain, and what sidelobes meet.
     """
 
     mean: FloatArray
@@ -254,12 +197,7 @@ class Clutter:
 
 
 class Echo:
-    """What gives an echo beside the target; called with cells, it returns its RCS in m².
-
-    Parameters
-    ----------
-    block : Radar
-    """
+    """What gives an echo beside the target; called with cells, it returns its RCS in m²."""
 
     #: Whether it adds to noise; else it is the mean that ``clutter_mean`` speaks of.
     diffuse = True
@@ -278,13 +216,8 @@ class Echo:
     ) -> tuple[FloatArray, FloatArray]:
         """Return mean and standard deviation of its range rates in each cell, m/s.
 
-        Parameters
-        ----------
-        cells : Cells
-        own_m_s : (north, east, down), each (cells,)
-            The ownship's velocity over ground.
-        ground_m_s : (cells,)
-            Range rate of the ground on the beam's axis.
+        `own_m_s` is the ownship's velocity over ground, `ground_m_s` the range rate of the ground
+        on the beam's axis.
         """
         raise NotImplementedError
 
@@ -374,31 +307,12 @@ _BEAM_DEVIATION = 1.0 / math.sqrt(16.0 * math.log(2.0))
 def platform_spread_m_s(
     speed_m_s: ArrayLike, ground_rate_m_s: ArrayLike, beamwidth_rad: float
 ) -> Any:
-    """Return the standard deviation of the ground's range rates over the beam of a moving radar.
+    """Return the standard deviation of the ground's range rates over a moving radar's beam, m/s.
 
-    Parameters
-    ----------
-    speed_m_s : array_like
-        Speed of the platform over ground, 0 or more.
-    ground_rate_m_s : array_like
-        Range rate of the ground on the beam's axis: -speed · cos(angle off the flight's course).
-    beamwidth_rad : float
-        One-way half-power beamwidth across which the rates change, above 0.
-
-    Returns
-    -------
-    array of the broadcast shape, m/s
-        0.30 · speed · beamwidth · sin(angle); as a frequency 0.60 · speed · beamwidth / λ abeam.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    A Gaussian beam, seen twice, has the standard deviation beamwidth / sqrt(16 ln 2). Straight
-    ahead the spread is of second order in the beamwidth and left out.
+    `ground_rate_m_s` is that of the ground on the beam's axis, -speed · cos(angle off the flight's
+    course). The result is 0.30 · speed · beamwidth · sin(angle), as a frequency 0.60 · speed ·
+    beamwidth / λ abeam: a Gaussian beam, seen twice, has the standard deviation beamwidth / sqrt(16
+    ln 2). Straight ahead the spread is of second order in the beamwidth and left out.
     """
     positive("beamwidth_rad", beamwidth_rad)
     shape, (speed, rate) = broadcast_flat(
@@ -410,13 +324,7 @@ def platform_spread_m_s(
 
 
 def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
-    """Say that clutter raises detections where the threshold stays at the noise.
-
-    Parameters
-    ----------
-    parameters : ClutterParameters
-    terrain : Terrain or None
-    """
+    """Say that clutter raises detections where the threshold stays at the noise."""
     if terrain is None or parameters.clutter_threshold != "noise":
         return []
     return [

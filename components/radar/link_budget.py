@@ -32,13 +32,7 @@ SMALLEST_MINIMUM_RANGE_M = 1e-3
 
 
 def wavelength(frequency_hz: ArrayLike) -> Any:
-    """Return the wavelength in metres of a frequency in hertz.
-
-    Raises
-    ------
-    ValueError
-        If the frequency is not finite and above 0.
-    """
+    """Return the wavelength in metres of a frequency in hertz."""
     return SPEED_OF_LIGHT_M_S / positive("frequency_hz", frequency_hz)[()]
 
 
@@ -54,34 +48,10 @@ def radar_constant(
 ) -> float:
     """Return what RCS/range⁴ is multiplied with to give the SNR, in m².
 
-    The result is Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K.
-
-    Parameters
-    ----------
-    power_w : float
-        Transmitted power Pt.
-    antenna_gain_db : float
-        G, the same antenna for transmitting and receiving.
-    wavelength_m, bandwidth_hz : float
-    integration_gain_db : float
-        Coherent integration gain G_I. Do not count the same pulses again as `pulses`.
-    noise_figure_db, losses_db : float
-        F and L.
-
-    Returns
-    -------
-    float
-        m²
-
-    Raises
-    ------
-    ValueError
-        If a quantity is not above 0 or a decibel value is not finite.
-
-    Notes
-    -----
-    Thesis eq. 7 and 8, completed by the gain G_I, the noise figure F and the losses L, which
-    Table 2.2 lists (G_I, F) or forgets (L).
+    Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis eq. 7
+    and 8, completed by the coherent integration gain G_I, the noise figure F and the losses L,
+    which Table 2.2 lists (G_I, F) or forgets (L). Pulses that G_I counts are not to be counted
+    again as `pulses`.
     """
     quantities = {
         "power_w": power_w,
@@ -121,30 +91,11 @@ def checked_minimum_range(minimum_range_m: float) -> float:
 def snr(
     range_m: ArrayLike, rcs_m2: ArrayLike, *, constant_m2: float, minimum_range_m: float
 ) -> Any:
-    """Return the SNR per look, or 0 closer than the minimum range.
+    """Return the SNR per look (linear), or 0 closer than the minimum range.
 
-    Closer than `minimum_range_m` the far-field equation does not hold and the receiver is still
-    blind from its own pulse: no echo is processed, and the SNR is 0. So range 0 is finite.
-
-    Parameters
-    ----------
-    range_m : array_like, m
-        Slant range, 0 or more.
-    rcs_m2 : array_like, m²
-        Radar cross-section, 0 or more; broadcasts with the range.
-    constant_m2 : float
-        From `radar_constant`.
-    minimum_range_m : float
-        At least 1 mm.
-
-    Returns
-    -------
-    array of the broadcast shape, linear power ratio
-
-    Raises
-    ------
-    ValueError
-        If an argument is negative or not finite.
+    Closer than `minimum_range_m`, at least 1 mm, the far-field equation does not hold and the
+    receiver is still blind from its own pulse: no echo is processed, and the SNR is 0. So range 0
+    is finite.
     """
     constant_m2 = float(positive("constant_m2", constant_m2))
     nearest = checked_minimum_range(minimum_range_m)
@@ -181,27 +132,12 @@ __all__ = [
 
 @dataclass(frozen=True)
 class LinkBudget:
-    """Describe one radar's link budget; all gains in dB, everything else in SI units.
+    """One radar's link budget; all gains in dB, everything else in SI units.
 
-    Parameters
-    ----------
-    power_w, antenna_gain_db, bandwidth_hz
-        As for `radar_constant`.
-    wavelength_m, frequency_hz : float, optional
-        Exactly one of the two.
-    integration_gain_db, noise_figure_db, losses_db
-        As for `radar_constant`; 0 dB each unless given.
-    minimum_range_m : float, optional
-        Closer than this no echo is processed (SNR 0). Unless given, the start of the antenna's
-        far field, 2 D²/λ with D the diameter of a circular aperture of this gain:
-        2 G λ / pi², 1.5 m for the 29.5 dB antenna at 35 GHz. A pulse radar is blind up to half
-        its pulse length, which is usually farther: set it then.
-
-    Raises
-    ------
-    ValueError
-        If a quantity is not above 0 or not finite, or not exactly one of wavelength and frequency
-        is given.
+    Exactly one of wavelength and frequency is given. Closer than `minimum_range_m` no echo is
+    processed (SNR 0): unless given, the start of the antenna's far field, 2 D²/λ with D the
+    diameter of a circular aperture of this gain: 2 G λ / pi², 1.5 m for the 29.5 dB antenna at 35
+    GHz. A pulse radar is blind up to half its pulse length, which is usually farther: set it then.
     """
 
     power_w: float
@@ -266,22 +202,6 @@ class LinkBudget:
         """Return the slant range in metres at which the radar equation gives an SNR.
 
         The equation alone: where the result is below `nearest_m`, the radar processes no echo.
-
-        Parameters
-        ----------
-        snr : array_like
-            Linear power ratio, above 0.
-        rcs_m2 : array_like, m²
-            0 or more; broadcasts with `snr`.
-
-        Returns
-        -------
-        array of the broadcast shape, m
-
-        Raises
-        ------
-        ValueError
-            If an argument is out of range.
         """
         shape, (ratio, rcs) = broadcast_flat(
             snr=positive("snr", snr), rcs_m2=not_negative("rcs_m2", rcs_m2)
@@ -303,33 +223,8 @@ def calibrated_bandwidth(
 ) -> float:
     """Return the bandwidth in hertz with which the radar has Pd `pd` for a target at a range.
 
-    The thesis gives no bandwidth; it follows from one known detection range. The budget's own
-    bandwidth does not matter; `with_bandwidth` puts the result in.
-
-    Parameters
-    ----------
-    budget : LinkBudget
-    rcs_dbsm : float, dB above 1 m²
-    range_km : float, km
-        Not closer than the budget's minimum range.
-    pd : float
-        Above the false-alarm probability, below 1.
-    pulses, false_alarm_probability, model
-        As for `components.radar.detection.probability.detection_probability`.
-
-    Returns
-    -------
-    float
-        Hz
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    The SNR required comes from `required_snr` (root finding); SNR times bandwidth is a constant.
+    The thesis gives no bandwidth; it follows from one known detection range, as SNR times bandwidth
+    is a constant. The budget's own bandwidth does not matter; `with_bandwidth` puts the result in.
     """
     range_m = float(positive("range_km", range_km)) * 1000.0
     if range_m < budget.nearest_m:
@@ -357,25 +252,7 @@ def detection_range(
     false_alarm_probability: float,
     model: str = "swerling1",
 ) -> Any:
-    """Return the slant range in metres at which a target of given RCS has Pd `pd`.
-
-    Parameters
-    ----------
-    budget : LinkBudget
-    rcs_m2 : array_like, m²
-        Above 0.
-    pd, pulses, false_alarm_probability, model
-        As for `calibrated_bandwidth`.
-
-    Returns
-    -------
-    array of the shape of `rcs_m2`, m
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
+    """Return the slant range in metres at which a target of given RCS has Pd `pd`."""
     rcs = positive("rcs_m2", rcs_m2)
     needed = required_snr(
         pd, pulses=pulses, false_alarm_probability=false_alarm_probability, model=model
@@ -407,12 +284,7 @@ _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 
 def implausible(parameters: Any) -> list[str]:
-    """Say which values no radar has, by their own names.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    """
+    """Say which values of a link budget no radar has, by their own names."""
     found = []
     for key, (low, high, unit) in _RANGES.items():
         value = getattr(parameters, key)

@@ -96,28 +96,10 @@ _UNIFORM = 1.0 / 12.0
 def angle_variance(
     beamwidth_rad: float, energy_ratio: FloatArray, *, method: str = "monopulse"
 ) -> FloatArray:
-    """Return the variance of an angle measured with one beam or a pair of them.
+    """Return the variance of an angle measured with one beam or a pair of them, rad².
 
-    Parameters
-    ----------
-    beamwidth_rad : float
-        One-way half-power beamwidth, above 0.
-    energy_ratio : (n,) array
-        S/N of a pulse times the number of pulses, linear, 0 or more.
-    method : {"monopulse", "scan"}
+    By the energy ratio, S/N of a pulse times the number of pulses; at most beamwidth²/12.
 
-    Returns
-    -------
-    (n,) array, rad²
-        At most beamwidth²/12.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the method is unknown.
-
-    Notes
-    -----
     ``monopulse``: sigma = beamwidth / (k_m sqrt(2 n S/N)), k_m = 1.6, of a target near the axis.
     ``scan``: sigma = beamwidth / (k sqrt(2 n S/N / L_p)), k = 1.66, L_p = 1.33 the beamshape loss.
     Barton & Leonov, Radar Technology Encyclopedia, Artech House 1997, "accuracy of monopulse,
@@ -134,58 +116,21 @@ def angle_variance(
 
 
 def range_variance(range_resolution_m: float, energy_ratio: FloatArray) -> FloatArray:
-    """Return the variance of a range measured with a resolution.
+    """Return the variance of a range measured with a resolution c / 2B, m², at most resolution²/12.
 
-    Parameters
-    ----------
-    range_resolution_m : float
-        c / 2B, above 0.
-    energy_ratio : (n,) array
-        As for `angle_variance`.
-
-    Returns
-    -------
-    (n,) array, m²
-        At most resolution²/12.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
     sigma = resolution / sqrt(2 n S/N): Curry, section 8.1; Mahafza, Radar Systems Analysis and
     Design Using MATLAB, has it with the rms bandwidth. That of a flat spectrum of width B, by
-    Skolnik, Theoretical accuracy of radar measurements, IRE Trans. ANE-7, 1960, would be smaller
-    by sqrt(3) / pi, which a receiver with weighting does not reach.
+    Skolnik, Theoretical accuracy of radar measurements, IRE Trans. ANE-7, 1960, would be smaller by
+    sqrt(3) / pi, which a receiver with weighting does not reach.
     """
     return _limited(float(positive("range_resolution_m", range_resolution_m)), _ratio(energy_ratio))
 
 
 def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArray) -> FloatArray:
-    """Return the variance of a range rate measured by its Doppler shift.
+    """Return the variance of a range rate measured by its Doppler shift, at most resolution²/12.
 
-    Parameters
-    ----------
-    range_rate_resolution_m_s : float
-        Wavelength / (2 coherent time), above 0.
-    energy_ratio : (n,) array
-        As for `angle_variance`.
-
-    Returns
-    -------
-    (n,) array, m²/s²
-        At most resolution²/12.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    sigma = resolution / sqrt(2 n S/N): Curry, section 8.3.
+    sigma = resolution / sqrt(2 n S/N), resolution = wavelength / (2 coherent time): Curry, section
+    8.3.
     """
     step = float(positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
     return _limited(step, _ratio(energy_ratio))
@@ -205,13 +150,6 @@ def _limited(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
 def heard(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
     """Return what a look's errors follow from: a pulse's signal over noise and clutter.
 
-    Parameters
-    ----------
-    snr, cnr : (cells,) arrays
-        Ratios to noise, linear; `cnr` is None where there is no clutter.
-
-    Notes
-    -----
     It is the SNR that the decision rested on and that is recorded: the mean one of a fluctuating
     target, or that of its sampled cross-section. A radar knows it from the height of the echo, to
     about 1 dB where it detects. As errors are drawn by the same number, variances are honest.
@@ -220,19 +158,7 @@ def heard(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
 
 
 def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
-    """Return the variances of what a radar measures, by quantity.
-
-    Parameters
-    ----------
-    p : LinkBudgetParameters
-    snr : (n,) array
-        Of a pulse.
-
-    Returns
-    -------
-    dict of (n,) arrays
-        In radians, metres and m/s, squared.
-    """
+    """Return the variances of measured quantities at the SNR of a pulse: rad², m², m²/s²."""
     ratio = p.pulses_summed * snr
     variances = {
         angle: angle_variance(math.radians(width_deg), ratio, method=p.angle_measurement)
@@ -248,12 +174,7 @@ def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
 
 
 def check_signal_errors(p: Any) -> None:
-    """Refuse errors by signal of a radar whose beam or resolution is not known.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse errors by signal of a radar whose beam or resolution is not known."""
     if p.errors != "signal":
         return
     wrong = [
@@ -318,27 +239,14 @@ class MeasuredStrength(Effect):
 
 
 class Strength:
-    """Gives the output that crossed the threshold.
-
-    Parameters
-    ----------
-    block : LinkBudgetRadar
-    """
+    """Gives the output that crossed the threshold."""
 
     def __init__(self, block: Any) -> None:
         self._block = block
         self._draws = block.stream("measured strength")
 
     def __call__(self, cells: Cells, found: IntArray, look: Look) -> Look:
-        """Return the look with the measured strength of the cells that are detected.
-
-        Parameters
-        ----------
-        cells : Cells
-        found : (n,) of int
-            Those that are detected; of others nothing is measured.
-        look : Look
-        """
+        """Return the look with the measured strength of the cells that are detected (`found`)."""
         if "snr" not in look.signal:  # a radar of one's own that says no strength
             return look
         block = self._block
@@ -384,12 +292,7 @@ def _within(cells: IntArray, chosen: Any, count: int) -> IntArray:
 
 
 def noise_at_targets(parameters: Any) -> list[str]:
-    """Say that looks which noise decides are reported at the target's own place, where they are.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    """
+    """Say that looks which noise decides are reported at the target's own place, where they are."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
     if parameters.errors != "grid" or not exact:

@@ -336,14 +336,7 @@ def budget_report(name: str, budget: LinkBudget) -> dict[str, Any]:
 
 
 def moved_threshold(parameters: Any, pd: float) -> list[str]:
-    """Say what is left of a calibration's Pd where the threshold is not the one it was stated for.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    pd : float
-        Of the calibration's target at its range, with the threshold in use.
-    """
+    """Say what Pd a calibration's range has where the threshold is not the one it was for."""
     known = parameters.calibrate
     if known is None or parameters.calibrated_pfa == parameters.false_alarm_probability:
         return []

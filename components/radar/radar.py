@@ -85,20 +85,10 @@ class OwnVelocity(Effect):
 
 
 def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's velocity at some times, each as a row of the targets knows its flight.
+    """Return the ownship's velocity (north, east, down, m/s) at times that its rows' flights know.
 
-    Parameters
-    ----------
-    targets : RelativeTargets
-    row : (n,) of int
-    time_s : (n,)
-
-    Returns
-    -------
-    (3, n) array, m/s
-        Over ground: north, east, down at its own place. From positions 1/64 s before and after,
-        of which one is replaced by the position itself where the flight begins or ends between;
-        NaN where no flights are known.
+    Over ground, at its own place. From positions 1/64 s before and after, of which one is replaced
+    by the position itself where the flight begins or ends between; NaN where no flights are known.
     """
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
@@ -231,18 +221,9 @@ class Radar(Sensor):
     ) -> FloatArray:
         """Return range rates that noise alone gives, m/s: any that the radar listens for.
 
-        One of one PRF listens for all that are unambiguous; another for those of aircraft up to
-        `FASTEST_M_S` over ground, by its own motion along the line of sight.
-
-        Parameters
-        ----------
-        uniform : (n,) array
-            In [0, 1).
-        where : mapping of (n,)
-            Directions in the sensor's axes.
-        targets : RelativeTargets
-        row : (n,) of int
-            Of the targets.
+        From uniform numbers in [0, 1). A radar of one PRF listens for all that are unambiguous;
+        another for those of aircraft up to `FASTEST_M_S` over ground, by its own motion along the
+        line of sight.
         """
         off = 2.0 * uniform - 1.0
         if self.p.range_rate_folds:

@@ -44,24 +44,6 @@ _SHEAR_PER_S, _MOST_SHEAR_M_S, _TURBULENCE_M_S, _FALL_SPREAD_M_S = 4e-3, 6.0, 1.
 def rain_reflectivity_per_m(rain_rate_mm_h: ArrayLike, wavelength_m: float) -> Any:
     """Return the radar cross-section of a volume of rain, η in m² per m³.
 
-    Parameters
-    ----------
-    rain_rate_mm_h : array_like, mm/h
-        0 or more.
-    wavelength_m : float, m
-        Above 0.
-
-    Returns
-    -------
-    array of the shape of `rain_rate_mm_h`, 1/m
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
     η = pi⁵ |K|² Z / λ⁴ with Z = 200 R^1.6 mm⁶/m³ (J. S. Marshall and W. M. Palmer, J. Meteorology
     5, 1948; M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 7.6; F. E. Nathanson,
     Radar Design Principles, 2nd ed., chapter 6). Drops scatter after Rayleigh: up to
@@ -85,34 +67,15 @@ def rain_volume_m3(
     lowest_m: float,
     highest_m: float,
 ) -> Any:
-    """Return the volume of rain in the range cell of a target at which the beam points.
+    """Return the volume of rain in the range cell of a target at which the beam points, m³.
 
-    Parameters
-    ----------
-    range_m, elevation_rad, alt_m : array_like, m and rad
-        Slant range of the cell, elevation of the beam above the horizontal, altitude of the cell.
-    azimuth_beamwidth_rad, elevation_beamwidth_rad : float, rad
-        One-way half-power beamwidths, above 0.
-    range_resolution_m : float, m
-        Depth of a range cell, above 0.
-    lowest_m, highest_m : float, m
-        It rains between these altitudes; -inf for rain that nothing ends below.
+    Weighted by the two-way gain of a beam of one-way half-power widths, as rain counts beside a
+    target amid the beam. It rains from `lowest_m` (-inf for rain that nothing ends below) to
+    `highest_m`.
 
-    Returns
-    -------
-    array of the broadcast shape, m³
-        Weighted by the beam's two-way gain, as rain counts beside a target amid the beam.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-
-    Notes
-    -----
-    pi R² θ_az θ_el ΔR / (8 ln 2) of a Gaussian beam (J. R. Probert-Jones, Quart. J. Royal Met.
-    Soc. 88, 1962), times the share of its two-way gain that lies where it rains: over the height it
-    is Gaussian with R cos(elevation) θ_el / sqrt(16 ln 2).
+    pi R² θ_az θ_el ΔR / (8 ln 2) of a Gaussian beam (J. R. Probert-Jones, Quart. J. Royal Met. Soc.
+    88, 1962), times the share of its two-way gain that lies where it rains: over the height it is
+    Gaussian with R cos(elevation) θ_el / sqrt(16 ln 2).
     """
     for name, value in (
         ("azimuth_beamwidth_rad", azimuth_beamwidth_rad),
@@ -141,19 +104,9 @@ def rain_shell_m3(
     lowest_m: float,
     highest_m: float,
 ) -> Any:
-    """Return the volume of rain at a slant range in all directions, which sidelobes meet.
+    """Return the volume of rain at a slant range in all directions, which sidelobes meet, m³.
 
-    Parameters
-    ----------
-    range_m, own_alt_m : array_like, m
-        Radius and altitude of the centre of the shell.
-    range_resolution_m, lowest_m, highest_m
-        As for `rain_volume_m3`.
-
-    Returns
-    -------
-    array of the broadcast shape, m³
-        2 pi R ΔR times the height of the shell in which it rains (Archimedes).
+    2 pi R ΔR times the height of the shell in which it rains (Archimedes).
     """
     positive("range_resolution_m", range_resolution_m)
     shape, (distance, own) = broadcast_flat(
@@ -177,18 +130,6 @@ def rain_spread_m_s(
 ) -> Any:
     """Return the standard deviation of the rain's own range rates in a cell, m/s.
 
-    Parameters
-    ----------
-    range_m : array_like, m
-    elevation_rad : array_like, rad
-    elevation_beamwidth_rad : float, rad
-
-    Returns
-    -------
-    array of the broadcast shape, m/s
-
-    Notes
-    -----
     Shear of the wind over the beam's height, 0.42 · 4 m/s/km · R · θ_el and at most 6 m/s,
     turbulence of 1 m/s and 1 m/s · sin(elevation) of the drops' fall (Nathanson, chapter 6).
     """

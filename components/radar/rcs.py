@@ -30,35 +30,12 @@ from dsa_des.time.timeline import first_scan
 
 
 def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> Any:
-    """Return sampled RCS from uniform draws by the inverse of the distribution's function.
+    """Return sampled RCS (m²) from uniform draws by the inverse of the distribution's function.
 
-    Parameters
-    ----------
-    mean_rcs_m2 : array_like, m²
-        Mean RCS, 0 or more.
-    uniforms : array_like
-        Draws in [0, 1), made by the caller. ``swerling1`` and ``swerling3``: one per scan, any
-        shape that broadcasts with the mean. ``swerling2`` and ``swerling4``: one per pulse, with
-        the pulses along the last axis; the mean broadcasts with the axes before it.
-        ``swerling0`` ignores their values.
-    model : str
-        ``swerling0`` (steady; also ``swerling5``), ``swerling1`` and ``swerling2`` (exponential),
-        ``swerling3`` and ``swerling4`` (Erlang of order 2).
-
-    Returns
-    -------
-    array, m²
-        Of the broadcast shape; its mean over the draws is `mean_rcs_m2`. Larger draws give larger
-        RCS.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the shapes do not fit.
-
-    Notes
-    -----
-    Thesis eq. 22 with N = 1 (eq. 23: the exponential in power, Rayleigh in amplitude) and N = 2.
+    Of ``swerling1`` and ``swerling3`` there is one draw per scan; of ``swerling2`` and
+    ``swerling4`` one per pulse, along the last axis, with which the mean broadcasts before it.
+    Larger draws give larger RCS. Thesis eq. 22 with N = 1 (eq. 23: the exponential in power,
+    Rayleigh in amplitude) and N = 2.
     """
     name = checked_model(model)
     mean, draw = not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
@@ -84,34 +61,13 @@ def scan_rcs(
     pulses: int,
     model: str,
 ) -> FloatArray:
-    """Return the RCS that a scan's pulses show on average, sampled.
+    """Return the RCS that a scan's pulses show on average, sampled, m².
 
     One draw per scan for ``swerling1`` and ``swerling3``; one per pulse for ``swerling2`` and
-    ``swerling4``, whose RCS are averaged. That average is all a square-law detector needs: with a
-    steady echo in each pulse the sum of n pulses depends only on the sum of their SNR. So a steady
-    target's Pd at the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
-
-    Parameters
-    ----------
-    mean_rcs_m2 : (m,) array, m²
-    draw : function
-        Uniform draws in [0, 1), shape (m,), of a given number: 0 for the scan, 0 ... pulses - 1.
-    pulses : int
-    model : str
-        As for `components.radar.rcs.fluctuating_rcs`.
-
-    Returns
-    -------
-    (m,) array, m²
-
-    Raises
-    ------
-    ValueError
-        If the model is unknown, or an RCS or a draw is out of range.
-
-    Notes
-    -----
-    Thesis §4.1.2: RCS constant within a scan (I, III) or from pulse to pulse (II, IV).
+    ``swerling4``, whose RCS are averaged (thesis §4.1.2). `draw` gives uniform numbers in [0, 1) by
+    the number of the pulse. That average is all a square-law detector needs: with a steady echo in
+    each pulse the sum of n pulses depends only on the sum of their SNR. So a steady target's Pd at
+    the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
     """
     name = checked_model(model)
     if name == "swerling0":
@@ -126,16 +82,7 @@ def scan_rcs(
 
 
 def mean_rcs_m2(cells: Cells) -> FloatArray:
-    """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant.
-
-    Parameters
-    ----------
-    cells : Cells
-
-    Returns
-    -------
-    (cells,) array, m²
-    """
+    """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
     tables, place = cells.roster.tables("rcs_table")
     if not tables:
@@ -211,14 +158,7 @@ class AspectRcs(Effect):
 def models_of(swerling: int | None) -> ModelsOfCells:
     """Return what tells each cell's fluctuation model: one for all, or each target its own.
 
-    Parameters
-    ----------
-    swerling : int or None
-
-    Returns
-    -------
-    function
-        From cells to pairs of a model (5 written as 0) and the cells it holds for.
+    It gives pairs of a model (5 written as 0) and the cells that it holds for.
     """
     if swerling is not None:
         return lambda cells: [(swerling % 5, slice(None))]
@@ -266,27 +206,14 @@ FIXED, CHANGING = 48, 8
 
 
 class Scatterers:
-    """Scatterers at fixed places of each target's body, evenly spread over a ball.
+    """Scatterers at fixed places of each target's body, evenly spread over a ball of `extent_m`.
 
-    Parameters
-    ----------
-    stream : Stream
-        Used by nothing else.
-    extent_m : float
-        Diameter of the ball.
-    wavelength_m : float
-    count : int
-        Scatterers of an echo.
-
-    Notes
-    -----
     An echo that goes to a scatterer at r and back has the phase 4π r·u / λ for the direction u to
-    the radar. The sum of many with complex Gaussian strengths is a complex Gaussian
-    amplitude; over targets its correlation between two aspects Δ apart is that of the ball,
-    3 (sin x - x cos x) / x³ with x = 2π Δ extent / λ: half of it is left at Δ = 0.40 λ / extent,
-    nothing at 0.72 λ / extent. For the usual estimate λ / (2 extent): D. K. Barton, *Modern Radar
-    System Analysis*, 1988, section 2.4; M. I. Skolnik, *Introduction to Radar Systems*, 3rd ed.,
-    section 2.8.
+    the radar. The sum of many with complex Gaussian strengths is a complex Gaussian amplitude; over
+    targets its correlation between two aspects Δ apart is that of the ball, 3 (sin x - x cos x) /
+    x³ with x = 2π Δ extent / λ: half of it is left at Δ = 0.40 λ / extent, nothing at 0.72 λ /
+    extent. For the usual estimate λ / (2 extent): D. K. Barton, *Modern Radar System Analysis*,
+    1988, section 2.4; M. I. Skolnik, *Introduction to Radar Systems*, 3rd ed., section 2.8.
     """
 
     def __init__(
@@ -305,23 +232,10 @@ class Scatterers:
     ) -> tuple[FloatArray, FloatArray]:
         """Return real and imaginary part of the amplitude of echoes, each of variance 1.
 
-        Parameters
-        ----------
-        keys : (n,) array of uint64
-            Of the targets.
-        aspect : three (n,) arrays
-            Unit vector to the radar in the target's body axes.
-        which : int
-            Of a target's independent echoes.
-        strengths : callable, optional
-            From a scatterer's number to standard normal numbers, (n,) twice; by default they are
-            fixed to the target.
-        replica : (n,) array of int, optional
-            Where replicas run in lock step, whose targets they are.
-
-        Returns
-        -------
-        two (n,) arrays
+        `aspect` is the unit vector to the radar in the target's body axes, `which` the number of a
+        target's independent echo, and `strengths` gives standard normal numbers by a scatterer's
+        number; by default they are fixed to the target. `replica` says whose the targets are where
+        replicas run in lock step.
         """
         whose = np.zeros(len(keys), dtype=np.uint64) if replica is None else replica
         pairs = np.stack([keys, whose.astype(np.uint64)])
@@ -363,24 +277,12 @@ Fading = Callable[[Cells, Any, int], FloatArray]
 
 
 def fading_power(amplitudes: list[FloatArray]) -> FloatArray:
-    """Return the power of an echo over its mean, from the real and imaginary parts of amplitudes.
+    """Return the power of an echo over its mean from independent standard normal amplitudes.
 
-    Parameters
-    ----------
-    amplitudes : list of arrays
-        Independent standard normal processes: two for exponential power (one complex amplitude of
-        many scatterers, Swerling I and II), four for chi-square of 4 degrees of freedom (two such
-        amplitudes, III and IV).
-
-    Returns
-    -------
-    array
-        Of mean 1. Where the amplitudes are correlated with ρ, it is with ρ².
-
-    Notes
-    -----
-    The complex Gaussian amplitude behind the Swerling cases: P. Swerling, "Probability of detection
-    for fluctuating targets", IRE Trans. IT-6(2), 1960.
+    Two of them (real and imaginary part) for exponential power (one complex amplitude of many
+    scatterers, Swerling I and II), four for chi-square of 4 degrees of freedom (two such
+    amplitudes, III and IV). Where they are correlated with ρ, the power is with ρ². P. Swerling,
+    "Probability of detection for fluctuating targets", IRE Trans. IT-6(2), 1960.
     """
     total = np.zeros_like(amplitudes[0])
     for part in amplitudes:

@@ -23,16 +23,9 @@ from dsa_des.errors import Disagreements
 
 @dataclass(frozen=True)
 class ResolutionCells:
-    """Describe the grid of resolution cells that fills a radar's field of view.
+    """The grid of resolution cells that fills a field of view: `resolution_cells` builds it.
 
-    Build it with `resolution_cells`.
-
-    Parameters
-    ----------
-    azimuth, elevation, range : int
-        Number of cells along each axis.
-    azimuth_rad, elevation_rad, range_m : (float, float)
-        First edge and width of the field of view along each axis.
+    By axis the number of cells, and the first edge and width of the field of view.
     """
 
     azimuth: int
@@ -60,27 +53,10 @@ def resolution_cells(
     range_cell_m: float,
     azimuth_start_rad: float = 0.0,
 ) -> ResolutionCells:
-    """Return the grid of resolution cells of a field of view.
+    """Return the grid of resolution cells of a field of view, or refuse over 1e15 of them.
 
-    Parameters
-    ----------
-    azimuth_start_rad, azimuth_width_rad : float, rad
-        The field of view runs clockwise from the start over the width, (0, 2π].
-    lowest_elevation_rad, highest_elevation_rad : float, rad
-    nearest_m, farthest_m : float, m
-        Ranges processed; blind range excluded.
-    azimuth_cell_rad, elevation_cell_rad, range_cell_m : float
-        Size of a resolution cell, above 0. A remainder counts as a cell; the cells of an axis are
-        then made equally a little smaller, so that they fill the field of view.
-
-    Returns
-    -------
-    ResolutionCells
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, or there would be over 1e15 cells.
+    A remainder counts as a cell; the cells of an axis are then made equally a little smaller, so
+    that they fill the field of view, which runs clockwise from its start.
     """
     values = {
         "azimuth_cell_rad": azimuth_cell_rad,
@@ -209,17 +185,7 @@ def azimuth_width_rad(reach: Reach) -> float:
 
 
 def cell_size(parameters: Any) -> tuple[float, float, float]:
-    """Return the size of a radar's resolution cell: its beam, or the step of its grid.
-
-    Parameters
-    ----------
-    parameters : RadarParameters
-
-    Returns
-    -------
-    azimuth_rad, elevation_rad, range_m : float
-        0 where neither is given.
-    """
+    """Return the size of a resolution cell (rad, rad, m): its beam, or its grid's step, or 0."""
     widths = [
         getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in CELL_SIZES
     ]
@@ -227,24 +193,7 @@ def cell_size(parameters: Any) -> tuple[float, float, float]:
 
 
 def cells_of_radar(block: Any) -> ResolutionCells:
-    """Return the resolution cells of a radar block's field of view.
-
-    Parameters
-    ----------
-    block : Sensor
-        A radar with a link budget.
-
-    Returns
-    -------
-    ResolutionCells
-        From the minimum range to ``range_km``.
-
-    Raises
-    ------
-    ValueError
-        If a resolution is 0 and no beamwidth given, ``range_km`` is not given, or there is no
-        range between the two.
-    """
+    """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
     p = block.p
     azimuth_rad, elevation_rad, range_m = cell_size(p)
     for width, (_, name) in zip((azimuth_rad, elevation_rad, range_m), CELL_SIZES, strict=True):
@@ -314,19 +263,7 @@ class Merging:
         self._widths = cell_size(block.p)
 
     def __call__(self, cells: Cells, power: FloatArray) -> FloatArray:
-        """Return the power of the echo that stands for its resolution cell, and 0 of the others.
-
-        Parameters
-        ----------
-        cells : Cells
-        power : (cells,)
-            0 where there is no echo.
-
-        Returns
-        -------
-        (cells,) array
-            The sum over the resolution cell.
-        """
+        """Return each cell's summed power for its strongest echo, and 0 for the others."""
         if len(cells) < 2 or not (np.diff(cells.row) == 0).any():
             return power
         block = self._block

@@ -231,15 +231,7 @@ class LinkBudgetRadar(Radar):
     ) -> Detections:
         """Return a report with what is not there beside, reported as if it were.
 
-        Parameters
-        ----------
-        detections : Detections
-        targets : RelativeTargets
-        rows : (scans,) of int
-            As every report is given them.
-        alarms : Alarms
-        cued : bool, optional
-            Whether only those that are reported inside cue cones are kept, or those outside.
+        `cued` says whether only those inside cue cones are kept, or those outside; None keeps all.
         """
         where, row = dict(alarms.where), alarms.row
         if self.p.measures_range_rate:

@@ -21,15 +21,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class BeamPositions:
-    """Say how many beams fill a field of view: columns in azimuth, bars in elevation.
-
-    Build it with `beam_positions`.
-
-    Parameters
-    ----------
-    azimuth, elevation : int
-        Beams side by side and one above the other.
-    """
+    """How many beams fill a field of view, side by side and one above the other."""
 
     azimuth: int
     elevation: int
@@ -56,34 +48,14 @@ def beam_positions(
     elevation_beamwidth_rad: float,
     spacing: float = 1.0,
 ) -> BeamPositions:
-    """Return the beam positions that search a field of view.
+    """Return the beam positions that search a field of view, `spacing` beamwidths apart.
 
-    Parameters
-    ----------
-    azimuth_width_rad, elevation_width_rad : float, rad
-        The volume searched, above 0.
-    azimuth_beamwidth_rad, elevation_beamwidth_rad : float, rad
-        Half-power beamwidths, above 0.
-    spacing : float
-        From beam to beam, in beamwidths; below 1 beams overlap.
-
-    Returns
-    -------
-    BeamPositions
-
-    Raises
-    ------
-    ValueError
-        If an argument is not above 0.
-
-    Notes
-    -----
-    The number of beams is the solid angle searched over that of a beam,
-    ``n_B = (Θ_A Θ_E) / (θ_a θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z.
-    Elsherbeni, *MATLAB Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65.
-    Here each axis is rounded up to whole beams, as a radar steps them. A beam that sweeps goes
-    through one column of beams after the other, so that it lights an azimuth once per scan. At an
-    elevation ε beams one step of azimuth apart overlap by 1 - cos ε more; nobody saves beams by it.
+    The number of beams is the solid angle searched over that of a beam, ``n_B = (Θ_A Θ_E) / (θ_a
+    θ_e)``, and a scan takes ``T = n_B · dwell``: B. R. Mahafza and A. Z. Elsherbeni, *MATLAB
+    Simulations for Radar Systems Design*, 2004, section 1.8, eq. 1.61-1.65. Here each axis is
+    rounded up to whole beams, as a radar steps them. A beam that sweeps goes through one column of
+    beams after the other, so that it lights an azimuth once per scan. At an elevation ε beams one
+    step of azimuth apart overlap by 1 - cos ε more; nobody saves beams by it.
     """
     counts = []
     for name, width, beam in (
@@ -120,20 +92,11 @@ _ROUNDED_DB = 0.05
 
 @dataclass(frozen=True)
 class LookEnergy:
-    """What one look at a target consists of.
+    """What one look at a target consists of: its beams, its time and its pulses.
 
-    Parameters
-    ----------
-    beams : BeamPositions
-    dwell_s : float
-        Time on one beam.
-    pulses : int or None
-        Pulses in it; None without a PRF.
-    gain : float
-        Of the energy that is added up coherently, over that of the look which the link budget is
-        for; 1 where pulses are summed non-coherently.
-    summed : int
-        Pulses summed non-coherently.
+    `pulses` is None without a PRF. `gain` is that of the energy added up coherently over that of
+    the look which the link budget is for, 1 where pulses are summed non-coherently, `summed` of
+    them.
     """
 
     beams: BeamPositions
@@ -316,20 +279,7 @@ class TimeBudgetParameters(ResolutionParameters):
             )
 
     def check_pulses_once(self, pulses: int, integration_gain_db: float) -> None:
-        """Refuse pulses that are counted twice, or that the stated look does not have.
-
-        Parameters
-        ----------
-        pulses : int
-            Pulses that the scene has summed non-coherently.
-        integration_gain_db : float
-            Coherent gain that the scene puts into the link budget.
-
-        Raises
-        ------
-        ValueError
-            If the two together need more pulses than there are (errata 6).
-        """
+        """Refuse pulses that are counted twice or that the stated look does not have (errata 6)."""
         if self.budget == "dwell" and pulses > 1:
             raise ValueError(
                 f"pulses is {pulses} and budget is 'dwell', which counts the pulses of a look "
@@ -404,14 +354,7 @@ class TimeBudget(Effect):
 
 
 def time_report(name: str, parameters: Any) -> dict[str, Any]:
-    """Return the section of the run's summary that says what a scan's time is spent on.
-
-    Parameters
-    ----------
-    name : str
-        The radar's.
-    parameters : TimeBudgetParameters
-    """
+    """Return the section of the run's summary that says what a scan's time is spent on."""
     if (look := parameters.look_energy) is None:
         return {}
     return {

@@ -106,12 +106,7 @@ def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
 
 
 def deaf_to_weather(block: Any) -> list[str]:
-    """Say that weather does nothing to a radar whose carrier is not known.
-
-    Parameters
-    ----------
-    block : Radar
-    """
+    """Say that weather does nothing to a radar whose carrier is not known."""
     weather = block.context.sections.get("weather")
     if weather is None or block.wavelength_m is not None or not block.p.enabled:
         return []
@@ -144,12 +139,7 @@ class Gas(Attenuation):
 
 
 def said_of_rain(block: Any) -> list[str]:
-    """Say where rain has no echo, or where its echo is taken for more than it is.
-
-    Parameters
-    ----------
-    block : Radar
-    """
+    """Say where rain has no echo, or where its echo is taken for more than it is."""
     weather = block.context.sections.get("weather")
     if weather is None or not weather.rain_rate_mm_h or not block.p.enabled:
         return []
@@ -175,17 +165,8 @@ _RANGE_WITHOUT_ONE_M = 10e3
 def gas_left_out(block: Any) -> list[str]:
     """Say what clear air would take from a radar above 10 GHz in a scene without gas.
 
-    It is not on by default: a radar calibrated by a range that was measured through air has the
-    air in its calibration already, and scenes keep their values.
-
-    Parameters
-    ----------
-    block : a radar with a link budget
-
-    Returns
-    -------
-    list of str
-        Empty where gas is simulated, or where it hardly matters.
+    It is not on by default: a radar calibrated by a range that was measured through air has the air
+    in its calibration already, and scenes keep their values.
     """
     weather = block.context.sections.get("weather")
     frequency_hz = SPEED_OF_LIGHT_M_S / block.budget.wavelength

@@ -22,31 +22,15 @@ def albersheim_probability(
 ) -> FloatArray:
     """Return Pd of a steady target by inverting Albersheim's equation for the SNR required.
 
-    Stated validity: swerling0, Pd 0.1 to 0.9, Pfa 1e-7 to 1e-3, 1 to 8096 pulses. It claims 0.2 dB
-    and was fitted to a linear detector. Against the exact square-law detector we measure 0.08 dB
-    at 1 pulse and Pd above 0.5, 0.33 dB over all pulses and Pd above 0.3, but 0.9 dB at Pd 0.2 and
-    4.1 dB at Pd 0.1 (1 pulse, Pfa 1e-3). Worst absolute error of Pd: 0.11 (8096 pulses, Pfa 1e-7).
+    Stated validity: swerling0, Pd 0.1 to 0.9, Pfa 1e-7 to 1e-3, 1 to 8096 pulses; outside it is
+    refused. It claims 0.2 dB and was fitted to a linear detector. Against the exact square-law
+    detector we measure 0.08 dB at 1 pulse and Pd above 0.5, 0.33 dB over all pulses and Pd above
+    0.3, but 0.9 dB at Pd 0.2 and 4.1 dB at Pd 0.1 (1 pulse, Pfa 1e-3). Worst absolute error of Pd:
+    0.11 (8096 pulses, Pfa 1e-7).
 
-    Parameters
-    ----------
-    snr : (m,) contiguous array, linear, 0 or more
-    pulses, false_alarm_probability, model
-        Checked and canonical.
-
-    Returns
-    -------
-    (m,) array
-
-    Raises
-    ------
-    ValueError
-        Outside the stated validity; for an SNR the message gives the range allowed.
-
-    Notes
-    -----
-    W. J. Albersheim, "A closed-form approximation to Robertson's detection characteristics",
-    Proc. IEEE 69 (7), 1981: with A = ln(0.62/Pfa) and B = ln(Pd/(1-Pd)),
-    SNR_dB = -5 log10 n + (6.2 + 4.54/sqrt(n + 0.44)) log10(A + 0.12 A B + 1.7 B).
+    W. J. Albersheim, "A closed-form approximation to Robertson's detection characteristics", Proc.
+    IEEE 69 (7), 1981: with A = ln(0.62/Pfa) and B = ln(Pd/(1-Pd)), SNR_dB = -5 log10 n + (6.2 +
+    4.54/sqrt(n + 0.44)) log10(A + 0.12 A B + 1.7 B).
     """
     if model != "swerling0":
         raise ValueError(
@@ -91,29 +75,12 @@ def gram_charlier_probability(
 ) -> FloatArray:
     """Return Pd of a steady target by three terms of the Gram-Charlier series, clipped to [0, 1].
 
-    Covers swerling0 only: the thesis gives the series' constants for no other model. Any number
-    of pulses and any Pfa, but it is an approximation: worst absolute error over all SNR and Pfa of
+    Covers swerling0 only: the thesis gives the series' constants for no other model. Any number of
+    pulses and any Pfa, but it is an approximation: worst absolute error over all SNR and Pfa of
     1e-12 to 0.1, 0.025 at 1 pulse, 0.010 at 2, 0.003 at 5, 0.001 at 10 and 5e-5 at 100 (at Pfa
-    1e-4: 0.0062, 0.0039, 0.0017, 0.0008 and 5e-5); before clipping it exceeds 1 by up to 0.001,
-    and it is not monotonic in SNR nor bounded by Pfa.
+    1e-4: 0.0062, 0.0039, 0.0017, 0.0008 and 5e-5); before clipping it exceeds 1 by up to 0.001, and
+    it is not monotonic in SNR nor bounded by Pfa.
 
-    Parameters
-    ----------
-    snr : (m,) contiguous array, linear, 0 or more
-    pulses, false_alarm_probability, model
-        Checked and canonical.
-
-    Returns
-    -------
-    (m,) array
-
-    Raises
-    ------
-    ValueError
-        For a model other than swerling0.
-
-    Notes
-    -----
     Thesis eq. 26-31 with the factor 1/sqrt(2 pi) that eq. 27 lacks (B. R. Mahafza, Radar Systems
     Analysis and Design Using MATLAB, has it). Without it Pd reaches 1.0074 at 5 pulses, Pfa 1e-4
     and 8 dB, where the exact value is 0.9958.
@@ -162,27 +129,11 @@ def shnidman_probability(
 ) -> FloatArray:
     """Return Pd by inverting Shnidman's equation for the SNR required.
 
-    Stated validity: all Swerling models, Pd 0.1 to 0.99, Pfa 1e-9 to 1e-3, 1 to 100 pulses.
-    Measured worst absolute error of Pd within that, for swerling0 … 4: 0.052, 0.036, 0.048, 0.045,
-    0.042; of the SNR required: 0.3, 1.2, 1.2, 0.7, 0.6 dB. The inverse itself is good to 2e-8.
+    Stated validity, outside of which it is refused: all Swerling models, Pd 0.1 to 0.99, Pfa 1e-9
+    to 1e-3, 1 to 100 pulses. Measured worst absolute error of Pd within that, for swerling0 … 4:
+    0.052, 0.036, 0.048, 0.045, 0.042; of the SNR required: 0.3, 1.2, 1.2, 0.7, 0.6 dB. The inverse
+    itself is good to 2e-8.
 
-    Parameters
-    ----------
-    snr : (m,) contiguous array, linear, 0 or more
-    pulses, false_alarm_probability, model
-        Checked and canonical.
-
-    Returns
-    -------
-    (m,) array
-
-    Raises
-    ------
-    ValueError
-        Outside the stated validity; for an SNR the message gives the range allowed.
-
-    Notes
-    -----
     D. A. Shnidman, "Determination of required SNR values", IEEE Trans. Aerospace and Electronic
     Systems 38 (3), 2002. The required SNR steps up at Pd 0.872; within that step Pd is 0.872.
     """
@@ -307,16 +258,6 @@ def table_probability(
     Absolute error below 1e-6 over all SNR (worst measured 2.9e-8 over the five models, pulses 1 to
     1000 and Pfa 1e-12 to 0.1), Pfa at SNR 0, rising with SNR up to one rounding, never outside
     [Pfa, 1]. About 30 ns per element; building takes some 10 ms and 200 kB.
-
-    Parameters
-    ----------
-    snr : (m,) contiguous array, linear, 0 or more
-    pulses, false_alarm_probability, model
-        Checked and canonical.
-
-    Returns
-    -------
-    (m,) array
     """
     table = detection_table(pulses, false_alarm_probability, model)
     inside = np.minimum(np.maximum(snr, table.lowest), np.nextafter(table.highest, 0.0))

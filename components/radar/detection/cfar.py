@@ -52,32 +52,12 @@ def cfar_detection_probability(
     pulses: int = 1,
     model: str = "swerling1",
 ) -> Any:
-    """Return the probability of detection of a cell-averaging CFAR detector.
+    """Return the probability of detection of a cell-averaging CFAR detector, to 1e-12.
 
-    Parameters
-    ----------
-    snr : array_like
-        Mean power of the target over that of noise and clutter, per pulse, linear, 0 to infinity.
-        0 gives the false alarm probability.
-    reference_cells : int
-        Cells averaged, 4 to 1000. Each holds the sum of as many pulses as the cell under test.
-    false_alarm_probability : float
-        Strictly between 0 and 1.
-    pulses : int
-        Summed non-coherently, 1 to 1000.
-    model : str
-        ``swerling0`` (or ``swerling5``) … ``swerling4``.
-
-    Returns
-    -------
-    array of the shape of `snr`
-        In [0, 1], to an absolute error below 1e-12. For Swerling I and one pulse it is
-        ``(1 + a / (1 + snr))**-N`` with ``a = Pfa**(-1 / N) - 1``.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the model unknown.
+    `snr` is the target's mean power over that of noise and clutter, per pulse, linear, 0 (which
+    gives the false alarm probability) to infinity; each of the 4 to 1000 reference cells holds the
+    sum of as many pulses as the cell under test. For Swerling I and one pulse it is ``(1 + a / (1 +
+    snr))**-N`` with ``a = Pfa**(-1 / N) - 1``.
     """
     ratio = checked_snr(snr)
     name = checked_model(model)
@@ -114,25 +94,7 @@ def cfar_required_snr(
     pulses: int = 1,
     model: str = "swerling1",
 ) -> float:
-    """Return the mean SNR per pulse at which a cell-averaging CFAR detector has Pd `pd`.
-
-    Parameters
-    ----------
-    pd : float
-        Above the false alarm probability, below 1.
-    reference_cells, false_alarm_probability, pulses, model
-        As for `cfar_detection_probability`.
-
-    Returns
-    -------
-    float
-        Linear power ratio, to about 1e-12 relative.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
-    """
+    """Return the mean SNR per pulse at which a cell-averaging CFAR detector has Pd `pd`, linear."""
     wanted = float(checked_probability("pd", pd))
     count, pfa, n = _checked(reference_cells, false_alarm_probability, pulses)
     if wanted <= pfa:
@@ -151,18 +113,7 @@ def cfar_loss_db(
     pulses: int = 1,
     model: str = "swerling1",
 ) -> float:
-    """Return the CFAR loss in dB: the SNR needed beyond that with a threshold known exactly.
-
-    Parameters
-    ----------
-    pd, reference_cells, false_alarm_probability, pulses, model
-        As for `cfar_required_snr`.
-
-    Returns
-    -------
-    float
-        dB, above 0.
-    """
+    """Return the CFAR loss in dB: the SNR needed beyond that with a threshold known exactly."""
     known = required_snr(
         pd, pulses=pulses, false_alarm_probability=false_alarm_probability, model=model
     )
@@ -317,12 +268,7 @@ class CellAveraging(Effect):
 
 
 class Averaging:
-    """A cell-averaging detector with one radar's pulses and probability of false alarm.
-
-    Parameters
-    ----------
-    parameters : LinkBudgetParameters
-    """
+    """A cell-averaging detector with one radar's pulses and probability of false alarm."""
 
     def __init__(self, parameters: Any) -> None:
         self._settings = {

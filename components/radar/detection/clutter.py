@@ -29,26 +29,12 @@ _CHUNK = 4096
 def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: float) -> FloatArray:
     """Return the probability that a steady signal in unit noise crosses a threshold.
 
-    Q_1(sqrt(2 signal), sqrt(2 threshold)) for flat arrays.
+    Q_1(sqrt(2 signal), sqrt(2 threshold)) for flat arrays of power ratios, in the unit in which
+    noise alone is Exponential(1), to a relative error below 1e-14 (1 - Q: below 1e-12 while it is
+    above 1e-4). `largest_threshold` sets the number of terms, so that an element's bits depend on
+    nothing else; above 240 (a false-alarm probability of 1e-104) thresholds beyond 240 have an
+    asymptotic form, with an absolute error below 1e-4.
 
-    Parameters
-    ----------
-    signal : (m,) array
-        Power ratio, 0 or more.
-    threshold : (m,) array
-        In [0, largest_threshold], in the unit in which noise alone is Exponential(1).
-    largest_threshold : float
-        It sets the number of terms, so that an element's bits depend on nothing else. Above 240
-        (a false-alarm probability of 1e-104) thresholds beyond 240 have an asymptotic form, with
-        an absolute error below 1e-4.
-
-    Returns
-    -------
-    (m,) array
-        In [0, 1], relative error below 1e-14 (1 - Q: below 1e-12 while it is above 1e-4).
-
-    Notes
-    -----
     With N Poisson(signal) and M Poisson(threshold) this is Pr(M <= N): summed over N where the
     signal is below the threshold, its complement over M elsewhere. All terms are positive.
     """
@@ -116,48 +102,19 @@ def clutter_detection_probability(
     threshold: str = "noise",
     noise_threshold: float | None = None,
 ) -> Any:
-    """Return the probability that the cell of a target in clutter crosses the threshold.
+    """Return the probability that a target's cell with clutter crosses the threshold, in one look.
 
-    Parameters
-    ----------
-    snr : array_like
-        Mean signal-to-noise power ratio S, linear, 0 or more.
-    cnr : array_like
-        Power of the clutter's mean over the noise, C, linear, 0 or more. Where `cnr` and
-        `diffuse_cnr` are 0 the result is `detection_probability`'s, to the bit.
-    false_alarm_probability : float
-        Of noise alone: it sets the threshold V. 1e-100 to below 1.
-    model : str
-        ``swerling0`` (or ``swerling5``) … ``swerling4``. In one look I and II are the same, and
-        so are III and IV.
-    clutter : {"constant", "fluctuating"}
-        Whether the clutter's mean fluctuates from look to look.
-    diffuse_cnr : array_like
-        Power of the clutter's zero-mean part over the noise, D, linear, 0 or more.
-    threshold : {"noise", "adaptive"}
-        Whether the threshold stays where noise alone has it, or rises with the mean power of noise
-        and clutter, V (1 + C + D). Then the false alarms of fluctuating clutter stay what they
-        are, and those of a constant mean are fewer.
-    noise_threshold : float, optional
-        V itself, 0 or more, in place of the probability that noise crosses it, which a double may
-        not hold.
+    `snr`, `cnr` and `diffuse_cnr` are S, C and D above, linear, 0 or more; without clutter the
+    result is `detection_probability`'s, to the bit. The `clutter` mean is ``constant`` or
+    ``fluctuating`` from look to look. The `threshold` stays where noise alone has it (``noise``, at
+    `noise_threshold` or by `false_alarm_probability`, 1e-100 to below 1), or rises with the mean
+    power of noise and clutter, V (1 + C + D) (``adaptive``): the false alarms of fluctuating
+    clutter then stay what they are, and those of a constant mean are fewer.
 
-    Returns
-    -------
-    array of the broadcast shape
-        In [0, 1].
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or a name unknown.
-
-    Notes
-    -----
-    One look (pulses = 1); for several, clutter's phase against the target's from pulse to pulse
-    would have to be known. Formulas above; relative error below 1e-13 (1e-12 of the miss), except a
-    steady target in constant clutter: a mean over 64 phases, good to 1e-14 while the weaker of
-    the two is below 20 dB, to 1e-8 at 25 dB and 1e-4 at 30 dB.
+    For several pulses clutter's phase against the target's from pulse to pulse would have to be
+    known. Relative error below 1e-13 (1e-12 of the miss), except a steady target in constant
+    clutter: a mean over 64 phases, good to 1e-14 while the weaker of the two is below 20 dB, to
+    1e-8 at 25 dB and 1e-4 at 30 dB.
     """
     name = checked_model(model)
     kind = one_of("clutter", clutter, KINDS)

@@ -175,14 +175,7 @@ def closed_form(block: Any) -> bool:
 
 
 def picked_method(block: Any, method: str) -> list[str]:
-    """Say why a radar with ``model = "auto"`` computes Pd as it does.
-
-    Parameters
-    ----------
-    block : SwerlingRadar
-        After its setup.
-    method : {"exact", "table"}
-    """
+    """Say why a radar with ``model = "auto"`` computes Pd exactly or by a table."""
     allowed = block.context.sections["accuracy"].detection_probability
     if method == "table":
         said = f"table, its error is at most {TABLE_ERROR:g} and [accuracy] allows {allowed:g}"

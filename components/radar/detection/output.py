@@ -40,34 +40,13 @@ def measured_snr(
 ) -> Any:
     """Return the SNR that a detection seems to have, given that it crosses the threshold.
 
-    Parameters
-    ----------
-    tail : array_like
-        In [0, 1], one per detection: the share of detections of such echoes that come out
-        stronger. Uniform numbers give the distribution.
-    snr : array_like
-        The echo's mean SNR (linear, per pulse), 0 or more; 0 is noise alone.
-    threshold : array_like
-        That the sum of pulses crosses, 0 or more, in units of a pulse's mean noise.
-    pulses : int
-        Summed non-coherently.
-    model : str
-        ``swerling0`` (or ``swerling5``) … ``swerling4``.
+    Detector output over its mean for noise, minus 1, linear, per pulse, never below 0. `tail` in
+    [0, 1] is the share of detections of such echoes that come out stronger, so that uniform numbers
+    give the distribution; `snr` the echo's mean SNR per pulse, 0 for noise alone; `threshold` that
+    of the sum of pulses, in units of a pulse's mean noise.
 
-    Returns
-    -------
-    array of the broadcast shape, linear power ratio per pulse
-        Detector output over its mean for noise, minus 1; never below 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range or the model unknown.
-
-    Notes
-    -----
-    The inverse of each model's own survival function: of the noncentral chi-square distribution
-    (J. I. Marcum, RAND RM-754, 1947), and of those of P. Swerling, "Probability of detection for
+    The inverse of each model's own survival function: of the noncentral chi-square distribution (J.
+    I. Marcum, RAND RM-754, 1947), and of those of P. Swerling, "Probability of detection for
     fluctuating targets", IRE Trans. IT-6(2), 1960. A noncentral one of more than 50 dB has a normal
     amplitude.
     """
@@ -150,19 +129,7 @@ def _solved_beyond(
 
 
 def survival_of_sum(output: FloatArray, snr: FloatArray, pulses: int, model: str) -> FloatArray:
-    """Return the probability that the sum of pulses of a fluctuating echo exceeds a value.
-
-    Parameters
-    ----------
-    output, snr : (n,) arrays
-        The value, 0 or more; the mean SNR of a pulse, above 0.
-    pulses : int
-    model : {"swerling1", "swerling3", "swerling4"}
-
-    Returns
-    -------
-    (n,) array
-    """
+    """Return the probability that the sum of pulses of an echo of model I, III or IV is larger."""
     from scipy.special import gammainc, gammaincc
 
     if model == "swerling4":
@@ -211,30 +178,10 @@ MOST_CELLS, MOST_FALSE_ALARMS = 10**15, 1e7
 def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability: float) -> Any:
     """Return the number of false alarms of each scan: Binomial(cells, Pfa) from one uniform each.
 
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per scan.
-    cells : int
-        Resolution cells looked at in a scan, 0 or more.
-    false_alarm_probability : float
-        Per cell and look, in [0, 1].
-
-    Returns
-    -------
-    array of int64, the shape of `uniform`
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, or more than 1e7 false alarms are expected in a scan.
-
-    Notes
-    -----
-    The smallest count whose cumulative probability exceeds the uniform number. The probabilities
-    come from the most likely count outwards by exact ratios and are normalised by their own sum,
-    so that no factorial of a large number is needed; counts with a probability below 1e-20 of the
-    largest are left out. One table per (cells, Pfa), remembered.
+    The smallest count whose cumulative probability exceeds the uniform number; over 1e7 expected
+    ones are refused. The probabilities come from the most likely count outwards by exact ratios and
+    are normalised by their own sum, so that no factorial of a large number is needed; counts with a
+    probability below 1e-20 of the largest are left out. One table per (cells, Pfa), remembered.
     """
     number = _checked_cells(cells)
     pfa = as_numbers("false_alarm_probability", false_alarm_probability)
@@ -265,26 +212,8 @@ def false_alarm_snr(
 ) -> Any:
     """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
 
-    Parameters
-    ----------
-    uniform : array_like
-        In [0, 1), one per false alarm.
-    false_alarm_probability : float
-        Strictly between 0 and 1; it sets the threshold.
-    pulses : int
-        Pulses summed non-coherently.
-    threshold : float, optional
-        The threshold itself, where it is known.
-
-    Returns
-    -------
-    array, linear power ratio per pulse
-        Detector output over its mean, minus 1; never below 0.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
+    One uniform number in [0, 1) each; the threshold follows from the probability where it is not
+    given. Detector output over its mean, minus 1; linear, per pulse, never below 0.
     """
     draws = _checked_uniform("uniform", uniform)
     if threshold is None:

@@ -178,16 +178,10 @@ def _sum_from(pulses: int, mean: float) -> float:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Hold the threshold of a look, and how often noise alone crosses it.
+    """The threshold of a look, and how often noise alone crosses it.
 
-    Parameters
-    ----------
-    pulses : int
-        Summed non-coherently.
-    false_alarm_probability : float
-        Per look and cell; 0 where a double cannot hold it.
-    threshold : float
-        That the sum of pulses crosses, in units of a pulse's mean noise.
+    The threshold is on the sum of pulses, in units of a pulse's mean noise; the probability of
+    false alarm is per look and cell, and 0 where a double cannot hold it.
     """
 
     pulses: int
@@ -211,18 +205,11 @@ class Crossing:
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """Hold what the detection series need to know of the noise and the threshold.
+    """What the detection series need to know of the noise and the threshold V_T.
 
-    Parameters
-    ----------
-    pulses, false_alarm_probability, threshold : numbers
-    term : (m,) array
-        g(pulses + j) for j = 0, 1, …: the Poisson probabilities with mean V_T.
-    missed : (m,) array
-        P(pulses + j, V_T): the sum of the terms from j on. It is the probability that noise of
-        pulses + j pulses stays below the threshold.
-    gained : (m,) array
-        P(pulses, V_T) - P(pulses + j, V_T): the sum of the terms before j.
+    `term` holds g(pulses + j) for j = 0, 1, …, the Poisson probabilities with mean V_T; `missed`
+    their sums from j on, P(pulses + j, V_T), the probability that noise of pulses + j pulses stays
+    below the threshold; `gained` the sums before j.
     """
 
     pulses: int
