@@ -14,7 +14,8 @@ from components.traffic.culling import Culling
 from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints
 from components.traffic.trajectory import SampledTrajectory
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

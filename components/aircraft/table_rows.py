@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from dsa_des.block.limits import refuse_extremes
+from dsa_des.block.parameters import refuse_extremes
 from dsa_des.files.input_files import InputFileError, read_input_text
 
 
@@ -51,7 +51,7 @@ def row_values(
         File and line, for messages.
     header, cells : names of the columns, and what the row has in them
     columns : numbers of the columns to read
-    quantities : what they hold, with units at the end (`dsa_des.block.limits`)
+    quantities : what they hold, with units at the end (`dsa_des.block.parameters`)
 
     Raises
     ------

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from dsa_des.files.unfinished import temporary_beside
+from dsa_des.files.output_file import temporary_beside
 
 
 @contextmanager

@@ -15,13 +15,14 @@ from matplotlib.patches import Polygon
 from scipy.stats import chi2
 
 import dsa_des
-from components.display.fields_of_view import draw_outline, outline_of
+from components.display.map_view import draw_outline, outline_of
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
 from components.sensor.mounting import BodyAxes
 from dsa_des.record.arrow import ParquetSink
-from dsa_des.record.recording import ObserverSink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import ObserverSink
 from dsa_des.running.simulation import Simulation
 
 START = -41.3, 179.98, 2200.0

@@ -12,7 +12,8 @@ from components.traffic.fleet import ScriptedFleet
 from components.traffic.legs import ScriptedTrajectory
 from components.traffic.steered_culling import SHORTEST_EPOCH_S, SteeredCulling
 from components.traffic.steered_flight import SteeredFlight
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

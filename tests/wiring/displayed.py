@@ -5,7 +5,8 @@ from typing import Any
 
 import dsa_des
 from components.cdti.scope import Scope
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 

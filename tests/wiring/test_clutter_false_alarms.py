@@ -13,7 +13,8 @@ from scipy.stats import binom, chi2, kstest, ncx2, norm
 from wired import alone, chain, noise_crosses, rows, run, sensor
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 PFA, GROUND_M, GAMMA_DB = 1e-3, 1500.0, -22.0

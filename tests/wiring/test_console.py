@@ -13,7 +13,8 @@ import dsa_des
 from components.messages.decisions import CLIMB, SHOWN, TURN, VERIFIED, OperatorDecision
 from components.operator.decision_table import read_decisions
 from components.operator.desk import MOST_WAITING, Desk, Laid
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation
@@ -161,6 +162,22 @@ def test_another_table_is_another_operator(tmp_path):
         for keys in ({}, {"decisions": str(other)})
     ]
     assert turns == [-0.6, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "more"), [(4, ""), (5, ""), (6, "and 1 more"), (8, "and 3 more")]
+)
+def test_five_problems_of_a_table_are_told_and_the_rest_counted(tmp_path, wrong, more):
+    path = tmp_path / "table.csv"
+    path.write_text("time_s,decision\n" + "1,trun\n" * wrong)
+    with pytest.raises(ValueError) as refused:
+        read_decisions(path)
+    said = str(refused.value).removeprefix(f"{path}: ").split("; ")
+    told = [part for part in said if "decision is 'trun'" in part]
+    assert [part.partition(":")[0] for part in told] == [
+        f"line {number + 2}" for number in range(min(wrong, 5))
+    ]
+    assert [part for part in said if " more" in part] == [more] * bool(more)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from scipy.stats import binom, chi2
 from wired import chain, noise_crosses, sensor
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 

@@ -16,7 +16,8 @@ from components.radar.detection import detection_probability
 from components.radar.rcs import Scatterers, fading_power
 from dsa_des.errors import SceneError
 from dsa_des.library.scenes import load_scene
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.time.randomness import Stream, target_keys

@@ -9,7 +9,8 @@ from covering import covers
 from wired import HEARS_ALL, SEES_ALL, chain, rows, run, sensor
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 ON = {"looks": True}

@@ -14,7 +14,7 @@ import dsa_des
 from components.encounters.ending import ClosestApproachPassed
 from dsa_des.block.run_end import RunEnd
 from dsa_des.block.wake import Wake
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas import replicas
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.scene.scene import load_scene

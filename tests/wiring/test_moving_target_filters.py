@@ -14,7 +14,8 @@ from wired import HEARS_ALL, chain, decided, noise_crosses, rows, run, sensor
 
 import dsa_des
 from dsa_des.errors import SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation
 

@@ -9,7 +9,8 @@ from covering import covers
 from wired import HEARS_ALL, chain, rows, run
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation

@@ -13,7 +13,8 @@ import pytest
 from wired import chain, rows, run, sensor
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 

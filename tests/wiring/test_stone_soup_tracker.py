@@ -17,7 +17,8 @@ from wired import chain, rows, run
 import dsa_des
 from components.tracking.stone_soup import StoneSoupTracker
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.simulation import Simulation

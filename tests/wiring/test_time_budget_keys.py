@@ -180,5 +180,6 @@ def test_what_fits_and_what_is_free_runs():
         {**FITS, "scan_rate_hz": "100/21"},
         {**FITS, "scan_rate_hz": 5, "budget": "free"},
         {**FITS, "prf_hz": 500.0, "integration_gain_db": 7.0},
+        {**VIEW, "prf_hz": 9993.0},  # c / (2 * 9993 Hz) is 15.0001 km, and range_km 15
     ):
         assert decided(alone("radar.threshold", **keys))

@@ -115,7 +115,8 @@ def test_variances_and_poses_go_through_the_fusion():
 
 def test_windows_and_single_scans_agree_on_late_rows():
     import dsa_des
-    from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.record.recording import Recorder
+    from dsa_des.record.sinks import MemorySink
     from dsa_des.running.simulation import Simulation
 
     scene = late_chain("fusion.gated", navigation={"position_noise_m": [3, 3, 3]})

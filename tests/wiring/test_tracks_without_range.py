@@ -8,7 +8,8 @@ from wired import chain, rows, run
 
 import dsa_des
 from components.messages.state_tracks import COVARIANCE
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.replicas.replicas import Replica, scene_of
 from dsa_des.running.simulation import Simulation

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from wired import chain, sensor
 
 from dsa_des.cli import main
-from dsa_des.files.toml_text import to_toml
+from dsa_des.files.toml_files import to_toml
 
 #: 13 km to the south-west, level with the ownship in its horizontal plane.
 FAR: dict[str, Any] = {

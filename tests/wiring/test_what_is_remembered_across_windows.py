@@ -5,7 +5,8 @@ import pytest
 from wired import HEARS_ALL, SEES_ALL, chain, sensor
 
 from dsa_des.library.scenes import load_scene
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 

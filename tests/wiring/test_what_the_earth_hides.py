@@ -277,7 +277,8 @@ def test_replicas_over_one_raster_run_in_lock_step():
     """Each reads its scene anew; the ground is the same one."""
     import pyarrow.compute as pc
 
-    from dsa_des.record.recording import MemorySink, Recorder
+    from dsa_des.record.recording import Recorder
+    from dsa_des.record.sinks import MemorySink
     from dsa_des.replicas.lockstep import lock_step
 
     def load(seed):

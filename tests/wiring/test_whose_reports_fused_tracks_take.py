@@ -6,7 +6,8 @@ from test_fused_track_keys import CAMERA, FINE, KIND, NEAR, distributed, of, sta
 from wired import chain
 
 import dsa_des
-from dsa_des.record.recording import MemorySink, Recorder
+from dsa_des.record.recording import Recorder
+from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 
 AWAY = {**crooked.ROLLING, "speed_mps": 150.0, "heading_deg": 250.0}

@@ -74,8 +74,8 @@ def detection_probability(
     method : str
         ``exact``: relative error below 1e-12 of Pd and of 1 - Pd above 1e-250.
         ``table``: absolute error below 1e-6 (measured 3e-8), for large arrays of one radar.
-        ``gram_charlier``, ``shnidman``, ``albersheim``: published approximations, see their
-        modules `components.radar.detection_<method>` for what they cover and how far they are off.
+        ``gram_charlier``, ``shnidman``, ``albersheim``: published approximations;
+        `components.radar.detection.approximations` says what they cover and how far they are off.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def detection_probability(
     -----
     Noise alone is Gamma(pulses, 1) distributed; for the threshold see `detection_threshold`.
     Thesis eq. 25-32 for Swerling I and V, with the one-pulse case Pd = Pfa^(1/(1+SNR)); the sums
-    are in `detection_series`.
+    are in `components.radar.detection.exact`.
     """
     return _probability(snr, pulses, false_alarm_probability, model, method, miss=False)
 
@@ -191,7 +191,7 @@ def required_snr(
     pd : float
         Wanted probability of detection, above the false-alarm probability and below 1.
     pulses, false_alarm_probability, model
-        As for `components.radar.detection.probability.detection_probability`, scalars.
+        As for `detection_probability`, scalars.
 
     Returns
     -------
