@@ -10,7 +10,7 @@ Sources: H. M. Finn and R. S. Johnson, RCA Review 29, 1968; P. P. Gandhi and S. 
 of CFAR processors in nonhomogeneous background", IEEE Trans. AES 24(4), 1988, eq. 10-13 (Swerling
 I, one pulse); M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed., section 6.5. The
 sums for several pulses and the other targets are our own: of a target that brings K quanta into
-the sum of n pulses (Poisson when steady, negative binomial when it fluctuates; `detection_series`)
+the sum of n pulses (Poisson when steady, negative binomial when it fluctuates; see `exact`)
 the cell is Gamma(n + K) distributed and the reference Gamma(n N), and their share is a Beta
 variable.
 """
