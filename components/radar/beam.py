@@ -1,4 +1,8 @@
-"""The beam: when it passes each target, and what a target off its axis loses."""
+"""The beam: when it passes each target, and what a target off its axis loses.
+
+The beam sweeps clockwise over the field of view once per scan, at an even rate, and flies back in
+what is left of the period: it looks one way only.
+"""
 
 from __future__ import annotations
 

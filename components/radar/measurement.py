@@ -12,8 +12,8 @@ from components.arguments.checks import not_negative, positive
 from components.radar.detection.output import measured_snr
 from components.radar.link_budget import wavelength
 from components.radar.resolution import ResolutionParameters
-from components.sensor.error_parameters import CorrelationTime, ErrorParameters, GlintParameters
 from components.sensor.look import Cells, Look
+from components.sensor.parameters import CorrelationTime, ErrorParameters, GlintParameters
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.errors import Disagreements

@@ -1,4 +1,4 @@
-"""Parameters of what a radar does where it is cued."""
+"""Parameters that radar blocks share: beam, threshold, filter, cues, and the link budget."""
 
 import math
 from dataclasses import replace

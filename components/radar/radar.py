@@ -1,4 +1,8 @@
-"""The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2)."""
+"""The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2).
+
+A range rate is of two aircraft: who estimates the other one's velocity from it must know our own,
+so radars that measure rates report it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The echo of rain in the cell of a target: its reflectivity, its volume and its motion."""
+"""The echo of rain, and what sidelobes hear of rain and ground all around."""
 
 from __future__ import annotations
 

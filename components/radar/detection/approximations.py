@@ -1,4 +1,9 @@
-"""Approximations of Pd: a table, and the equations of Albersheim, Shnidman and the thesis."""
+"""Approximations of Pd: a table, and the equations of Albersheim, Shnidman and the thesis.
+
+The table is indexed by the bits of the SNR itself: exponent and leading bits of a double are the
+number of the cell, so there is no logarithm and no search. Each octave of SNR has 64 cells; a cell
+holds the cubic through four exact values.
+"""
 
 from __future__ import annotations
 

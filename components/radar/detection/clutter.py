@@ -1,4 +1,33 @@
-"""Marcum's Q function of order one, with a threshold that may differ from element to element."""
+r"""Detection and false alarms with clutter in the target's cell.
+
+The model. In one look (the pulses of a coherent interval already added up) the receiver sees the
+complex amplitude ``target + mean clutter + Gaussian``, against the threshold that was set for noise
+alone, or against one that rises with the power of the clutter. The thesis has only the Gaussian
+part, of zero mean: noise. Clutter adds to it
+
+- a *mean*: the echo of this patch of ground. It is *constant* (a building, a rock face) or
+  *fluctuating* (exponential power from look to look: many scatterers), with a phase that is random
+  against the target's;
+- a *diffuse* part of zero mean, which is more noise: `diffuse_cnr`.
+
+This follows D. A. Shnidman, "Generalized radar clutter model", IEEE Trans. AES 35(3), 1999, and
+"Radar detection in clutter", IEEE Trans. AES 41(3), 2005 (thesis section 5.3.2), whose mean may
+fluctuate with a gamma distribution of any shape; here the shape is 1 (exponential) or infinite.
+The closed forms are our own derivation for one look; `tests/radar` draws the amplitudes and counts.
+
+With S, C, D the mean power of target, mean clutter and diffuse clutter over the noise, V the
+threshold and Q(a, v) Marcum's Q_1(sqrt(2a), sqrt(2v)):
+
+========== ========================= ====================================
+target     fluctuating mean          constant mean
+========== ========================= ====================================
+none       exp(-V/N), N = 1 + C + D  Q(C/N, V/N), N = 1 + D
+steady     Q(S/N, V/N)               mean of Q(\|s + c\|²/N, V/N) over the phase
+exponential exp(-V/(N + S))          Q(C/M, V/M), M = N + S
+chi-square 4 exp(-V/M) (1 + V a/M²),  d/da of a Q(C/M, V/M), M = N + a, a = S/2
+           M = N + a, a = S/2
+========== ========================= ====================================
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,15 @@
-"""The exact probability of detection, or of a miss, of each Swerling model."""
+"""The exact probability of detection, or of a miss, of each Swerling model, as a series.
+
+Given the echo, the detector's sum is Gamma(n + N, 1) with a random whole N: Poisson for a steady
+echo (Swerling 0), negative binomial with shape K for the others (K = 1, n, 2, 2n for I, II, III,
+IV). With the noise terms g of `threshold.NoiseTerms`
+
+    Pd     = Pfa + sum_j Pr(N = j) · gained_j
+    1 - Pd =       sum_j Pr(N = j) · missed_j
+
+and every term is positive. Two ways to sum: a polynomial where Pr(N = j) is a power times a
+polynomial (K = 1 and 2), and two chains that run towards the largest term otherwise.
+"""
 
 from __future__ import annotations
 

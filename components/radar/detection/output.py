@@ -1,4 +1,9 @@
-"""The detector's output beyond its threshold: of echoes, and of noise alone."""
+"""The detector's output beyond its threshold: of echoes, and of noise alone (false alarms).
+
+The sum of n pulses is Gamma(n, 1) for noise alone. An echo adds to it by its own fluctuation: a
+steady one makes it noncentral, one that fluctuates from pulse to pulse (II and IV) spreads every
+pulse, one that fluctuates from scan to scan (I and III) all of them at once.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The threshold of the detector, and the distribution of the noise around it."""
+"""The threshold of the detector, and the distribution of the noise around it.
+
+Poisson and negative binomial probabilities are had to full relative accuracy by the saddle point.
+ln(m!) and m ln x are large and nearly cancel; Loader's form subtracts them on paper instead: what
+is left is the small error of Stirling's formula and a deviance that vanishes at the mean.
+Source: C. Loader, "Fast and Accurate Computation of Binomial Probabilities", 2000.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run cuts off: what is seen first in its first scan was perhaps in sight before.
+"""Left- and right-censored first and last sightings.
 
 A sighting in a sensor's first scan, or in its last, is not where the target came into sight or went
 out of it: the run began or ended there. The summary of a run and the metrics of studies both ask
