@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from components.aircraft.aircraft import Aircraft, Roster
+from components.flights.culling import Culling
+from components.flights.fleet import ScriptedFleet
+from components.flights.legs import Straight, Turn, Waypoint, Waypoints
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.targets import TrafficStates
-from components.traffic.culling import Culling
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.legs import ScriptedTrajectory, Straight, Turn, Waypoint, Waypoints
-from components.traffic.trajectory import SampledTrajectory
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

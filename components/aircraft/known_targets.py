@@ -17,7 +17,7 @@ class KnownTraffic:
     roster : Roster
     envelope : callable or None
         Gives, for a reach in m and the time in s that a look lasts, the
-        `components.traffic.envelope.TrafficEnvelope` of the run, once its length is known. None
+        `components.flights.bounds.TrafficEnvelope` of the run, once its length is known. None
         where it depends on what will be sensed.
     """
 

@@ -14,7 +14,7 @@ from components.alert_configuration.conf_keys import (
 )
 from components.alert_configuration.conf_values import BadValue, parse_value
 from components.alert_configuration.configuration import Alerter, Level
-from components.traffic.traffic_file import MOST_OF_A_CELL, Problems, did_you_mean
+from components.formats.text_rows import MOST_OF_A_CELL, Problems, did_you_mean
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.text.safe_text import shortened

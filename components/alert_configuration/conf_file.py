@@ -8,8 +8,7 @@ from components.alert_configuration.conf_alerters import AlerterKeys
 from components.alert_configuration.conf_keys import KEYS, ONLY_OFF, SIGNED, UNITS
 from components.alert_configuration.conf_values import BadValue, parse_value
 from components.alert_configuration.configuration import Configuration
-from components.traffic.text_rows import read_lines
-from components.traffic.traffic_file import MOST_OF_A_CELL, Problems
+from components.formats.text_rows import MOST_OF_A_CELL, Problems, read_lines
 from dsa_des.text.safe_text import shortened
 
 Lines = dict[str, tuple[int, str, str]]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from components.traffic.units import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
+from components.formats.text_rows import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
 
 GRAVITY_MPS2 = 9.80665
 

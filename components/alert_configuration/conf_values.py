@@ -6,7 +6,7 @@ from typing import Any
 
 from components.alert_configuration.conf_keys import UNITS
 from components.alert_configuration.configuration import REGIONS
-from components.traffic.units import NO_UNIT, clean_token
+from components.formats.text_rows import NO_UNIT, clean_token
 from dsa_des.errors import nearest
 from dsa_des.text.safe_text import shortened
 

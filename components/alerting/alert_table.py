@@ -8,7 +8,7 @@ from components.alert_configuration.configuration import Configuration
 from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.alerting.separation import separation
-from components.traffic.units import LENGTH_M, SPEED_MPS
+from components.formats.text_rows import LENGTH_M, SPEED_MPS
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -13,17 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from components.encounters.closest_geometry import (
+from components.encounters.sampling import EncounterDraws
+from components.flights.closest_geometry import (
     SENSES,
     Approach,
     flown,
     in_plane,
     intruder_heading,
 )
-from components.encounters.draws import EncounterDraws
-from components.encounters.encounter_set import LARGEST_WEIGHT, TRACKS, EncounterSet
-from components.encounters.pair_sets import NAMES, geometry_class
-from components.encounters.set_file import is_place
+from components.formats.encounter_set import (
+    LARGEST_WEIGHT,
+    NAMES,
+    TRACKS,
+    EncounterSet,
+    geometry_class,
+)
+from components.formats.set_file import is_place
 from components.well_clear.volume import FOOT_M
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value

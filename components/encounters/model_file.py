@@ -13,8 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from components.encounters.bayes_network import BayesNetwork, NetworkError, make_network
-from components.encounters.model import Bins, EncounterModel
+from components.encounters.model import (
+    BayesNetwork,
+    Bins,
+    EncounterModel,
+    NetworkError,
+    make_network,
+)
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, read_input_text

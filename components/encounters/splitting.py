@@ -14,13 +14,11 @@ splitting for estimating rare event probabilities", Operations Research 47, 1999
 
 import numpy as np
 
-from components.encounters.draws import EncounterDraws
-from components.encounters.encounter_set import EncounterSet
+from components.encounters.sampling import EncounterDraws
+from components.formats.encounter_set import FAMILY, EncounterSet
 from components.well_clear.volume import PRESETS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
-#: The column of a set that says of which encounter each is a copy.
-FAMILY = "family"
 _NMAC = PRESETS["nmac"]
 
 

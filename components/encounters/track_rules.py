@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.encounters.bayes_network import BayesNetwork
 from components.encounters.model import (
     ACCELERATION,
     AIRSPACE,
@@ -26,10 +25,11 @@ from components.encounters.model import (
     LAYERS_FT,
     SPEED,
     TURN,
+    BayesNetwork,
     EncounterModel,
 )
-from components.encounters.motion import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
 from components.encounters.sampling import SampledTracks, TrackSampler
+from components.flights.point_mass import FT_S_PER_KT, FlownTracks, fly_euler, fly_point_mass
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 

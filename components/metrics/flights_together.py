@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.closest_approach import Approaches, closest_approaches
+from components.flights.sample_times import OwnTimes, RegularTimes, SampleTimes
+from components.flights.sampled_flight import CELLS_AT_ONCE
+from components.flights.steered_flights import ManyFlights
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
 from components.metrics.separation import RelativeFlight, closest, distances_m, first_inside
-from components.traffic.closest_approach import Approaches, closest_approaches
-from components.traffic.many_flights import ManyFlights
-from components.traffic.sample_times import OwnTimes, RegularTimes, SampleTimes
-from components.traffic.trajectory import CELLS_AT_ONCE
 from components.well_clear.curved_flights import first_inside_cylinder
 from dsa_des.arrays.types import FloatArray, IntArray
 

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import line_of_sight
-from components.traffic.censored import end_of_look, present_together_s
-from components.traffic.sample_times import (
+from components.flights.closest_approach import end_of_look, present_together_s
+from components.flights.sample_times import (
     SampleTimes,
     SharedTimes,
     regular_count,
     regular_times_s,
 )
+from components.geometry.ellipsoid import line_of_sight
 from components.traffic.source import TrafficSource
 from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
@@ -237,7 +237,7 @@ def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArra
 def closest(flight: RelativeFlight) -> tuple[float, float, str]:
     """Return the smallest range (m), its time (s), the first of several, and where it is cut off.
 
-    See `components.traffic.censored.end_of_look`.
+    See `components.flights.closest_approach.end_of_look`.
     """
     best = (float("inf"), float("nan"))
     looked_s = np.full(2, np.nan)

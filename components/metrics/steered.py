@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.steered_flights import ManyFlights, OwnFlights, SteeredFlight
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import traffic_block
-from components.traffic.many_flights import ManyFlights
-from components.traffic.own_flights import OwnFlights
-from components.traffic.steered_flight import SteeredFlight
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
 

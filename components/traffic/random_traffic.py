@@ -11,19 +11,18 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.geometry.enu import enu_to_geodetic
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.flight_protocols import Trajectory
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.sample_times import (
+from components.flights.fleet import ScriptedFleet
+from components.flights.sample_times import (
     RegularTimes,
     SampleTimes,
     regular_count,
     regular_times_s,
 )
+from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
+from components.flights.steered_flights import Trajectory
+from components.geometry.enu import enu_to_geodetic
 from components.traffic.scripted import Ownship, flight_arguments
 from components.traffic.source import SourceParameters, TrafficSource
-from components.traffic.straight_flights import Starts, flights_of
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.randomness import target_keys

@@ -9,22 +9,20 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
-from components.geometry.enu import enu_to_geodetic
-from components.traffic import leg_types
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.flight_protocols import Trajectory
-from components.traffic.flown_together import AllFlown
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.replica_flights import flown
-from components.traffic.sample_times import (
+from components.flights import legs
+from components.flights.attitude import Wind, ground_speed_mps
+from components.flights.fleet import ScriptedFleet
+from components.flights.sample_times import (
     RegularTimes,
     SampleTimes,
     regular_count,
     regular_times_s,
 )
+from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
+from components.flights.steered_flights import Trajectory
+from components.geometry.enu import enu_to_geodetic
+from components.traffic.flown_together import AllFlown, flown
 from components.traffic.source import SourceParameters, TrafficSource
-from components.traffic.straight_flights import Starts, flights_of
-from components.traffic.wind import Wind, ground_speed_mps
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
@@ -254,9 +252,9 @@ def flight_arguments(
 def _leg(leg: Any) -> Any:
     values = leg.model_dump(exclude={"kind", "points"})
     if leg.kind == "waypoints":
-        points = tuple(leg_types.Waypoint(**point.model_dump()) for point in leg.points)
-        return leg_types.Waypoints(points, **values)
-    return getattr(leg_types, leg.kind.capitalize())(**values)
+        points = tuple(legs.Waypoint(**point.model_dump()) for point in leg.points)
+        return legs.Waypoints(points, **values)
+    return getattr(legs, leg.kind.capitalize())(**values)
 
 
 def _intruders(

@@ -11,26 +11,29 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import KnownTraffic
-from components.messages.reach import FarthestLook, farthest_look
-from components.messages.targets import TrafficStates, TrueStates
-from components.traffic.censored import censored_approaches, present_together_s
-from components.traffic.closest_approach import (
+from components.flights.attitude import Wind, scene_wind
+from components.flights.bounds import (
+    FlightOf,
+    TrafficEnvelope,
+    check_above_terrain,
+    check_on_raster,
+    max_speeds_mps,
+    traffic_envelope,
+)
+from components.flights.closest_approach import (
     Approaches,
+    censored_approaches,
     closest_approaches,
     looked_at_one_by_one,
+    present_together_s,
 )
-from components.traffic.culling import Culling
-from components.traffic.envelope import TrafficEnvelope, traffic_envelope
-from components.traffic.flight_limits import max_speeds_mps
-from components.traffic.flight_protocols import Trajectory
-from components.traffic.flown_together import FlownTogether
-from components.traffic.replica_flights import flown_by
-from components.traffic.sample_times import SampleTimes
-from components.traffic.steered_culling import SteeredCulling
-from components.traffic.steered_ownship import SteeredOwnship
-from components.traffic.terrain_check import FlightOf, check_above_terrain, check_on_raster
-from components.traffic.true_flights import truth_is_recorded
-from components.traffic.wind import Wind, scene_wind
+from components.flights.culling import Culling, SteeredCulling
+from components.flights.sample_times import SampleTimes
+from components.flights.steered_flights import Trajectory
+from components.messages.reach import FarthestLook, farthest_look
+from components.messages.targets import TrafficStates, TrueStates
+from components.traffic.flown_together import FlownTogether, flown_by
+from components.traffic.steered_ownship import SteeredOwnship, truth_is_recorded
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters, PositiveRational
 from dsa_des.block.message import Message

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.attitude import Wind, attitude_in_wind, scene_wind
+from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
+from components.flights.steered_flights import SteeredFlight
 from components.geometry.normals import FloatArray
 from components.geometry.state import TrajectoryState
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.steered_flight import SteeredFlight
-from components.traffic.straight_flights import StraightFlights
-from components.traffic.wind import Wind, attitude_in_wind, scene_wind
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.effect import Effect, Verdict
 

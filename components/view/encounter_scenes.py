@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from components.traffic.daa_file import read_daa_samples
-from components.traffic.traffic_file import TrafficFileError
+from components.formats.daa_file import read_daa_samples
+from components.formats.text_rows import TrafficFileError
 from components.view.picture import RunPicture, TangentPlane
 from dsa_des.errors import UsageError
 

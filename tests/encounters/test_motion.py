@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.encounters.motion import FT_S_PER_KT, fly_euler, fly_point_mass
+from components.flights.point_mass import FT_S_PER_KT, fly_euler, fly_point_mass
 
 
 def commands(seconds: int, a: float, climb: float, turn_deg: float, tracks: int = 1):

@@ -9,8 +9,8 @@ import pytest
 from scipy.io import savemat
 from scipy.io.matlab import MatlabObject
 
-from components.encounters.encounter_flights import encounter_flights
-from components.encounters.set_file import read_set
+from components.encounters.encounter_traffic import encounter_flights
+from components.formats.set_file import read_set
 from tests.encounters.test_set_file import call
 
 FT = 0.3048

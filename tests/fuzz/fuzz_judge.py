@@ -192,9 +192,9 @@ def import_everything() -> None:
         "rich.table", "rich.progress", "matplotlib.figure", "matplotlib.backends.backend_agg",
         "scipy.special", "scipy.stats", "components.display.figures", "trimesh",
         "components.evidence.silhouettes.comparison_command", "components.optical.mesh",
-        "components.encounters.convert_command", "components.encounters.show_command",
-        "components.encounters.risk_table", "components.encounters.generate_command",
-        "components.encounters.split_command", "components.export.exported", "scipy.io",
+        "components.encounters.set_commands", "components.encounters.set_commands",
+        "components.encounters.encounter_tables", "components.encounters.model_commands",
+        "components.encounters.set_commands", "components.export.exported", "scipy.io",
         "components.view.make", "pyarrow.parquet", "pyarrow.csv",
     ):  # fmt: skip
         with contextlib.suppress(ImportError):

@@ -11,8 +11,8 @@ import pickle
 import numpy as np
 import pytest
 
-from components.traffic.csv_file import read_csv
-from components.traffic.daa_file import TrafficFileError, read_daa
+from components.formats.csv_file import read_csv
+from components.formats.daa_file import TrafficFileError, read_daa
 
 H = "NAME lat lon alt trk gs vs time\n"
 U = "[none] [deg] [deg] [ft] [deg] [knot] [fpm] [s]\n"

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from components.traffic.attitude_from_path import attitude_from_path, fit_path
-from components.traffic.legs import Climb, ScriptedTrajectory, Turn
+from components.flights.attitude import attitude_from_path, fit_path
+from components.flights.legs import Climb, Turn
+from components.flights.scripted_flights import ScriptedTrajectory
 
 STANDARD_BANK = np.degrees(np.arctan(60 * np.radians(3) / 9.80665))  # 17.76 degrees
 

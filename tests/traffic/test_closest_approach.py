@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.flights import closest_approach
+from components.flights.closest_approach import closest_approaches, looked_at_one_by_one
+from components.flights.fleet import SampledFleet, ScriptedFleet
+from components.flights.legs import Straight, Turn
+from components.flights.sample_times import OwnTimes, RegularTimes, SharedTimes
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic import closest_approach
-from components.traffic.closest_approach import closest_approaches, looked_at_one_by_one
-from components.traffic.fleet import SampledFleet, ScriptedFleet
-from components.traffic.legs import ScriptedTrajectory, Straight, Turn
-from components.traffic.sample_times import OwnTimes, RegularTimes, SharedTimes
-from components.traffic.trajectory import SampledTrajectory
 
 ENDLESS = (0.0, np.inf)
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from components.traffic.fleet import SampledFleet, ScriptedFleet
-from components.traffic.legs import ScriptedTrajectory, Straight, Turn
-from components.traffic.trajectory import SampledTrajectory
+from components.flights.fleet import SampledFleet, ScriptedFleet
+from components.flights.legs import Straight, Turn
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
 
 
 def scripted(count):

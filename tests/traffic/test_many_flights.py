@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from components.flights.legs import Straight, Turn
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.steered_flights import ManyFlights, SteeredFlight
 from components.messages.steering import Manoeuvre
-from components.traffic.legs import ScriptedTrajectory, Straight, Turn
-from components.traffic.many_flights import ManyFlights
-from components.traffic.steered_flight import SteeredFlight
-from components.traffic.trajectory import SampledTrajectory
 
 TIMES = np.arange(0.0, 41.0)
 

@@ -6,9 +6,10 @@ from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.flights.legs import Turn
+from components.flights.sampled_flight import SampledTrajectory
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.legs import ScriptedTrajectory, Turn
-from components.traffic.trajectory import SampledTrajectory
 
 
 def distance(a, b):

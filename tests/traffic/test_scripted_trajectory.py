@@ -6,16 +6,9 @@ from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.flights.legs import Climb, Stationary, Straight, Turn, Waypoint, Waypoints
+from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.legs import (
-    Climb,
-    ScriptedTrajectory,
-    Stationary,
-    Straight,
-    Turn,
-    Waypoint,
-    Waypoints,
-)
 
 WGS84 = Geodesic.WGS84
 START = {"lat_deg": 45.0, "lon_deg": -75.0, "alt_m": 1000.0}

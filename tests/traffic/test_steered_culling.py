@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from components.flights.culling import SHORTEST_EPOCH_S, SteeredCulling
+from components.flights.fleet import ScriptedFleet
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.steered_flights import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.steered_culling import SHORTEST_EPOCH_S, SteeredCulling
-from components.traffic.steered_flight import SteeredFlight
 from dsa_des.record.recording import MemorySink, Recorder
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

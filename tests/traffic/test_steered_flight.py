@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from components.flights.scripted_flights import ScriptedTrajectory
+from components.flights.steered_flights import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
 from components.metrics.steered import flown_as_told
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.steered_flight import SteeredFlight
 
 STRAIGHT = ScriptedTrajectory(
     "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=90.0, speed_mps=60.0

@@ -5,11 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.traffic.fleet import ScriptedFleet
-from components.traffic.flight_limits import intervals_present_s, max_speeds_mps
-from components.traffic.geodesic_motion import geodesic_parameter_table, geodesic_parameters
-from components.traffic.legs import ScriptedTrajectory
-from components.traffic.straight_flights import Starts, StraightFlights, flights_of
+from components.flights.bounds import intervals_present_s, max_speeds_mps
+from components.flights.fleet import ScriptedFleet
+from components.flights.geodesic_motion import geodesic_parameter_table, geodesic_parameters
+from components.flights.scripted_flights import (
+    ScriptedTrajectory,
+    Starts,
+    StraightFlights,
+    flights_of,
+)
 
 latitudes = st.floats(-90, 90) | st.sampled_from([90.0, -90.0, 0.0, -0.0, 52.0])
 headings = st.floats(-720, 720) | st.sampled_from([0.0, 90.0, 180.0, 270.0, 360.0])

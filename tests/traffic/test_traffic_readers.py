@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.formats.csv_file import read_csv
+from components.formats.daa_file import TrafficFileError, read_daa
+from components.formats.sample_table import elapsed_times
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.csv_file import read_csv
-from components.traffic.daa_file import TrafficFileError, read_daa
-from components.traffic.sample_table import elapsed_times
 
 KNOT = 1852 / 3600
 

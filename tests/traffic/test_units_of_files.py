@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from components.traffic.units import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
+from components.formats.text_rows import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
 
 FOOT, MILE, HOUR = Fraction("0.3048"), Fraction(1852), Fraction(3600)
 LENGTHS = {

@@ -1,6 +1,6 @@
 """Straight flight and the line of sight for one aircraft at a time, in plain Python.
 
-The formulas are those of `components.traffic.geodesic_motion` and `components.geometry`; this is
+The formulas are those of `components.flights.geodesic_motion` and `components.geometry`; this is
 how one writes them without arrays. Only the benchmark's yardstick uses them.
 """
 
@@ -24,7 +24,7 @@ def straight_flight(parameters: list[float]) -> Callable[[float], Position]:
     Parameters
     ----------
     parameters : list of float
-        One straight leg's, from `components.traffic.geodesic_motion.geodesic_parameters`.
+        One straight leg's, from `components.flights.geodesic_motion.geodesic_parameters`.
     """
     speed_radius, centre, climb, alt0, tau0, per_metre, sin_az0, cos_az0 = parameters[:8]
     lon0, lon_slope, _, radius = parameters[8:12]
