@@ -1,40 +1,88 @@
-"""Contacts: what the operator is shown of other aircraft, as the tracker or the fusion has them."""
+"""Contacts as the tracker or the fusion has them, and where the ownship was when it saw them."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from components.cdti.own_flight import OwnFlight, OwnNow
-from components.geometry.attitude import body_to_ned
-from components.geometry.enu import enu_to_geodetic
+from components.display.picture import TangentPlane, offset_positions
+from components.geometry.attitude import body_to_ned, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
+from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: A range that was measured counts for so long when only directions follow, s.
 RANGE_HELD_S = 3.0
+_KEPT = 600
+_SPEED_OVER_S = 0.5
+
+
+@dataclass(frozen=True)
+class OwnNow:
+    """The ownship at the latest instant that is known."""
+
+    east_m: float
+    north_m: float
+    alt_m: float
+    heading_rad: float
+    pitch_rad: float
+    roll_rad: float
+    speed_mps: float
+    climb_mps: float
+
+
+class OwnFlight:
+    """The ownship's latest positions and attitudes, in order of time."""
+
+    def __init__(self) -> None:
+        self.now: OwnNow | None = None
+        self.plane: TangentPlane | None = None
+        self._tick: IntArray = np.empty(0, dtype=np.int64)
+        # East, north, altitude, yaw, pitch, roll.
+        self._pose: FloatArray = np.empty((0, 6))
+
+    def take(self, states: TrafficStates, ticks_per_s: int) -> None:
+        """Take in new positions."""
+        if self.plane is None:
+            self.plane = TangentPlane(float(states.own_lat_deg[0]), float(states.own_lon_deg[0]))
+        east, north = self.plane.east_north_m(
+            states.own_lat_deg, states.own_lon_deg, states.own_alt_m
+        )
+        new = np.stack([
+            east, north, states.own_alt_m, states.own_yaw_rad, states.own_pitch_rad,
+            states.own_roll_rad,
+        ], axis=1)  # fmt: skip
+        keep = self._tick < states.tick[0]
+        self._tick = np.concatenate([self._tick[keep], states.tick])[-_KEPT:]
+        self._pose = np.concatenate([self._pose[keep], new])[-_KEPT:]
+        then = int(np.searchsorted(self._tick, self._tick[-1] - _SPEED_OVER_S * ticks_per_s))
+        then = min(then, max(len(self._tick) - 2, 0))
+        apart_s = (self._tick[-1] - self._tick[then]) / ticks_per_s
+        moved = self._pose[-1] - self._pose[then]
+        speed, climb = 0.0, 0.0
+        if apart_s > 0.0:
+            speed, climb = math.hypot(moved[0], moved[1]) / apart_s, float(moved[2]) / apart_s
+        east_m, north_m, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
+        self.now = OwnNow(east_m, north_m, alt_m, yaw, pitch, roll, speed, climb)
+
+    def poses(self, tick: IntArray) -> FloatArray:
+        """Return the last poses not after some instants, (n, 6); the first one before it."""
+        place = np.searchsorted(self._tick, tick, side="right") - 1
+        return self._pose[np.maximum(place, 0)]
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts at one instant.
+    """Contacts at one instant, (n,) each.
 
-    Parameters
-    ----------
-    number : (n,) of int
-        Of the target, -1 for none, or `TRACKS_FROM` and the tracker's number.
-    seen_s : (n,)
-        When it was seen last.
-    ranged : (n,) of bool
-    range_m, range_s : (n,)
-        The range, and when it was measured; NaN without one.
-    place_m : (n, 3)
-        East and north in the plane, and altitude; NaN without a range.
-    toward : (n, 2)
-        Bearing from north and elevation of the line of sight, rad.
+    The number is that of the target, -1 for none, or `TRACKS_FROM` and the tracker's number. Of one
+    that was seen last at `seen_s` the range and when it was measured are NaN without one, as is the
+    place (n, 3): east and north in the plane, and altitude. The line of sight is `toward` (n, 2):
+    bearing from north and elevation, rad.
     """
 
     number: IntArray
@@ -48,10 +96,8 @@ class Contacts:
     def shown(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
         """Return the contacts as the page has them, ranged ones first.
 
-        Returns
-        -------
-        list of [number, east_m, north_m, up_m, bearing_deg, age_s]
-            From the ownship as it is now; the three are None without a range.
+        [number, east_m, north_m, up_m, bearing_deg, age_s] from the ownship as it is now; the three
+        are None without a range.
         """
         fresh = np.flatnonzero(time_s - self.seen_s < forgotten_s)
         fresh = fresh[np.argsort(~self.ranged[fresh], kind="stable")]
@@ -79,9 +125,7 @@ def contacts_of_lines(
     if before is not None:
         range_m, range_s = _held(message.target, seen_s, range_m, range_s, before)
     pose = own.poses(message.measured_tick)
-    azimuth, elevation = message.azimuth_rad, message.elevation_rad
-    level = np.cos(elevation)
-    body = level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
+    body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
     away = np.stack([east, north, -down], axis=1) * range_m[:, np.newaxis]
     toward = np.stack([np.arctan2(east, north), np.arcsin(np.clip(-down, -1.0, 1.0))], axis=1)
@@ -118,17 +162,11 @@ def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -
     lives = np.flatnonzero(message.track_status != DELETED)
     place = np.full((len(lives), 3), np.nan)
     ranged = message.has_range[lives] & np.isfinite(message.north_m[lives])
-    with_range = lives[ranged]
-    if len(with_range) and own.plane is not None:
-        lat, lon, alt = enu_to_geodetic(
-            message.east_m[with_range],
-            message.north_m[with_range],
-            -message.down_m[with_range],
-            reference_lat_deg=message.origin_lat_deg[with_range],
-            reference_lon_deg=message.origin_lon_deg[with_range],
-            reference_alt_m=message.origin_alt_m[with_range],
-        )
-        place[ranged] = np.stack([*own.plane.east_north_m(lat, lon, alt), alt], axis=1)
+    if own.plane is not None:
+        ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
+        origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
+        ends = offset_positions(np.where(ranged, ned_m, np.nan), [part[lives] for part in origin])
+        place = np.stack([*own.plane.east_north_m(*ends), ends[2]], axis=1)
     toward = np.stack([message.azimuth_rad[lives], message.elevation_rad[lives]], axis=1)
     seen_s = message.updated_s[lives]
     unknown = np.full(len(lives), np.nan)

@@ -6,15 +6,13 @@ replaced as a whole, never changed.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
-from components.cdti.camera_sights import CameraSights
-from components.cdti.contacts import Contacts, contacts_of_lines, contacts_of_states
-from components.cdti.lost_area import lost_area
-from components.cdti.own_flight import OwnFlight
+from components.cdti.camera import CameraSights
+from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines, contacts_of_states
 from components.messages.alerts import BAND_REGIONS, AlertLevels, GuidanceBands, contact_name
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
@@ -22,6 +20,9 @@ from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
 from components.sensor.marks import IR
+from components.well_clear.detection import detection_span
+from components.well_clear.tcas import TcasAdvisory
+from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -35,6 +36,9 @@ BANDS_LAST_S = 1.5
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
+#: Directions that are looked at, all around the ownship.
+STEP_RAD = math.radians(3.0)
+DIRECTIONS_RAD = np.arange(0.0, 2.0 * math.pi - 0.5 * STEP_RAD, STEP_RAD)
 
 
 @dataclass(frozen=True)
@@ -52,12 +56,7 @@ class _Alerts:
 
 
 class Scope:
-    """The state of the display.
-
-    Parameters
-    ----------
-    simulation : Simulation
-    """
+    """The state of the display."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._per_s = simulation.ticks_per_s
@@ -187,15 +186,9 @@ class Scope:
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
-        """Return the camera's picture of a contact that is shown, or None where there is none.
+        """Return the camera's picture of a contact of a `picture`, or None where there is none.
 
-        Parameters
-        ----------
-        picture : dict
-            From `picture`.
-        time_s : float
-        chosen : int
-            -1 takes the most urgent one.
+        Of contact -1 it is that of the most urgent one.
         """
         own = self._own.now
         if own is None:
@@ -297,3 +290,38 @@ def _sensor(name: str, component: Component) -> dict[str, Any]:
     low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
     far = getattr(component, "reach", reach).range_max_m
     return {**found, "range": round(far, 1) if math.isfinite(far) else None, "azimuth": [low, high]}
+
+
+class Reached(NamedTuple):
+    """How far from the ownship an area begins and ends, by direction clockwise from north."""
+
+    direction_rad: FloatArray
+    near_m: FloatArray
+    far_m: FloatArray
+
+
+def lost_area(
+    volume: Volume | TcasAdvisory,
+    own_alt_m: float,
+    own_mps: FloatArray,
+    relative: FloatArray,
+    lookahead_s: float,
+) -> Reached:
+    """Return where the ownship would be in a volume about other aircraft, were it to turn at once.
+
+    It keeps its speed and its vertical speed, and the others their flights; how long it takes to
+    turn is left out. What an operator sees is where not to fly to, as the thesis has it (section
+    2.2: the area where the loss of separation occurs).
+    Velocities are east, north and upward; `relative` (6, targets) is east, north, up in m and their
+    rates, ownship less target. There is one entry for each target and direction with a loss.
+    """
+    speed_mps = math.hypot(own_mps[0], own_mps[1])
+    east = speed_mps * np.sin(DIRECTIONS_RAD)[:, np.newaxis] - own_mps[0]
+    north = speed_mps * np.cos(DIRECTIONS_RAD)[:, np.newaxis] - own_mps[1]
+    turned = [*relative[:3], relative[3] + east, relative[4] + north, relative[5]]
+    parts = [part.reshape(-1) for part in np.broadcast_arrays(*turned)]
+    own_up = np.full(len(parts[0]), own_alt_m), np.full(len(parts[0]), own_mps[2])
+    span = detection_span(volume, parts, own_up, None, 0.0, lookahead_s)
+    lost = np.flatnonzero(span.begin_s < span.end_s)
+    direction = np.repeat(DIRECTIONS_RAD, relative.shape[1])[lost]
+    return Reached(direction, speed_mps * span.begin_s[lost], speed_mps * span.end_s[lost])

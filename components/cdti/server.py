@@ -5,6 +5,7 @@ it has drawn the one before.
 """
 
 import asyncio
+import errno
 import json
 import logging
 import threading
@@ -19,10 +20,16 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from components.cdti.admission import OPERATOR, Admission
-from components.cdti.connection_limit import ConnectionLimit
-from components.cdti.page_messages import LARGEST_BYTES, Drawn, PageMessage, read_message
-from components.cdti.page_text import headers, page
+from components.cdti.page import (
+    LARGEST_BYTES,
+    OPERATOR,
+    Admission,
+    Drawn,
+    PageMessage,
+    headers,
+    page,
+    read_message,
+)
 from dsa_des.errors import UsageError
 from dsa_des.terminal.terminal import say
 
@@ -32,16 +39,12 @@ MOST_PAGES = 8
 #: Pictures that a page may have without having drawn them.
 _AHEAD = 2
 _START_S, _END_S = 10.0, 3.0
+#: Browsers open a few each; all others are a flood. Far below any limit of open files.
+MOST_CONNECTIONS = 64
 
 
 class Page:
-    """One browser's connection.
-
-    Parameters
-    ----------
-    connection : ServerConnection
-    role : str
-    """
+    """One browser's connection."""
 
     def __init__(self, connection: ServerConnection, role: str) -> None:
         self.connection, self.role = connection, role
@@ -73,7 +76,7 @@ class Page:
             await self.connection.send(_json(content))
 
 
-class Crew(Protocol):
+class PageControl(Protocol):
     """What a server asks of whoever runs the session; called in the server's thread."""
 
     def welcome(self, role: str) -> dict[str, Any]:
@@ -82,33 +85,19 @@ class Crew(Protocol):
     def frame(self, chosen: int) -> dict[str, Any] | None:
         """Return the newest picture, or None before the first."""
 
-    async def said(self, page: Page, message: PageMessage) -> None:
-        """Take in what a page said."""
+    async def on_message(self, page: Page, message: PageMessage) -> None:
+        """Take in a message of a page."""
 
-    def operators(self, count: int) -> None:
+    def on_operators(self, count: int) -> None:
         """Take note of how many pages are there that may decide."""
 
 
 class DisplayServer:
-    """Serves the page at one address.
+    """Serves the page at one address; port 0 takes a free one."""
 
-    Parameters
-    ----------
-    host : str
-    port : int
-        0 takes a free one.
-    admission : Admission
-    crew : Crew
-
-    Raises
-    ------
-    UsageError
-        From `start`, if the address cannot be served.
-    """
-
-    def __init__(self, host: str, port: int, admission: Admission, crew: Crew) -> None:
+    def __init__(self, host: str, port: int, admission: Admission, control: PageControl) -> None:
         self._host, self._port = host, port
-        self._admission, self._crew = admission, crew
+        self._admission, self._control = admission, control
         self.pages: list[Page] = []
         self.loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._live, name="display", daemon=True)
@@ -120,7 +109,7 @@ class DisplayServer:
     # -- other threads -----------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Serve from now on."""
+        """Serve from now on; `UsageError` if the address cannot be."""
         self._thread.start()
         if not self._up.wait(_START_S) or self._failed:
             raise UsageError(f"cannot serve at {self.authority}: {self._failed or 'no answer'}")
@@ -175,7 +164,7 @@ class DisplayServer:
     async def _serve(self) -> None:
         self._new, self._stop = asyncio.Condition(), asyncio.Event()
         quiet = logging.getLogger(f"{__name__}.connections")
-        quiet.setLevel(logging.CRITICAL)  # what a stranger sends is no matter of the terminal's
+        quiet.setLevel(logging.CRITICAL)  # what anybody sends is no matter of the terminal's
         limit = ConnectionLimit(partial(say, err=True))
         self.loop.set_exception_handler(limit.on_error)
         try:
@@ -241,11 +230,11 @@ class DisplayServer:
         feeding = None
         try:
             await page.send(
-                {"type": "welcome", "role": role, "key": key, **self._crew.welcome(role)}
+                {"type": "welcome", "role": role, "key": key, **self._control.welcome(role)}
             )
             feeding = asyncio.create_task(self._feed(page))
             async for text in connection:
-                await self._hear(page, text)
+                await self._receive(page, text)
         except ConnectionClosed:
             pass
         finally:
@@ -255,9 +244,9 @@ class DisplayServer:
             self._count()
 
     def _count(self) -> None:
-        self._crew.operators(sum(page.role == OPERATOR for page in self.pages))
+        self._control.on_operators(sum(page.role == OPERATOR for page in self.pages))
 
-    async def _hear(self, page: Page, text: str | bytes) -> None:
+    async def _receive(self, page: Page, text: str | bytes) -> None:
         try:
             message = read_message(text)
         except ValueError as error:
@@ -266,7 +255,7 @@ class DisplayServer:
         if isinstance(message, Drawn):
             page.drawn(message.frame)
         else:
-            await self._crew.said(page, message)
+            await self._control.on_message(page, message)
 
     async def _feed(self, page: Page) -> None:
         """Send a page the newest picture whenever it can take one."""
@@ -278,7 +267,7 @@ class DisplayServer:
                     while self._number == seen:
                         await self._new.wait()
                 seen = self._number
-                content = self._crew.frame(page.chosen)
+                content = self._control.frame(page.chosen)
                 if content is not None:
                     await page.send_frame(content)
 
@@ -291,6 +280,71 @@ class DisplayServer:
         waits = [asyncio.create_task(page.send(content)) for page in self.pages]
         if waits:
             await asyncio.wait(waits, timeout=1.0)
+
+
+class ConnectionLimit:
+    """Drops connections beyond a limit at once, and says so in one line."""
+
+    def __init__(self, say: Callable[[str], None], most: int = MOST_CONNECTIONS) -> None:
+        self._say, self._most = say, most
+        self._open = 0
+        self._said = self._starved = False
+
+    def connection(self, *given: Any, **options: Any) -> ServerConnection:
+        """Return what `websockets.asyncio.server.serve` makes of a new connection."""
+        return _Limited(self, *given, **options)
+
+    def take(self) -> bool:
+        """Count a connection that opens; return False where there is no room for it."""
+        if self._open >= self._most:
+            self._tell(f"more than {self._most} connections")
+            return False
+        self._open += 1
+        return True
+
+    def give_back(self) -> None:
+        """Count a connection that was taken and is gone."""
+        self._open -= 1
+
+    def on_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Handle what the loop could not: connections may come faster than they can be dropped."""
+        error = context.get("exception")
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            self._starved = True
+            self._tell("more connections than files may be open")
+        elif self._starved and isinstance(error, ValueError) and "descriptor: -1" in str(error):
+            # A second later the loop listens again, to a socket that the end has closed meanwhile.
+            pass
+        else:
+            loop.default_exception_handler(context)
+
+    def _tell(self, what: str) -> None:
+        if not self._said:
+            self._said = True
+            self._say(f"the display was sent {what}: some are dropped, the session goes on")
+
+
+class _Limited(ServerConnection):
+    """A connection that is closed before anything is read where there is no room for it."""
+
+    def __init__(self, limit: ConnectionLimit, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
+        self._limit, self._taken = limit, False
+
+    def connection_made(self, transport: Any) -> None:
+        """Take it, or drop it."""
+        self._taken = self._limit.take()
+        if self._taken:
+            super().connection_made(transport)
+        else:
+            transport.abort()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """Give its place back."""
+        if self._taken:
+            self._taken = False
+            self._limit.give_back()
+            super().connection_lost(error)
 
 
 def _token(request: Request) -> str:

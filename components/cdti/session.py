@@ -8,9 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from components.cdti.admission import Admission
-from components.cdti.crew import SessionCrew
-from components.cdti.live_pace import LivePacer
+from components.cdti.control import LivePacer, SessionControl
+from components.cdti.page import Admission
 from components.cdti.scope import Scope
 from components.operator.desk import Desk
 from components.operator.human import Human
@@ -47,16 +46,7 @@ def run_session(
     no_wait: bool,
     figures: bool,
 ) -> None:
-    """Run a scene with its display, and keep the run also when it is interrupted.
-
-    Raises
-    ------
-    UsageError
-        The scene has several consoles, the address cannot be served, or the package websockets is
-        missing.
-    KeyboardInterrupt
-        When it was interrupted, once the run folder is complete.
-    """
+    """Run a scene with its display, and keep the run also when it is interrupted."""
     try:
         from components.cdti.server import DisplayServer
     except ImportError as error:
@@ -76,11 +66,13 @@ def run_session(
     target.check()
     replay = _replay(loaded, console, target.path)
     desk = Desk()
-    crew = SessionCrew(loaded, desk, console, speed, waits=not no_wait and console is not None)
+    control = SessionControl(
+        loaded, desk, console, speed, waits=not no_wait and console is not None
+    )
     admission = Admission()
-    server = DisplayServer(host, port, admission, crew)
-    pacer = LivePacer(speed, crew.holds, crew.came_to)
-    crew.attach(server, pacer, admission)
+    server = DisplayServer(host, port, admission, control)
+    pacer = LivePacer(speed, control.holds, control.came_to)
+    control.attach(server, pacer, admission)
     server.start()
     say(f"display: {server.address(admission.token)}")
     say(f"{_WATCHED if console is None else _DECIDED} Ctrl-C ends the run.")
@@ -96,7 +88,7 @@ def run_session(
             block = simulation.components[console]
             assert isinstance(block, Human)
             block.desk = desk
-        crew.scope = scope
+        control.scope = scope
 
     ended = "the run was broken off"
     received: list[int] = []
@@ -116,7 +108,7 @@ def run_session(
     finally:
         desk.close()
         server.close({"type": "end", "why": ended})
-    say(f"run: {printable(str(summary['out']))}: {crew.sentence()}; {pacer.sentence()}")
+    say(f"run: {printable(str(summary['out']))}: {control.sentence()}; {pacer.sentence()}")
     if received:
         raise KeyboardInterrupt if received[0] == signal.SIGINT else Terminated(received[0])
 

@@ -1,4 +1,4 @@
-"""The flights of a run on a map: east and north of where the ownship starts."""
+"""The flights of a run on a map, east and north of where the ownship starts, and what was seen."""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from components.display.recorded_rows import Detected
+from components.display.symbols import by_target, evenly
 from components.geometry.ellipsoid import line_of_sight, line_of_sight_ned
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
@@ -18,22 +20,15 @@ MOST_POINTS = 30_000
 """Points of all tracks together."""
 MOST_TRACKS = 1000
 """Of more targets than this, those that come nearest are drawn."""
+MOST_MARKS = 20_000
+"""Detections whose position is worked out; fewer are drawn."""
 
 
 @dataclass
 class Track:
-    """One aircraft's flight.
+    """One aircraft's flight, (points,) each; NaN where it is not there.
 
-    Parameters
-    ----------
-    name : str
-    time_s : (points,)
-    east_km, north_km : (points,)
-        NaN where the aircraft is not there.
-    range_m : (points,)
-        True slant range from the ownship; NaN where one of the two is not there.
-    alt_m : (points,)
-        Above the ellipsoid; NaN where the aircraft is not there.
+    The range is the true slant range from the ownship, the altitude that above the ellipsoid.
     """
 
     name: str
@@ -53,14 +48,8 @@ class Track:
 class Flights:
     """Where the aircraft of a traffic source are, in a frame tangent at the ownship's start.
 
-    Parameters
-    ----------
-    source : TrafficSource
-    duration_s : float
-    closest_s : dict
-        Target → time of closest approach, which becomes a point of its track.
-    nearest_m : dict, optional
-        Target → range at closest approach. Of very many targets only the nearest have tracks.
+    The time of a target's closest approach becomes a point of its track; of very many targets only
+    the nearest have tracks.
     """
 
     def __init__(
@@ -81,20 +70,14 @@ class Flights:
         times = _times(source.own, duration_s, count)
         own = source.own_at(times)
         start = int(np.argmax(own.present))
-        self._lat_deg = float(own.lat_deg[start])
-        self._lon_deg = float(own.lon_deg[start])
-        self._alt_m = float(own.alt_m[start])
+        #: Latitude and longitude in degrees and altitude in metres of the map's origin.
+        self.origin = float(own.lat_deg[start]), float(own.lon_deg[start]), float(own.alt_m[start])
         self.start_s = float(times[start])
         #: Where the ownship's nose points at its start, clockwise from north.
         self.start_yaw_rad = float(own.yaw_rad[start])
         east, north = self._map(own)
         self.own = Track("ownship", times, east, north, np.zeros(len(times)), _altitude(own))
         self.targets = [self._track(target, count) for target in chosen]
-
-    @property
-    def origin(self) -> tuple[float, float, float]:
-        """Latitude and longitude in degrees and altitude in metres of the map's origin."""
-        return self._lat_deg, self._lon_deg, self._alt_m
 
     @classmethod
     def of(cls, simulation: "Simulation", summary: dict[str, Any]) -> "Flights | None":
@@ -141,13 +124,7 @@ class Flights:
 
     def _map(self, state: Any) -> tuple[FloatArray, FloatArray]:
         north, east, _ = line_of_sight_ned(
-            self._lat_deg,
-            self._lon_deg,
-            self._alt_m,
-            state.lat_deg,
-            state.lon_deg,
-            state.alt_m,
-            validate=False,
+            *self.origin, state.lat_deg, state.lon_deg, state.alt_m, validate=False
         )
         there = state.present
         return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)
@@ -172,3 +149,46 @@ def _times(flight: Any, duration_s: float, count: int) -> FloatArray:
     end = max(start, min(duration_s, end))
     # One instant is enough for a flight of no length.
     return np.linspace(start, end, count if end > start else 1)
+
+
+#: Sensor → detections of one target: its track, and times, east and north of the detections.
+Positions = dict[str, list[tuple[Track, FloatArray, FloatArray, FloatArray]]]
+
+
+def positions(flights: Flights, detected: Detected) -> Positions:
+    """Return for each sensor and target the true positions of its detections."""
+    tracks = {track.name: track for track in flights.targets}
+    wanted: dict[int, list[tuple[str, FloatArray]]] = {}
+    grouped = {name: by_target(detected.target[name]) for name in detected.sensors}
+    most = max(10, MOST_MARKS // max(1, sum(len(groups) for groups in grouped.values())))
+    for name, groups in grouped.items():
+        for target, rows in groups:
+            if detected.names[target] in tracks:
+                rows = rows[evenly(len(rows), most)]
+                wanted.setdefault(target, []).append((name, detected.time_s[name][rows]))
+    found: Positions = {name: [] for name in detected.sensors}
+    for target, parts in sorted(wanted.items()):
+        # One call per target for all sensors together.
+        times = np.concatenate([times for _, times in parts])
+        east, north = flights.at(detected.names[target], times)
+        start = 0
+        for name, part in parts:
+            here = slice(start, start + len(part))
+            track = tracks[detected.names[target]]
+            found[name].append((track, part, east[here], north[here]))
+            start += len(part)
+    return found
+
+
+def where_detected(flights: Flights, found: Positions) -> FloatArray:
+    """Return the start, the detections and the ownship at their times, shape (points, 2)."""
+    points = [np.zeros((1, 2))]
+    own = flights.own
+    for paths in found.values():
+        for _, time_s, east, north in paths:
+            points.append(np.column_stack((east, north)))
+            own_east = np.interp(time_s, own.time_s, own.east_km)
+            own_north = np.interp(time_s, own.time_s, own.north_km)
+            points.append(np.column_stack((own_east, own_north)))
+    together = np.concatenate(points)
+    return together[np.isfinite(together).all(axis=1)]

@@ -1,30 +1,101 @@
-"""The part of the map that the plan shows, and its scale."""
+"""What the plan shows: the part of the map that is seen, and the sensors' fields of view on it."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from components.display.fields_of_view import Outline
-from components.display.flights import Flights
-from components.display.positions import Positions, where_detected
+from components.display.flights import Flights, Positions, where_detected
+from components.geometry.field_of_view import sector_width_rad
+from dsa_des.arrays.types import FloatArray
+from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI
 
 # Inches: the map is as wide as it may be, and as high as the flights need.
 MAP_WIDTH_IN, _MAP_HEIGHTS_IN = 6.4, (3.8, 6.6)
 
 
+@dataclass
+class Outline:
+    """A field of view from above, with a range limit if closed: its corners (n, 2), east and north.
+
+    One without a limit has the directions of its two edges.
+    """
+
+    corners_km: FloatArray
+    radius_km: float
+    closed: bool
+
+
+def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
+    """Return a reach from above, for a level ownship at the origin with its nose at `yaw_rad`.
+
+    It is drawn as the plane of elevation 0 of the sensor's axes; a tilted sensor foreshortens it.
+    """
+    width = sector_width_rad(*reach.azimuth_rad)
+    everywhere = width >= 2 * math.pi - 1e-9
+    closed = math.isfinite(reach.range_max_m)
+    angle = reach.azimuth_rad[0] + np.linspace(0.0, min(width, 2 * math.pi), 181)
+    if not closed:
+        angle = angle[:0] if everywhere else angle[[0, -1]]
+    radius_km = reach.range_max_m / 1000 if closed else 1.0
+    azimuth, elevation = axes.pointing(angle, np.zeros(len(angle)))
+    bearing = yaw_rad + azimuth
+    level_km = radius_km * np.cos(elevation) if closed else np.ones(len(angle))
+    corners = np.column_stack((np.sin(bearing), np.cos(bearing))) * level_km[:, np.newaxis]
+    if closed and not everywhere:
+        corners = np.vstack((corners, [[0.0, 0.0]]))
+    return Outline(corners, radius_km, closed)
+
+
+def draw_outline(
+    axes: Any, outline: Outline, styles: Mapping[str, Mark], name: str, far_km: float
+) -> None:
+    """Draw a sensor's field of view: filled up to a range limit, or dashed edges without end.
+
+    No corner of the plot is farther away than `far_km`.
+    """
+    from matplotlib.patches import Polygon
+
+    colour = styles[name].colour
+    corners = outline.corners_km
+    if outline.closed:
+        axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.06, zorder=0.5))
+        axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.0, zorder=0.6))
+        return
+    shift = 4 * list(styles).index(name)
+    for edge in corners * far_km:
+        # Shifted dashes keep two fields of view with the same edges apart.
+        axes.plot(
+            [0.0, edge[0]], [0.0, edge[1]], color=colour, linewidth=1.2,
+            linestyle=(shift, (6, 5)), zorder=0.7, scalex=False, scaley=False,
+        )  # fmt: skip
+
+
+def reach_text(reach: Any, axes: Any) -> str:
+    """Return a reach in words, round the boresight where that is not the nose."""
+    if not reach.enabled:
+        return "switched off"
+    low, high = (math.degrees(angle) for angle in reach.azimuth_rad)
+    field = f"±{high:.4g}°" if low == -high else f"{low:.4g}° to {high:.4g}°"
+    azimuth, elevation = (
+        round(math.degrees(angle[0]), 6) for angle in axes.pointing(*np.zeros((2, 1)))
+    )
+    if azimuth or elevation:
+        field += f"\nround {azimuth:.4g}°"
+        field += f", {abs(elevation):.4g}° {'up' if elevation > 0 else 'down'}" if elevation else ""
+    if math.isfinite(reach.range_max_m):
+        return f"field of view {field},\nto {reach.range_max_m / 1000:g} km"
+    return f"field of view {field},\nno range limit (dashed)"
+
+
 class MapView:
     """What part of the map is seen, at one scale in both directions.
 
     It is everything that was flown; but if all detections lie in a small part of that, the
-    surroundings of that part.
-
-    Parameters
-    ----------
-    flights : Flights
-    positions : Positions
-    outlines : list of Outline
-        Fields of view; as much of them is shown as does not dwarf the flights.
+    surroundings of that part. Of fields of view as much is shown as does not dwarf the flights.
     """
 
     def __init__(self, flights: Flights, positions: Positions, outlines: list[Outline]) -> None:

@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.altitudes import draw_altitudes
-from components.display.fields_of_view import draw_outline, outline_of, reach_text
-from components.display.flights import Flights, Track
-from components.display.labels import Labels
-from components.display.map_view import MAP_WIDTH_IN, MapView
-from components.display.marks import Detected
-from components.display.positions import positions
-from components.display.styles import mark_of
+from components.display.flights import Flights, Positions, Track, positions
+from components.display.map_view import (
+    MAP_WIDTH_IN,
+    MapView,
+    draw_outline,
+    outline_of,
+    reach_text,
+)
+from components.display.recorded_rows import Detected
+from components.display.symbols import Labels, draw_marks, in_turns, mark_of
 from components.display.terminal import distance_text
-from components.display.thinning import evenly, staggered
 from components.messages.reach import Reach
 from components.sensor.mounting import BodyAxes
 from dsa_des.arrays.types import FloatArray
@@ -30,10 +31,11 @@ MOST_NAMED = 8
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
 # The panel of altitudes below it, and what is between the two.
 _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
-_OWN = "#000000"
-_TARGET = "#777777"
+_OWN, _TARGET = "#000000", "#777777"
+_MANY = 20
 
-_SPACING_PX = 9.0  # between marks of different sensors on one track
+#: Least span of altitudes that is shown, m: level flights are level lines.
+_LEAST_SPAN_M = 40.0
 
 
 def draw_plan(
@@ -43,19 +45,7 @@ def draw_plan(
     detected: Detected,
     summary: dict[str, Any],
 ) -> Path:
-    """Draw the plan view.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG to write.
-    simulation : Simulation
-        For the sensors' fields of view.
-    flights : Flights
-    detected : Detected
-    summary : dict
-        For the numbers in the legend.
-    """
+    """Draw the plan view, with fields of view as the blocks have them, and write it as PNG."""
     marks = positions(flights, detected)
     looks = {
         name: getattr(simulation.components.get(name), "stated_reach", None)
@@ -102,8 +92,7 @@ def draw_plan(
             (left, _BOTTOM_IN / height_in, right - left, _ALTITUDES_IN / height_in)
         )
         px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
-        colours = (_OWN, _TARGET)
-        draw_altitudes(heights, flights, marks, detected.styles, px_per_s, colours)
+        _draw_altitudes(heights, flights, marks, detected.styles, px_per_s)
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         handles = _legend(texts, detected, drawn, summary)
         figure.legend(
@@ -113,29 +102,35 @@ def draw_plan(
     return path
 
 
+def _draw_lines(axes: Any, lines: list[FloatArray]) -> None:
+    """Draw lines of targets, and last that of the ownship."""
+    from matplotlib.collections import LineCollection
+
+    targets = len(lines) - 1
+    widths = [0.6 if targets >= _MANY else 1.0] * targets + [2.0]
+    colours = [_TARGET] * targets + [_OWN]
+    axes.add_collection(
+        LineCollection(lines, colors=colours, linewidths=widths, zorder=1.0), autolim=False
+    )
+
+
 def _draw_tracks(axes: Any, view: MapView, flights: Flights) -> None:
     from matplotlib.collections import LineCollection
 
     tracks = [*flights.targets, flights.own]
-    many = len(tracks) > 20
-    widths = [0.6 if many else 1.0] * (len(tracks) - 1) + [2.0]
-    colours = [_TARGET] * (len(tracks) - 1) + [_OWN]
+    many = len(flights.targets) >= _MANY
     lines = [np.column_stack((track.east_km, track.north_km)) for track in tracks]
+    _draw_lines(axes, lines)
     # Drawn with their gaps; ends are sought without them.
     known = [line[np.isfinite(line).all(axis=1)] for line in lines]
     starts = np.array([line[0] for line in known if len(line)])
+    arrows = [_arrow_head(line, (5.0 if many else 8.0) * view.km_per_px) for line in known]
+    colours = [_TARGET] * len(flights.targets) + [_OWN]
+    shown = [(arrow, c) for arrow, c in zip(arrows, colours, strict=True) if arrow is not None]
     axes.add_collection(
-        LineCollection(lines, colors=colours, linewidths=widths, zorder=1.0), autolim=False
-    )
-    heads, head_colours = [], []
-    for line, colour in zip(known, colours, strict=True):
-        head = _arrow_head(line, (5.0 if many else 8.0) * view.km_per_px)
-        if head is not None:
-            heads.append(head)
-            head_colours.append(colour)
-    axes.add_collection(
-        LineCollection(heads, colors=head_colours, linewidths=1.5, zorder=1.1), autolim=False
-    )
+        LineCollection([arrow for arrow, _ in shown], colors=[colour for _, colour in shown],
+                       linewidths=1.5, zorder=1.1), autolim=False,
+    )  # fmt: skip
     if len(starts):
         axes.plot(
             starts[:, 0], starts[:, 1], linestyle="none", marker="o", markersize=3 if many else 5,
@@ -166,21 +161,41 @@ def _draw_marks(
     """Mark a sensor's detections, as far as they can be told apart, and return how many."""
     if not paths:
         return 0
-    sensors = list(styles)
-    kept_east, kept_north = [], []
+    points = []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
-        keep = staggered(along_px, _SPACING_PX * len(sensors), sensors.index(name) / len(sensors))
-        kept_east.append(east[keep])
-        kept_north.append(north[keep])
-    east, north = np.concatenate(kept_east), np.concatenate(kept_north)
-    few = evenly(len(east), 5000)
-    style = styles[name]
-    axes.plot(
-        east[few], north[few], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
-        scalex=False, scaley=False,
-    )  # fmt: skip
-    return len(few)
+        points.append(np.column_stack((east, north))[in_turns(along_px, styles, name)])
+    return draw_marks(axes, styles[name], np.concatenate(points))
+
+
+def _draw_altitudes(
+    axes: Any,
+    flights: Flights,
+    marks: Positions,
+    styles: Mapping[str, Mark],
+    px_per_s: float,
+) -> None:
+    """Draw altitude above the ellipsoid over time, and where each sensor detected what."""
+    tracks = [*flights.targets, flights.own]
+    _draw_lines(axes, [np.column_stack((track.time_s, track.alt_m)) for track in tracks])
+    for name, style in styles.items():
+        points = []
+        for track, time_s, _, _ in marks.get(name, []):
+            kept = time_s[in_turns(time_s * px_per_s, styles, name)]
+            points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
+        if points:
+            draw_marks(axes, style, np.concatenate(points))
+    every = np.concatenate([track.alt_m for track in tracks])
+    every = every[np.isfinite(every)]
+    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
+    half = max(high - low, _LEAST_SPAN_M) * 0.58
+    axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+    axes.set_xlim(0.0, max(flights.duration_s, 1e-9))
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("altitude [m]")
+    axes.grid(color="#DDDDDD", linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.ticklabel_format(useOffset=False, style="plain")
 
 
 def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
@@ -248,8 +263,8 @@ def _legend(
     for name in detected.sensors:
         count = summary.get("sensors", {}).get(name, {}).get("detections")
         count = len(detected.time_s[name]) if count is None else count
-        who = figure_text(name, 24)
-        text = f"{who}: {count:,} detections" if count else f"{who}: no detections"
+        label = figure_text(name, 24)
+        text = f"{label}: {count:,} detections" if count else f"{label}: no detections"
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:

@@ -1,18 +1,29 @@
-"""The report of a detect-and-sense run: summary, terminal tables and two figures."""
+"""The report of a detect-and-sense run: summary, terminal tables, changes between runs, figures."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from components.display.change import share_that_differs
-from components.display.outcomes import outcome_observers
-from components.display.summary import FusedSummary, SensorSummary
+import numpy as np
+
+from components.display.summary import (
+    FusedSummary,
+    SensorSummary,
+    outcome_observers,
+    senders,
+)
 from components.messages.detections import Detections
 from dsa_des.record.recording import Observer
 from dsa_des.running.reports import Change, Difference
 
 if TYPE_CHECKING:
     from dsa_des.running.simulation import Simulation
+
+
+def share_that_differs(changes: Mapping[str, Any]) -> float:
+    """Return detections gained and lost, of what `compare_runs` returned, per one before."""
+    changed = changes.get("detections_gained", 0) + changes.get("detections_lost", 0)
+    return float(changed / max(changes.get("detections_reference", 0), 1))
 
 
 class DetectAndSenseReport:
@@ -35,7 +46,7 @@ class DetectAndSenseReport:
         Every block that sends `Detections` is a sensor, ours or not.
         """
         sensors = sensor_names(simulation)
-        off = [name for name in sensors if is_off(simulation.components[name])]
+        off = [n for n in sensors if getattr(simulation.components[n].p, "enabled", True) is False]
         return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation)]
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
@@ -54,8 +65,6 @@ class DetectAndSenseReport:
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
-        from components.display.change import compare_runs
-
         return compare_runs(reference, other)
 
     def remarks(self, changes: Mapping[str, Any]) -> list[str]:
@@ -64,7 +73,7 @@ class DetectAndSenseReport:
         return [f"never sees {', '.join(missed)}"] if missed else []
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
-        """Draw ``plan.png`` and ``timeline.png`` into a run's folder.
+        """Draw the figures of a run into its folder, the same bytes on every drawing.
 
         Parameters
         ----------
@@ -78,22 +87,98 @@ class DetectAndSenseReport:
         Returns
         -------
         list of Path
-            Without ``plan.png`` when no block of the scene knows the flights.
+            ``plan.png`` where a block of the scene knows the flights, ``timeline.png``, and
+            ``tracks.png`` and ``consistency.png`` where a tracker confirmed tracks with a range.
         """
-        from components.display.figures import draw
+        from components.display.flights import Flights
+        from components.display.plan import draw_plan
+        from components.display.recorded_rows import Detected
+        from components.display.symbols import styles_of
+        from components.display.timeline import draw_timeline
+        from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks
 
-        return draw(simulation, folder, summary, sensor_names(simulation))
+        flights = Flights.of(simulation, summary)
+        detected = Detected.read(folder, sensor_names(simulation))
+        detected.styles = styles_of(detected.sensors, simulation.components)
+        paths = []
+        if flights is not None:
+            paths.append(draw_plan(folder / "plan.png", simulation, flights, detected, summary))
+        paths.append(draw_timeline(folder / "timeline.png", simulation, flights, detected, folder))
+        tracks = DrawnTracks.read(simulation, folder)
+        if tracks is not None:
+            paths.append(draw_tracks(folder / "tracks.png", tracks))
+            consistency = draw_consistency(folder / "consistency.png", tracks)
+            paths += [] if consistency is None else [consistency]
+        return paths
 
 
 def sensor_names(simulation: "Simulation") -> list[str]:
     """Return the names of all blocks that send `Detections`, sorted."""
-    return sorted(
-        name
-        for name, component in simulation.components.items()
-        if any(issubclass(output.message, Detections) for output in component.outputs.values())
-    )
+    return senders(simulation, Detections)
 
 
-def is_off(sensor: Any) -> bool:
-    """Whether a sensor has a parameter ``enabled`` that is false."""
-    return getattr(sensor.p, "enabled", True) is False
+def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what changed from one run's tables to another's.
+
+    Tables are ``pyarrow.Table`` by name: ``detections`` and ``fused``. ``detections_gained`` and
+    ``detections_lost`` count (sensor, target, instant) that only one of the runs has, of
+    ``detections_reference``. ``first_detection_range_change_m`` and
+    ``first_detection_time_change_s`` are those of the sensor and target, named in
+    ``first_detection_of``, whose first detection moved farthest in range; None where no sensor saw
+    one target in both runs. ``never_detected`` and ``newly_detected`` list ``sensor/target`` that
+    only one run detects. ``fused_share`` is the share of fused rows with two sensors or more,
+    ``fused_share_change`` its change. False alarms are left out.
+    """
+    before, after = _detections(reference), _detections(other)
+    common = before.keys() & after.keys()
+    moved: tuple[float, float] | tuple[None, None] = (None, None)
+    of = None
+    firsts, others = _firsts(before), _firsts(after)
+    for name in sorted(firsts.keys() & others.keys()):
+        change = (others[name][1] - firsts[name][1], others[name][0] - firsts[name][0])
+        if moved[0] is None or abs(change[0]) > abs(moved[0]):
+            moved, of = change, name
+    share, changed = _fused_share(reference), _fused_share(other)
+    return {
+        "first_detection_of": of,
+        "first_detection_range_change_m": moved[0],
+        "first_detection_time_change_s": moved[1],
+        "never_detected": sorted(firsts.keys() - others.keys()),
+        "newly_detected": sorted(others.keys() - firsts.keys()),
+        "detections_reference": len(before),
+        "detections_gained": len(after) - len(common),
+        "detections_lost": len(before) - len(common),
+        "fused_share": changed,
+        "fused_share_change": None if share is None or changed is None else changed - share,
+    }
+
+
+def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float, float]]:
+    """Return time and true range by (sensor/target, tick)."""
+    table = tables.get("detections")
+    if table is None:
+        return {}
+    columns = [table[name].to_pylist() for name in ("block", "target", "tick", "time_s",
+                                                    "true_range_m")]  # fmt: skip
+    return {
+        (f"{block}/{target}", tick): (time_s, range_m)
+        for block, target, tick, time_s, range_m in zip(*columns, strict=True)
+        if target is not None
+    }
+
+
+def _firsts(
+    detections: Mapping[tuple[str, int], tuple[float, float]],
+) -> dict[str, tuple[float, float]]:
+    found: dict[str, tuple[float, float]] = {}
+    for (name, _), seen in detections.items():
+        if name not in found or seen[0] < found[name][0]:
+            found[name] = seen
+    return found
+
+
+def _fused_share(tables: Mapping[str, Any]) -> float | None:
+    table = tables.get("fused")
+    if table is None or table.num_rows == 0:
+        return None
+    return float(np.mean(["+" in sensors for sensors in table["sensors"].to_pylist()]))

@@ -1,21 +1,40 @@
-"""Running summaries of a run: what each sensor saw first and last, and which sensors were fused.
+"""Running summaries of a run: detections, fused lines of sight, tracks, alerts and manoeuvres.
 
-They take the recorded rows as these come, and keep a few numbers per sensor whatever the length
-of the run.
+They take the recorded rows as these come, and keep a few numbers per sensor, track and block
+whatever the length of the run.
 """
 
 import math
 from collections.abc import Collection, Iterable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from components.messages.alerts import AlertLevels
 from components.messages.detections import Detections
+from components.messages.state_tracks import COASTED, CONFIRMED, STATUSES, StateTracks
+from components.messages.steering import Manoeuvres
+from components.metrics.true_states import TargetsInFrame
 from components.sensor.cut_off import END, START, in_scan
-from dsa_des.arrays.types import IntArray
-from dsa_des.block.message import Text
-from dsa_des.record.recording import Columns
+from components.traffic.source import TrafficSource
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.record.recording import Observer
 
+if TYPE_CHECKING:
+    from dsa_des.running.simulation import Simulation
+
+#: Columns of recorded rows; of text `dsa_des.block.message.Text`.
+Columns = Any
+
+#: Table of the tracks.
+TABLE = "state_tracks"
+#: A track that never comes so near to any target is false.
+NEAR_M = 300.0
+_PLACE = ("north_m", "east_m", "down_m")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+_HELD = (STATUSES[CONFIRMED], STATUSES[COASTED])
+#: Distances of tracks and targets that are worked out at once.
+_MOST_AT_ONCE = 200_000
 _SKIPPED = "skipped_"
 #: Said only where something stood before a target: most scenes have nothing that could.
 _HIDDEN = "skipped_hidden"
@@ -25,12 +44,7 @@ SKIP_COLUMNS = tuple(name for name in Detections.recorded["scans"] if name.start
 class SensorSummary:
     """Counts each sensor's scans and detections and keeps its first and last detection.
 
-    Parameters
-    ----------
-    sensors : iterable of str
-        Names of all sensor blocks; each gets an entry, also when it never scans.
-    off : collection of str
-        Those of them that are switched off.
+    Each sensor gets an entry, also when it never scans or is switched off.
     """
 
     tables: ClassVar[frozenset[str]] = frozenset({"scans", "detections"})
@@ -93,6 +107,100 @@ class FusedSummary:
         return {"fused": dict(sorted(self._counts.items()))}
 
 
+def outcome_observers(simulation: "Simulation") -> list[Observer]:
+    """Return running summaries for the kinds of blocks that a scene has."""
+    found: list[Observer] = []
+    if names := senders(simulation, StateTracks):
+        found.append(TrackSummary(names, _recorded_targets(simulation)))
+    if names := senders(simulation, AlertLevels):
+        found.append(AlertSummary(names))
+    if names := senders(simulation, Manoeuvres):
+        found.append(ManoeuvreSummary(names))
+    return found
+
+
+class TrackSummary:
+    """Counts each tracker's confirmed tracks, and how far they lie from the truth.
+
+    `targets` makes targets in the frame of an origin; None where no truth is recorded.
+    """
+
+    tables: ClassVar[frozenset[str]] = frozenset({TABLE})
+
+    def __init__(self, trackers: Iterable[str], targets: Any = None) -> None:
+        self._entries = {name: _Tracker(targets) for name in trackers}
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of ``state_tracks``."""
+        status = columns["track_status"]
+        wanted = [code for code, name in enumerate(status.names) if name in _HELD]
+        held = np.isin(status.codes, wanted)
+        for name, rows in rows_by_name(columns["block"]):
+            self._entries[name].add(columns, rows[held[rows]])
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``tracks``: tracker → what came of it.
+
+        ``confirmed`` counts tracks that were ever confirmed. Where truth is recorded: ``false``
+        of them have a range and are never within `NEAR_M` of a target (None where no track has
+        a range), and ``position_error_m`` is the rms distance of the others' states from the
+        nearest target within `NEAR_M`, None without any.
+        """
+        return {"tracks": {name: entry.result() for name, entry in self._entries.items()}}
+
+
+class AlertSummary:
+    """Keeps when each level of an alerter first came on."""
+
+    tables: ClassVar[frozenset[str]] = frozenset({AlertLevels.entry_table or ""})
+
+    def __init__(self, alerters: Iterable[str]) -> None:
+        self._first_s: dict[str, dict[int, float]] = {name: {} for name in alerters}
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of ``alerts``, in order of time."""
+        level, time_s = columns["level"], columns["time_s"]
+        for name, rows in rows_by_name(columns["block"]):
+            found, first = np.unique(level[rows], return_index=True)
+            for number, row in zip(found.tolist(), rows[first].tolist(), strict=True):
+                if number > 0:
+                    self._first_s[name].setdefault(number, float(time_s[row]))
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``alerts``: alerter → level → time of its first alert, s."""
+        return {
+            "alerts": {
+                name: {str(level): first[level] for level in sorted(first)}
+                for name, first in self._first_s.items()
+            }
+        }
+
+
+class ManoeuvreSummary:
+    """Counts manoeuvres, and keeps when the first and last were begun."""
+
+    tables: ClassVar[frozenset[str]] = frozenset({Manoeuvres.row_table or ""})
+
+    def __init__(self, deciders: Iterable[str]) -> None:
+        self._entries: dict[str, dict[str, Any]] = {
+            name: {"count": 0, "first_s": None, "last_s": None} for name in deciders
+        }
+
+    def update(self, table: str, columns: Columns) -> None:
+        """Take rows of ``manoeuvres``, in order of time."""
+        time_s = columns["time_s"]
+        for name, rows in rows_by_name(columns["block"]):
+            entry = self._entries[name]
+            if not entry["count"]:
+                entry["first_s"] = float(time_s[rows[0]])
+            entry["count"] += len(rows)
+            entry["last_s"] = float(time_s[rows[-1]])
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``manoeuvres``: block → ``count``, ``first_s``, ``last_s``."""
+        return {"manoeuvres": self._entries}
+
+
 class _Sensor:
     """What is kept of one sensor."""
 
@@ -108,24 +216,24 @@ class _Sensor:
         self.span: tuple[int, int] | None = None
 
     def add_scans(self, columns: Columns, rows: IntArray) -> None:
-        tick = numbers(columns, "tick")
+        tick = columns["tick"]
         begin = int(tick[rows[0]]) if self.span is None else self.span[0]
         self.span = begin, int(tick[rows[-1]])
         self.scans += len(rows)
-        self.evaluated += int(numbers(columns, "evaluated")[rows].sum())
+        self.evaluated += int(columns["evaluated"][rows].sum())
         for name in self.skipped:
             if name in columns:
-                self.skipped[name] += int(numbers(columns, name)[rows].sum())
+                self.skipped[name] += int(columns[name][rows].sum())
 
     def add_detections(self, columns: Columns, rows: IntArray) -> None:
-        true = rows[codes(columns["target"])[rows] >= 0]
+        true = rows[columns["target"].codes[rows] >= 0]
         self.false_alarms += len(rows) - len(true)
         if len(true):
             self._add_true(columns, true)
 
     def _add_true(self, columns: Columns, rows: IntArray) -> None:
         self.detections += len(rows)
-        tick = numbers(columns, "tick")
+        tick = columns["tick"]
         if self.first is None or self.first.tick == tick[rows[0]]:
             together = rows[: np.searchsorted(tick[rows], tick[rows[0]], side="right")]
             self.first = _nearer(self.first, _Sighting.nearest(columns, together))
@@ -145,12 +253,12 @@ class _Sensor:
                 for name, n in self.skipped.items()
                 if n or name != _HIDDEN
             },
-            "first_detection": self._marked(self.first, 0),
-            "last_detection": self._marked(self.last, 1),
+            "first_detection": self._with_end(self.first, 0),
+            "last_detection": self._with_end(self.last, 1),
         }
 
-    def _marked(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
-        """Say of a sighting whether it is at the sensor's first or last scan."""
+    def _with_end(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
+        """Return a sighting, and whether the sensor's first or last scan censors it."""
         if seen is None:
             return None
         found = seen.result()
@@ -159,27 +267,25 @@ class _Sensor:
         return found
 
 
-class _Sighting:
+class _Sighting(NamedTuple):
     """One detection."""
 
-    def __init__(self, tick: int, time_s: float, range_m: float, target: str) -> None:
-        self.tick = tick
-        self.time_s = time_s
-        self.range_m = range_m
-        self.target = target
+    tick: int
+    time_s: float
+    range_m: float
+    target: str
 
     @classmethod
     def nearest(cls, columns: Columns, rows: IntArray) -> "_Sighting":
         """Return the nearest of some rows of one instant."""
-        range_m = numbers(columns, "true_range_m")[rows]
+        range_m = columns["true_range_m"][rows]
         # A block that knows no true range records NaN, which is never the nearest.
         row = rows[np.argmin(np.where(np.isnan(range_m), np.inf, range_m))]
         target = columns["target"]
-        assert isinstance(target, Text)
         return cls(
-            int(numbers(columns, "tick")[row]),
-            float(numbers(columns, "time_s")[row]),
-            float(numbers(columns, "true_range_m")[row]),
+            int(columns["tick"][row]),
+            float(columns["time_s"][row]),
+            float(columns["true_range_m"][row]),
             target.names[target.codes[row]],
         )
 
@@ -194,15 +300,6 @@ def _nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
     return other if other.range_m < one.range_m else one
 
 
-def codes(column: Any) -> IntArray:
-    assert isinstance(column, Text)
-    return np.asarray(column.codes)
-
-
-def numbers(columns: Columns, name: str) -> Any:
-    return columns[name]
-
-
 def rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
     """Return each name that occurs in a text column and its rows, ascending."""
     counts = np.bincount(column.codes + 1)[1:]  # code -1 is null
@@ -210,3 +307,69 @@ def rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
         (column.names[code], np.flatnonzero(column.codes == code))
         for code in np.flatnonzero(counts).tolist()
     ]
+
+
+class _Tracker:
+    """What is kept of one tracker."""
+
+    def __init__(self, targets: Any) -> None:
+        self._at, self._targets = targets, None
+        self._confirmed: set[int] = set()
+        self._judged: set[int] = set()
+        self._near: set[int] = set()
+        self._squares_m2, self._count = 0.0, 0
+
+    def add(self, columns: Columns, rows: IntArray) -> None:
+        number = columns["track"]
+        self._confirmed.update(np.unique(number[rows]).tolist())
+        if self._at is None:
+            return
+        rows = rows[columns["has_range"][rows]]
+        self._judged.update(np.unique(number[rows]).tolist())
+        if self._targets is None and len(rows):
+            self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in _ORIGIN))
+        step = _MOST_AT_ONCE // max(1, len(self._targets.names) if self._targets else 1) + 1
+        for start in range(0, len(rows), step):
+            self._compare(columns, rows[start : start + step])
+
+    def _compare(self, columns: Columns, rows: IntArray) -> None:
+        assert self._targets is not None
+        apart = distances(columns, rows, self._targets.at(columns["state_s"][rows]))
+        # What is not there is no distance away; a scene may have no targets at all.
+        nearest = np.fmin.reduce(apart, axis=0, initial=np.inf)
+        near = nearest < NEAR_M
+        self._near.update(np.unique(columns["track"][rows[near]]).tolist())
+        self._squares_m2 += float((nearest[near] ** 2).sum())
+        self._count += int(near.sum())
+
+    def result(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"confirmed": len(self._confirmed)}
+        if self._at is not None:
+            found["false"] = len(self._judged - self._near) if self._judged else None
+            mean = self._squares_m2 / self._count if self._count else None
+            found["position_error_m"] = None if mean is None else mean**0.5
+        return found
+
+
+def _recorded_targets(simulation: "Simulation") -> Any:
+    """Return what makes `TargetsInFrame` of an origin, where the truth is recorded."""
+    sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
+    if not sources or not all(source.says_truth for source in sources):
+        return None
+    targets = [target for source in sources for target in source.targets]
+    return lambda origin: TargetsInFrame(targets, origin)
+
+
+def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
+    """Return how far rows of tracks are from targets (targets, 3, rows) at the same times, m."""
+    estimate = np.stack([columns[name][rows] for name in _PLACE])
+    return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
+
+
+def senders(simulation: "Simulation", message: type) -> list[str]:
+    """Return the names of all blocks that send a kind of message, sorted."""
+    return sorted(
+        name
+        for name, component in simulation.components.items()
+        if any(issubclass(output.message, message) for output in component.outputs.values())
+    )

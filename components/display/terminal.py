@@ -9,14 +9,7 @@ MOST_TARGETS = 10
 
 
 def show(console: Any, summary: dict[str, Any]) -> None:
-    """Print a run's summary: sensors, fusion, closest approaches, what came of them, speed.
-
-    Parameters
-    ----------
-    console : rich.console.Console
-    summary : dict
-        As described in `DetectAndSenseReport.show`.
-    """
+    """Print a run's summary: sensors, fusion, closest approaches, outcomes, attitude, speed."""
     if summary.get("sensors"):
         _print_table(
             console,
@@ -81,8 +74,8 @@ def _sensor_rows(sensors: dict[str, Any]) -> list[tuple[str, ...]]:
             continue
         for which in ("first", "last"):
             seen = entry[f"{which}_detection"]
-            place = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
-            rows.append((*start, which + ("*" if seen.get("at") else ""), *place))
+            values = (f"{seen['time_s']:.3f}", distance_text(seen["range_m"]), seen["target"])
+            rows.append((*start, which + ("*" if seen.get("at") else ""), *values))
             start = ("", "", "")
     return rows
 
@@ -99,13 +92,7 @@ _WHY_NOT_SEEN = {
 
 
 def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say what the asterisk means behind the first and last detections that the run cut off.
-
-    Parameters
-    ----------
-    sensors : dict
-        As of `SensorSummary.result`.
-    """
+    """Say what the asterisk means behind the first and last detections that the run cut off."""
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()
@@ -116,13 +103,7 @@ def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def unseen_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say of each sensor without a detection why it saw nothing.
-
-    Parameters
-    ----------
-    sensors : dict
-        As of `SensorSummary.result`.
-    """
+    """Say of each sensor without a detection why it saw nothing."""
     lines = []
     for name, entry in sensors.items():
         if entry["first_detection"] is not None:
@@ -147,55 +128,42 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def outcome_lines(summary: dict[str, Any]) -> list[str]:
-    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do.
-
-    Parameters
-    ----------
-    summary : dict
-        With the sections of `components.display.outcomes.outcome_observers`, and ``late_looks`` of
-        trackers.
-    """
-    lines = [f"{name}: {_tracks_text(told)}" for name, told in summary.get("tracks", {}).items()]
+    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do."""
+    lines = [f"{name}: {_tracks_text(entry)}" for name, entry in summary.get("tracks", {}).items()]
     lines += [
-        f"{name}: {told['left_out']:,} of {told['looks']:,} looks of {sensor} "
-        f"({told['share']:.0%}) came too late and were left out"
+        f"{name}: {entry['left_out']:,} of {entry['looks']:,} looks of {sensor} "
+        f"({entry['share']:.0%}) came too late and were left out"
         for name, late in summary.get("late_looks", {}).items()
-        for sensor, told in late.items()
+        for sensor, entry in late.items()
     ]
     for name, first_s in summary.get("alerts", {}).items():
         times = ", ".join(f"level {level} from {when:.1f} s" for level, when in first_s.items())
         lines.append(f"{name}: {'alerts of ' + times if times else 'no alert'}")
-    for name, told in summary.get("manoeuvres", {}).items():
+    for name, entry in summary.get("manoeuvres", {}).items():
         text = "no manoeuvre"
-        if told["count"] == 1:
-            text = f"1 manoeuvre, at {told['first_s']:.1f} s"
-        elif told["count"]:
-            text = f"{told['count']:,} manoeuvres, from {told['first_s']:.1f} s to "
-            text += f"{told['last_s']:.1f} s"
+        if entry["count"] == 1:
+            text = f"1 manoeuvre, at {entry['first_s']:.1f} s"
+        elif entry["count"]:
+            text = f"{entry['count']:,} manoeuvres, from {entry['first_s']:.1f} s to "
+            text += f"{entry['last_s']:.1f} s"
         lines.append(f"{name}: {text}")
     return lines
 
 
-def _tracks_text(told: dict[str, Any]) -> str:
-    count = told["confirmed"]
+def _tracks_text(entry: dict[str, Any]) -> str:
+    count = entry["confirmed"]
     if not count:
         return "no confirmed track"
     text = f"{count:,} confirmed track{'s' if count > 1 else ''}"
-    if told.get("false") is not None:
-        text += f", {format(told['false'], ',') if told['false'] else 'none'} of them false"
-    if told.get("position_error_m") is not None:
-        text += f"; position error {distance_text(told['position_error_m'])} rms"
+    if entry.get("false") is not None:
+        text += f", {format(entry['false'], ',') if entry['false'] else 'none'} of them false"
+    if entry.get("position_error_m") is not None:
+        text += f"; position error {distance_text(entry['position_error_m'])} rms"
     return text
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:
-    """Say that attitude was derived from flown paths, and how wrong that is.
-
-    Parameters
-    ----------
-    traffic : dict
-        The section of a block that replays flights, with ``derived_attitude`` where any was.
-    """
+    """Say that attitude was derived from flown paths, and how wrong that is."""
     derived = traffic.get("derived_attitude")
     if not derived:
         return []

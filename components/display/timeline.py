@@ -9,10 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from components.display.flights import Flights
-from components.display.marks import Detected, read_fused
-from components.display.scan_times import ScansShown, SensorScans, read_scans, scans_between
-from components.display.styles import mark_of
-from components.display.thinning import by_target, evenly, staggered
+from components.display.recorded_rows import (
+    Detected,
+    ScansShown,
+    SensorScans,
+    read_fused,
+    read_scans,
+    scans_between,
+)
+from components.display.symbols import by_target, draw_marks, in_turns, mark_of
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
 
@@ -25,22 +30,12 @@ MOST_SCANS_SHOWN = 90
 """Scans of the fastest sensor in the close-up."""
 _SIZE_IN = (9.6, 7.0)
 _LEFT, _WIDTH = 0.105, 0.87
-_SPACING_PX = 9.0
 _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 
 @dataclass
 class CloseUp:
-    """The part of a run in which single scans are shown.
-
-    Parameters
-    ----------
-    start_s, end_s : float
-    what : str
-        Why this part.
-    joined : list of (time_s, sensors)
-        Instants in it at which two or more sensors were fused.
-    """
+    """A part of a run in which single scans are shown, why, and where sensors were fused."""
 
     start_s: float
     end_s: float
@@ -55,19 +50,7 @@ def draw_timeline(
     detected: Detected,
     folder: Path,
 ) -> Path:
-    """Draw a close-up of single scans, and range over time for the whole run.
-
-    Parameters
-    ----------
-    path : Path
-        The PNG to write.
-    simulation : Simulation
-    flights : Flights or None
-        For the targets' true ranges.
-    detected : Detected
-    folder : Path
-        Holds the run's Parquet tables.
-    """
+    """Draw a close-up of single scans, and range over time for the whole run."""
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
     close_up = find_close_up(scans, folder, duration_s)
@@ -157,8 +140,8 @@ def _draw_scans(
         here = shown.get(name, nothing)
         style = styles[name]
         rate_hz = scans[name].rate_hz if name in scans else None
-        who = figure_text(name, 16)
-        names.append(f"{who}\n{rate_hz:.4g} Hz" if rate_hz else who)
+        label = figure_text(name, 16)
+        names.append(f"{label}\n{rate_hz:.4g} Hz" if rate_hz else label)
         size = min(7.0, _mark_size(len(here.time_s)))
         axes.plot(
             here.time_s, np.full(len(here.time_s), height[name]), linestyle="none", marker="|",
@@ -233,9 +216,9 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     top_km = max(1.05 * top_km, 0.1)
     width_px = _SIZE_IN[0] * _WIDTH * DPI
     for name in detected.sensors:
-        style = detected.styles[name]
-        _draw_detections(axes, style, detected, name, width_px / duration_s)
-        handles.append(Line2D([], [], **mark_of(style), label=figure_text(name, 16)))
+        _draw_detections(axes, detected, name, width_px / duration_s)
+        label = figure_text(name, 16)
+        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=label))
     axes.set_ylim(0.0, top_km)
     axes.set_ylabel("true slant range [km]")
     axes.grid(color="#DDDDDD", linewidth=0.5)
@@ -247,26 +230,14 @@ def _draw_ranges(axes: Any, flights: Flights | None, detected: Detected, duratio
     )  # fmt: skip
 
 
-def _draw_detections(
-    axes: Any,
-    style: Mark,
-    detected: Detected,
-    name: str,
-    px_per_s: float,
-) -> None:
-    spacing_px = _SPACING_PX * len(detected.sensors)
-    phase = detected.sensors.index(name) / len(detected.sensors)
-    time_s, range_km = detected.time_s[name], detected.range_m[name] / 1000
+def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) -> None:
+    points = np.column_stack((detected.time_s[name], detected.range_m[name] / 1000))
     kept = [
-        rows[staggered(time_s[rows] * px_per_s, spacing_px, phase + _GOLDEN * target)]
+        rows[in_turns(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
         for target, rows in by_target(detected.target[name])
     ]
     if kept:
-        rows = np.concatenate(kept)
-        rows = rows[evenly(len(rows), 5000)]
-        axes.plot(
-            time_s[rows], range_km[rows], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
-        )  # fmt: skip
+        draw_marks(axes, detected.styles[name], points[np.concatenate(kept)])
 
 
 def _time_axis(axes: Any, start_s: float, end_s: float) -> None:

@@ -1,72 +1,174 @@
-"""``tracks.png``: estimated tracks with their 95 % ellipses over the true flights."""
+"""``tracks.png`` and ``consistency.png``: estimated tracks over the true flights, and their errors.
 
+Tracks are those that were confirmed and have a range.
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from components.display.drawn_tracks import DrawnTrack, DrawnTracks
-from components.display.labels import Labels
-from dsa_des.arrays.types import FloatArray
-from dsa_des.record.drawing import drawing, figure_text, tight
+from components.display.summary import NEAR_M, TABLE, distances
+from components.display.symbols import Labels
+from components.messages.state_tracks import COVARIANCE
+from components.metrics.true_states import TargetsInFrame
+from components.traffic.source import TrafficSource
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.studies.statistics import chi_square_bounds
+
+if TYPE_CHECKING:
+    from dsa_des.running.simulation import Simulation
 
 #: Okabe and Ito's colours, as in all figures, in turn.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _FALSE, _TRUTH, _OWN = "#999999", "#000000", "#666666"
+STATE = ("north_m", "east_m", "down_m", "north_m_s", "east_m_s", "down_m_s")
+_ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+_COLUMNS = (
+    "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
+    *_ORIGIN, *COVARIANCE.values(),
+)  # fmt: skip
+# Rows that are read of a table, at most; of a larger one, groups of rows spread over it.
+_MOST_ROWS = 1_000_000
 # Chi-square quantiles of 95 % in a plane and on a line.
 _PLANE, _LINE = 5.991464547107979, 3.841458820694124
 _MOST_POINTS, _ELLIPSES = 400, 8
 #: More names and numbers than this cannot be told apart.
 _MOST_NAMED = 12
+_MOST_ERRORS = 2000
+_LOWEST, _HIGHEST = 0.02, 1000.0
+#: Stretches of time over which innovations are averaged.
+_STRETCHES = 40
 
 
-def draw_tracks(path: Path, told: DrawnTracks) -> Path:
-    """Draw confirmed tracks that have a range, on the plan and by height.
+@dataclass(frozen=True, eq=False)
+class DrawnTrack:
+    """One track in order of time; it is false if it never comes near any target."""
 
-    Parameters
-    ----------
-    path : Path
-        The PNG to write.
-    told : DrawnTracks
+    block: str
+    number: int
+    columns: dict[str, Any]
+    false: bool
+
+    @property
+    def colour(self) -> str:
+        """Its colour in all figures."""
+        return _FALSE if self.false else COLOURS[(self.number - 1) % len(COLOURS)]
+
+
+class DrawnTracks:
+    """Tracks of a table, with the true flights in their frame."""
+
+    def __init__(self, simulation: "Simulation", columns: dict[str, Any]) -> None:
+        self.origin = tuple(float(columns[name][0]) for name in _ORIGIN)
+        self.time_s = float(columns["state_s"].min()), float(columns["state_s"].max())
+        sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
+        self.own = sources[0].own if sources else None
+        targets = [target for source in sources for target in source.targets]
+        self.targets = TargetsInFrame(targets, self.origin)
+        self.tracks = []
+        for block in sorted(set(columns["block"].tolist())):
+            mine = columns["block"] == block
+            for number in np.unique(columns["track"][mine]).tolist():
+                rows = np.flatnonzero(mine & (columns["track"] == number))
+                one = {name: columns[name][rows] for name in _COLUMNS}
+                near = distances(one, slice(None), self.targets.at(one["state_s"]))
+                # A comparison with nothing, as with what is not there, is false.
+                false = bool(len(targets)) and not bool((near < NEAR_M).any())
+                self.tracks.append(DrawnTrack(block, number, one, false))
+
+    @classmethod
+    def read(cls, simulation: "Simulation", folder: Path) -> "DrawnTracks | None":
+        """Read the tracks of a run's folder; None where none was confirmed."""
+        source = folder / f"{TABLE}.parquet"
+        columns = _read(source) if source.exists() else None
+        return None if columns is None else cls(simulation, columns)
+
+
+def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return normalised errors squared of a track to the nearest target, and where it has one.
+
+    States (targets, 6, rows) are those of the targets at the same times.
     """
-    grid = np.linspace(*told.time_s, _MOST_POINTS)
-    places, own = told.targets.at(grid), told.targets.own(grid)
+    count = len(one["state_s"])
+    if len(states) == 0:
+        return np.full(count, np.nan), np.zeros(count, dtype=bool)
+    apart = distances(one, slice(None), states[:, :3])
+    apart = np.where(np.isnan(apart), np.inf, apart)
+    nearest: IntArray = apart.argmin(axis=0)
+    rows = np.arange(count)
+    known = apart[nearest, rows] < NEAR_M
+    error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
+    spread = np.empty((count, 6, 6))
+    for (i, j), name in COVARIANCE.items():
+        spread[:, i, j] = spread[:, j, i] = one[name]
+    found = np.full(count, np.nan)
+    solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
+    found[known] = (error.T[known] * solved).sum(axis=1)
+    return found, known
+
+
+def _read(source: Path) -> dict[str, Any] | None:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(source)
+    groups = file.metadata.num_row_groups
+    step = -(-file.metadata.num_rows // _MOST_ROWS)
+    table = file.read_row_groups(list(range(0, groups, max(step, 1))), columns=list(_COLUMNS))
+    held = pa.array(["confirmed", "coasted"])
+    status = table["track_status"]
+    if pa.types.is_dictionary(status.type):
+        status = status.cast(status.type.value_type)
+    table = table.filter(pc.and_(table["has_range"], pc.is_in(status, held)))
+    if table.num_rows == 0:
+        return None
+    return {name: np.asarray(table[name].to_numpy(zero_copy_only=False)) for name in _COLUMNS}
+
+
+def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
+    """Draw tracks with their 95 % ellipses on the plan and by height, and write the PNG."""
+    grid = np.linspace(*drawn.time_s, _MOST_POINTS)
+    positions, own = drawn.targets.at(grid), drawn.targets.position(drawn.own, grid)
     with drawing(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
-        _flight(plan, height, grid, own, told.origin[2], {"color": _OWN, "linestyle": "--"})
-        for place in places:
-            _flight(plan, height, grid, place, told.origin[2], {"color": _TRUTH})
-        for one in told.tracks:
-            _draw_one(plan, height, one, told.origin[2])
+        _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
+        for position in positions:
+            _flight(plan, height, grid, position, drawn.origin[2], {"color": _TRUTH})
+        for one in drawn.tracks:
+            _draw_one(plan, height, one, drawn.origin[2])
         plan.set_aspect("equal", adjustable="datalim")
         plan.set_xlabel("east of the origin [km]")
         plan.set_ylabel("north of the origin [km]")
         height.set_xlabel("time [s]")
         height.set_ylabel("height in the frame [m]")
-        false = sum(one.false for one in told.tracks)
-        many = len(told.tracks) - false
+        false = sum(one.false for one in drawn.tracks)
+        many = len(drawn.tracks) - false
         plan.set_title(
             f"{many} confirmed track{'s' * (many != 1)} near targets, {false} false", loc="left"
         )
         _legend(figure, false > 0)
         tight(figure)
         figure.subplots_adjust(top=0.93)
-        _names(figure, plan, told, places, own)
+        _names(figure, plan, drawn, positions, own)
     return path
 
 
 def _flight(
-    plan: Any, height: Any, time_s: FloatArray, place: FloatArray, alt_m: float, style: Any
+    plan: Any, height: Any, time_s: FloatArray, ned_m: FloatArray, alt_m: float, style: Any
 ) -> None:
-    plan.plot(place[1] / 1e3, place[0] / 1e3, linewidth=0.7, zorder=1, **style)
-    height.plot(time_s, alt_m - place[2], linewidth=0.7, zorder=1, **style)
+    plan.plot(ned_m[1] / 1e3, ned_m[0] / 1e3, linewidth=0.7, zorder=1, **style)
+    height.plot(time_s, alt_m - ned_m[2], linewidth=0.7, zorder=1, **style)
 
 
 def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) -> None:
     every = track.columns
     rows = np.arange(len(every["state_s"]))[:: max(1, len(every["state_s"]) // _MOST_POINTS)]
     one = {name: values[rows] for name, values in every.items()}
-    colour = colour_of(track)
+    colour = track.colour
     style = {"color": colour, "linestyle": ":" if track.false else "-", "linewidth": 1.4}
     east, north = one["east_m"] / 1e3, one["north_m"] / 1e3
     plan.plot(east, north, zorder=2, **style)
@@ -88,11 +190,6 @@ def _draw_one(plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float) ->
         plan.plot(x, y, color=colour, linewidth=0.6, zorder=1)
 
 
-def colour_of(track: DrawnTrack) -> str:
-    """Return a track's colour in all figures."""
-    return _FALSE if track.false else COLOURS[(track.number - 1) % len(COLOURS)]
-
-
 def _legend(figure: Any, false: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -110,26 +207,98 @@ def _legend(figure: Any, false: bool) -> None:
     figure.legend(handles=entries, loc="upper center", ncols=len(entries), frameon=False)
 
 
-def _names(figure: Any, plan: Any, told: DrawnTracks, places: FloatArray, own: FloatArray) -> None:
+def _names(
+    figure: Any, plan: Any, drawn: DrawnTracks, positions: FloatArray, own: FloatArray
+) -> None:
     """Write names of aircraft at their ends and numbers of tracks at their beginnings."""
     plan.apply_aspect()
     x, y = plan.get_xlim(), plan.get_ylim()
     plan.set(xlim=x, ylim=y)
     per_px = (x[1] - x[0]) / plan.get_window_extent().width
-    lines = [place[[1, 0]].T / 1e3 for place in (*places, own)]
+    lines = [ned_m[[1, 0]].T / 1e3 for ned_m in (*positions, own)]
     lines += [
         np.column_stack([one.columns["east_m"], one.columns["north_m"]]) / 1e3
-        for one in told.tracks
+        for one in drawn.tracks
     ]
     points = np.concatenate(lines)
     labels = Labels(plan, x, y, per_px, points[~np.isnan(points).any(axis=1)])
-    for name, line in zip((*told.targets.names, "ownship"), lines, strict=False):
+    for name, line in zip((*drawn.targets.names, "ownship"), lines, strict=False):
         there = line[~np.isnan(line).any(axis=1)]
-        if len(there) and len(told.targets.names) <= _MOST_NAMED:
+        if len(there) and len(drawn.targets.names) <= _MOST_NAMED:
             labels.add(figure_text(name), float(there[-1][0]), float(there[-1][1]))
-    if len(told.tracks) > _MOST_NAMED:
+    if len(drawn.tracks) > _MOST_NAMED:
         return
-    blocks = {one.block for one in told.tracks}
-    for one, line in zip(told.tracks, lines[len(places) + 1 :], strict=True):
+    blocks = {one.block for one in drawn.tracks}
+    for one, line in zip(drawn.tracks, lines[len(positions) + 1 :], strict=True):
         text = f"{one.number}" if len(blocks) == 1 else f"{figure_text(one.block)} {one.number}"
-        labels.add(text, float(line[0][0]), float(line[0][1]), colour_of(one), "bold")
+        labels.add(text, float(line[0][0]), float(line[0][1]), one.colour, "bold")
+
+
+def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
+    """Draw normalised errors squared of tracks, and of what they expected of detections.
+
+    A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
+    drawn where no track is near a target.
+    """
+    shown: list[tuple[Any, FloatArray, FloatArray]] = []
+    for track in drawn.tracks:
+        count = len(track.columns["state_s"])
+        one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
+        found, known = errors_squared(one, drawn.targets.states(one["state_s"]))
+        if known.any():
+            shown.append((track, one["state_s"], found))
+    if not shown:
+        return None
+    every = np.concatenate([values[~np.isnan(values)] for _, _, values in shown])
+    with drawing(7.5, 6.4, path) as figure:
+        errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        for track, time_s, values in shown:
+            errors.plot(time_s, values, color=track.colour, linewidth=0.9,
+                        label=f"track {track.number}")  # fmt: skip
+        low, high = chi_square_bounds(6)
+        errors.axhspan(low, high, color="#999999", alpha=0.3, linewidth=0, zorder=0)
+        errors.axhline(6.0, color="#666666", linewidth=0.8, zorder=0)
+        inside = np.mean((every >= low) & (every <= high))
+        errors.set_title(
+            f"Error squared by its covariance (NEES): mean {every.mean():.3g} (honest: 6), "
+            f"{inside:.0%} inside", loc="left",
+        )  # fmt: skip
+        if len(shown) <= 6:
+            errors.legend(loc="upper right", ncols=3)
+        _draw_innovations(innovations, drawn)
+        errors.set_yscale("log")
+        bottom, top = errors.get_ylim()
+        errors.set_ylim(max(bottom, _LOWEST), min(max(top, 20.0), _HIGHEST))
+        plain_log_ticks(errors.yaxis)
+        innovations.set_ylim(bottom=0.0)
+        innovations.set_xlabel("time [s]")
+        tight(figure)
+    return path
+
+
+def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
+    held = [one.columns for one in drawn.tracks]
+    time_s, nis, freedom = (
+        np.concatenate([columns[name] for columns in held])
+        for name in ("state_s", "nis", "nis_freedom")
+    )
+    mine = freedom > 0
+    time_s, nis, freedom = time_s[mine], nis[mine], freedom[mine]
+    if len(nis) == 0:
+        axes.set_title("Innovation squared (NIS): this tracker tells none", loc="left")
+        return
+    edges = np.linspace(drawn.time_s[0], drawn.time_s[1] + 1e-9, _STRETCHES + 1)
+    total, many = (np.histogram(time_s, edges, weights=values)[0] for values in (nis, freedom))
+    middle = 0.5 * (edges[1:] + edges[:-1])[many > 0]
+    total, many = total[many > 0], many[many > 0]
+    low, high = np.array([chi_square_bounds(n) for n in many.tolist()]).T / many
+    axes.fill_between(middle, low, high, color="#999999", alpha=0.3, linewidth=0, label="95 %")
+    axes.plot(middle, total / many, color="#0072B2", marker=".", linewidth=0.9,
+              label="mean per quantity")  # fmt: skip
+    axes.axhline(1.0, color="#666666", linewidth=0.8, zorder=0)
+    inside = np.mean((total / many >= low) & (total / many <= high))
+    axes.set_title(
+        f"Innovation squared by its covariance (NIS): {nis.sum() / freedom.sum():.3g} per quantity "
+        f"(honest: 1), {inside:.0%} of stretches inside", loc="left",
+    )  # fmt: skip
+    axes.legend(loc="upper right")

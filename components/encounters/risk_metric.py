@@ -1,4 +1,9 @@
-"""The weight of the encounter that a run flies, as a metric beside what came of it."""
+"""Risk ratios over the runs of a study (``risk_ratio``): of all encounters, and class by class.
+
+One run of a closed loop gives both flags of an encounter, without and with the manoeuvres that the
+ownship was told (`components.metrics.risk`); beside them stand the encounter's weight and the
+class of its geometry. The ratios themselves are taken over all runs of a cell.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,9 +14,9 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import chosen_encounter
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class
-from components.metrics.encounter import read_flights
-from components.metrics.flights_together import nearest_of, ways_of
-from components.metrics.mitigated import Mitigated, RiskParameters
+from components.metrics.flown_flights import read_flights
+from components.metrics.losses import nearest_of, ways_of
+from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import RelativeFlight, traffic_block
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.scene.scene import Scene

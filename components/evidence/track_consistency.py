@@ -22,7 +22,8 @@ import dsa_des
 from components.estimation.motion import CoordinatedTurn, Motion
 from components.geometry.enu import enu_to_geodetic
 from components.messages.state_tracks import COVARIANCE
-from components.metrics.true_states import RecordedTruth
+from components.metrics.separation import traffic_of
+from components.metrics.true_states import states_in_frame
 from components.optical.range_boundary import OpticalRangeBoundary as CameraBoundary
 from components.radar.range_boundary import RangeBoundary as RadarBoundary
 from components.sensor.look import Cells, Look
@@ -325,18 +326,18 @@ def nees_of(case: Case, replicas: int) -> FloatArray:
     found: list[FloatArray] = []
     with tempfile.TemporaryDirectory() as folder:
         for scenes in _scenes(case, replicas, Path(folder)):
-            truth = RecordedTruth(scenes[0])
+            targets = traffic_of(scenes[0])[0].targets
             for table in _tracks(scenes):
-                found.append(_of_run(table, truth))
+                found.append(_of_run(table, targets))
     return np.concatenate(found)
 
 
-def _of_run(table: Any, truth: RecordedTruth) -> FloatArray:
+def _of_run(table: Any, targets: list[Any]) -> FloatArray:
     columns: Callable[[str], Any] = lambda name: table[name].to_numpy(zero_copy_only=False)  # noqa: E731
     time_s = columns("time_s")
     firsts = np.searchsorted(time_s, INSTANTS_S)
     status, ranged = columns("track_status"), columns("has_range")
-    nees = np.full((len(truth.names), len(INSTANTS_S)), np.nan)
+    nees = np.full((len(targets), len(INSTANTS_S)), np.nan)
     for k, first in enumerate(firsts.tolist()):
         if first == len(time_s):
             continue
@@ -346,7 +347,7 @@ def _of_run(table: Any, truth: RecordedTruth) -> FloatArray:
             continue
         part = {n: columns(n)[rows] for n in (*_STATE, *COVARIANCE.values(), "state_s")}
         origin = np.stack([columns(f"origin_{n}")[rows] for n in ("lat_deg", "lon_deg", "alt_m")])
-        known, _ = truth.at(part["state_s"], origin)
+        known, _ = states_in_frame(targets, part["state_s"], origin)
         error = np.stack([part[n] for n in _STATE]) - known
         # Where two meet, who flies on elsewhere is another one.
         ahead = error[:, :3] + _AHEAD_S * error[:, 3:]

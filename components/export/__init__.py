@@ -40,7 +40,7 @@ def stone_soup(
     from components.stone_soup.library import needs_stone_soup
 
     needs_stone_soup("components.export.stone_soup")
-    from components.export.recorded import tables_of
+    from components.display.recorded_run import tables_of
     from components.export.stone_soup_run import recorded_run
 
     return recorded_run(tables_of(run), origin, range_rates)

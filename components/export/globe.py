@@ -8,9 +8,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from components.export.recorded import OWNSHIP, RecordedTables
-from components.geometry.attitude import body_to_ned
-from components.geometry.enu import enu_to_geodetic
+from components.display.picture import sights
+from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.sensor.marks import FUSION, RADAR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import printable
@@ -39,24 +38,8 @@ def _detected(run: RecordedTables) -> Iterator[tuple[str, str, float, float, flo
     if len(there) == 0:
         return
     number = {name: values[there] for name, values in number.items()}
-    level = np.cos(number["elevation_rad"]) * number["range_m"]
-    azimuth = number["azimuth_rad"]
-    north, east, down = body_to_ned(
-        level * np.cos(azimuth),
-        level * np.sin(azimuth),
-        -np.sin(number["elevation_rad"]) * number["range_m"],
-        number["own_heading_rad"],
-        number["own_pitch_rad"],
-        number["own_roll_rad"],
-    )
-    lat, lon, alt = enu_to_geodetic(
-        east,
-        north,
-        -down,
-        reference_lat_deg=number["own_lat_deg"],
-        reference_lon_deg=number["own_lon_deg"],
-        reference_alt_m=number["own_alt_m"],
-    )
+    directions = number["azimuth_rad"], number["elevation_rad"], number["range_m"]
+    _, (lat, lon, alt) = sights(*directions, [number[name] for name in _POSE])
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
     places = zip(lon.tolist(), lat.tolist(), alt.tolist(), strict=True)
     for row, time_s, place in zip(there.tolist(), number["time_s"].tolist(), places, strict=True):

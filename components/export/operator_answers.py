@@ -6,7 +6,7 @@ import math
 from itertools import groupby
 from typing import Any
 
-from components.export.recorded import RecordedTables
+from components.display.recorded_run import RecordedTables
 from dsa_des.errors import UsageError
 
 _COLUMNS = (
@@ -26,11 +26,6 @@ def operator_csv(run: RecordedTables) -> bytes:
     but not one that belongs to an alert before. Responses are counted from when the alert
     came; ``_wall_s`` are seconds since 1970 by the clock on the wall. What did not happen is empty;
     turns are in degrees to the right, climbs in m.
-
-    Raises
-    ------
-    UsageError
-        The run has no alerts or no decisions.
     """
     for name, needed in (("alerts", "an alerting block"), ("decisions", "an operator's console")):
         if name not in run.tables:
@@ -87,8 +82,8 @@ def _answered(
     """Return the row of an alert with the decisions that belong to it."""
     ended_s = math.inf if alert["ended_s"] is None else alert["ended_s"]
     row = dict(alert)
-    for place, one in enumerate(decisions):
-        if not alert["alert_s"] <= one["time_s"] <= ended_s or place in taken:
+    for number, one in enumerate(decisions):
+        if not alert["alert_s"] <= one["time_s"] <= ended_s or number in taken:
             continue
         what = one["decision"]
         about = one["target"] in names
@@ -100,7 +95,7 @@ def _answered(
             continue
         if f"{name}_s" in row:
             continue
-        taken.add(place)
+        taken.add(number)
         row[f"{name}_s"], row[f"{name}_wall_s"] = one["time_s"], one["wall_time_s"]
         if name == "judged":
             row["judged_as"] = what

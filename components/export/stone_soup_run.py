@@ -14,8 +14,8 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
+from components.display.recorded_run import OWNSHIP, RecordedTables
 from components.estimation.frame import place_in_frame
-from components.export.recorded import OWNSHIP, RecordedTables
 from components.geometry.ellipsoid import north_east_up
 from components.geometry.normals import local_axes
 from components.stone_soup.objects import (
@@ -97,22 +97,7 @@ class StoneSoupRun:
 def recorded_run(
     run: RecordedTables, origin: Origin | None = None, range_rates: bool = False
 ) -> StoneSoupRun:
-    """Return a run's detections, poses and truth.
-
-    Parameters
-    ----------
-    run : RecordedTables
-    origin : tuple, optional
-        Latitude and longitude (deg) and height (m) of the frame; by default that of the run's
-        tracks, or where the ownship was first.
-    range_rates : bool
-        Whether range rates are part of measurements, where the ownship's velocity is recorded.
-
-    Raises
-    ------
-    UsageError
-        The run has no detections, no poses, or detections without an error.
-    """
+    """Return a run's detections, poses and truth."""
     flights = run.flights() if "truth" in run.tables else {}
     columns = _detections(run)
     pose = _poses(run, columns, flights)
@@ -139,18 +124,14 @@ def _detections(run: RecordedTables) -> dict[str, Any]:
     """Return columns of the detections in order of their instants, and what each look is."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         raise UsageError(f"{run.folder}: has no detections")
-    table = run.with_pose
-    names = (*_MEASURED, *_VARIANCES, *(f"own_{name}" for name in _POSE), "illuminated_s", "time_s")
-    columns: dict[str, Any] = {
-        name: np.asarray(table[name].to_numpy(zero_copy_only=False), dtype=float) for name in names
-    }
+    names = [*_MEASURED, *_VARIANCES, *(f"own_{name}" for name in _POSE), "illuminated_s", "time_s"]
+    columns: dict[str, Any] = {name: run.numbers("detections", name) for name in names}
     for name in _MOVES:  # runs before sensors measured range rates have none
-        known = name in table.column_names
-        found = table[name].to_numpy(zero_copy_only=False) if known else np.full(len(table), np.nan)
-        columns[name] = np.asarray(found, dtype=float)
-    for name in ("tick", "scan"):
-        columns[name] = np.asarray(table[name].to_numpy(zero_copy_only=False))
-    columns["block"] = np.array(table["block"].to_pylist(), dtype=object)
+        known = name in run.table("detections").column_names
+        nothing = np.full(len(columns["time_s"]), np.nan)
+        columns[name] = run.numbers("detections", name) if known else nothing
+    columns["scan"] = run.values("detections", "scan")
+    columns["block"] = np.array(run.texts("detections", "block"), dtype=object)
     # A sweeping beam measures when it meets the target, after its scan has begun.
     lit = columns["illuminated_s"]
     columns["time_s"] = np.where(np.isfinite(lit), lit, columns["time_s"])
@@ -181,13 +162,13 @@ def _poses(
             "[record]"
         )
     time_s = columns["time_s"][unknown]
-    place = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
-    if (own["time_s"][place] != time_s).any():
+    row = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
+    if (own["time_s"][row] != time_s).any():
         raise UsageError(
             f"{run.folder}: its detections have no pose of the ownship, and truth.parquet has none "
             "at their instants: record them with fusion = fusion.pass_through"
         )
-    pose[:, unknown] = [own[name][place] for name in _POSE]
+    pose[:, unknown] = [own[name][row] for name in _POSE]
     return pose
 
 
@@ -211,9 +192,8 @@ def _looks(
         found.setdefault((when, name not in ranged, name), []).append(i)
     sweeping = set(block[np.isfinite(columns["illuminated_s"])])
     if "scans" in run.tables:
-        scans = run.tables["scans"]
-        rows = zip(scans["block"].to_pylist(), scans["time_s"].to_pylist(), strict=True)
-        for name, when in rows:
+        names = run.values("scans", "block")
+        for name, when in zip(names, run.numbers("scans", "time_s").tolist(), strict=True):
             if name not in sweeping:  # a scan of a sweeping beam has no one instant
                 found.setdefault((when, name not in ranged, name), [])
     values = np.stack([columns[name] for name in _MEASURED])

@@ -19,9 +19,7 @@ from components.flights.sampled_flight import (
     locate,
 )
 from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
-from components.geometry.normals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class LegTable:
@@ -110,10 +108,6 @@ class LegTable:
         ]
         present = (time_s >= self._start[aircraft]) & (time_s <= self._end[aircraft])
         return TrajectoryState(lat, lon, alt, attitude[0], attitude[1], attitude[2], present)
-
-
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
 
 
 class ScriptedFleet:

@@ -1,38 +1,36 @@
-"""The outcome of an encounter, and the warning time before it (``closest_approach``,
-``well_clear``).
+"""The outcome of an encounter and the warning before it (``closest_approach``, ``well_clear``,
+``alert_times``).
 
 Loss of well clear is by default that of ASTM F3442 for small unmanned aircraft, 2000 ft
 horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 ft.
 """
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from components.metrics.declaration import ANY, DECLARED, DeclarationParameters, declarations
-from components.metrics.flights_together import first_losses_s
-from components.metrics.relative_states import first_violation_s
-from components.metrics.rows import TargetMetric, sensors_of
-from components.metrics.run_ends import SCANS
-from components.metrics.separation import (
-    RelativeFlight,
-    closest,
-    separations,
-    traffic_block,
+from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
+from components.metrics.flown_flights import Read, RecordedManoeuvres, each_alone, read_flights
+from components.metrics.losses import closest, losses_s
+from components.metrics.rows import (
+    SCANS,
+    TargetMetric,
+    TargetParameters,
+    is_named,
+    of_target,
+    sensors_of,
 )
-from components.metrics.steered import Told, ToldManoeuvres, flown_as_told
+from components.metrics.separation import RelativeFlight, traffic_block
 from components.sensor.cut_off import END, START, in_scan, said
 from components.well_clear.volume import FOOT_M, PRESETS, Volume
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
 
-#: Where a closest approach may be cut off, see `components.flights.closest_approach.end_of_look`.
+#: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
 #: The end of a run that a block ended before its time.
 _EARLY_END = "the early end of the run"
@@ -41,15 +39,17 @@ _BEFORE = ("detection", "declaration")
 _CUT_OFF, _LOSS_CUT_OFF = "closest_approach_cut_off", "well_clear_loss_cut_off"
 _WELL_CLEAR, _NMAC = PRESETS["astm_f3442"], PRESETS["nmac"]
 
-
 #: Of metrics of losses; ``step_s`` of None looks between samples too.
 STEP: Any = Field(
-    default=None,
-    gt=0,
-    le=10,
+    default=None, gt=0, le=10,
     description="Take distances at this spacing only, s. By default entries are found between "
     "samples too, to 1 ms.",
-)
+)  # fmt: skip
+
+
+def size(default_m: float, description: str) -> Any:
+    """Return the field of a distance that counts as a loss, m."""
+    return Field(default=default_m, gt=0, le=1e6, description=description)
 
 
 class EncounterParameters(DeclarationParameters):
@@ -63,36 +63,22 @@ class EncounterParameters(DeclarationParameters):
 class SizeParameters(Parameters):
     """What counts as a loss of well clear, and as a near mid-air collision."""
 
-    horizontal_m: float = Field(
-        default=_WELL_CLEAR.horizontal_m,
-        gt=0,
-        le=1e6,
-        description="Horizontal distance below which well clear is lost, m.",
+    horizontal_m: float = size(
+        _WELL_CLEAR.horizontal_m, "Horizontal distance below which well clear is lost, m."
     )
-    vertical_m: float = Field(
-        default=_WELL_CLEAR.vertical_m,
-        gt=0,
-        le=1e6,
-        description="Difference in height below which well clear is lost, m.",
+    vertical_m: float = size(
+        _WELL_CLEAR.vertical_m, "Difference in height below which well clear is lost, m."
     )
     tau_s: float = Field(
-        default=0.0,
-        ge=0,
-        le=600,
+        default=0.0, ge=0, le=600,
         description="Modified tau below which well clear is lost too, s (DO-365: 35). 0: distances "
         "alone.",
+    )  # fmt: skip
+    nmac_horizontal_m: float = size(
+        _NMAC.horizontal_m, "Horizontal distance of a near mid-air collision, m."
     )
-    nmac_horizontal_m: float = Field(
-        default=_NMAC.horizontal_m,
-        gt=0,
-        le=1e6,
-        description="Horizontal distance of a near mid-air collision, m.",
-    )
-    nmac_vertical_m: float = Field(
-        default=_NMAC.vertical_m,
-        gt=0,
-        le=1e6,
-        description="Difference in height of a near mid-air collision, m.",
+    nmac_vertical_m: float = size(
+        _NMAC.vertical_m, "Difference in height of a near mid-air collision, m."
     )
 
     @property
@@ -114,71 +100,6 @@ class WellClearParameters(EncounterParameters, SizeParameters):
     step_s: float | None = STEP  # type: ignore[assignment]
 
 
-#: What is read of runs, each a list of its flights: (values, runs).
-Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
-
-
-def each_alone(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
-    """Return what reads the flights of one run after the other."""
-    return lambda runs: np.array([read(flights) for flights in runs]).T
-
-
-def read_flights(
-    group: Group,
-    step_s: float | None,
-    target: str | None,
-    read: Read,
-    told: Mapping[int, Told] | None = None,
-    *,
-    to_the_end: bool = False,
-) -> FloatArray:
-    """Return what `read` makes of every replica's flights, shape (values, replicas).
-
-    Flights are computed once for all replicas that share them.
-
-    Parameters
-    ----------
-    group : Group
-    step_s : float or None
-        Spacing of the times at which distances are taken; None looks between them for losses.
-    target : str or None
-        Which one counts; None for all.
-    read : callable
-    told : mapping, optional
-        What the ownship of a replica was told to fly; others fly on as they are.
-    to_the_end : bool
-        Look at each no longer than its run, which may have ended early; else as long as it was
-        meant to last.
-    """
-    told = told or {}
-    block = f"blocks.{traffic_block(group.scene).name}."
-    runs: list[list[RelativeFlight]] = []
-    places: dict[Any, int] = {}
-    place, steered = np.empty(len(group), dtype=np.int64), []
-    for number, replica in enumerate(group.replicas):
-        mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
-        until_s = math.inf
-        if to_the_end and group.ended_early[number]:
-            until_s = float(group.duration_s[number])
-        key = (until_s, *sorted((k, repr(v)) for k, v in mine.items()))
-        alone = number in told
-        place[number] = places.setdefault((key, number if alone else None), len(runs))
-        if place[number] < len(runs):
-            continue
-        scene = group.scenes[number] if mine else group.scene
-        make = partial(separations, scene, step_s, until_s)
-        flights = group.once(("separations", step_s, key), make)
-        runs.append([flight for flight in flights if target in (None, flight.name)])
-        if alone and runs[-1]:
-            steered.append(number)
-    flown = flown_as_told(
-        [runs[place[number]][0].own for number in steered], [told[number] for number in steered]
-    )
-    for number, own in zip(steered, flown, strict=True):
-        runs[place[number]] = [flight.flown_by(own) for flight in runs[place[number]]]
-    return read(runs)[:, place]
-
-
 class _Encounter(TargetMetric):
     Parameters = EncounterParameters
     tables = {**DECLARED, **SCANS}
@@ -187,15 +108,13 @@ class _Encounter(TargetMetric):
         super().__init__(parameters, scene)
         traffic_block(scene)
         self.sensors = sensors_of(scene, parameters.sensors)
-        self._told = ToldManoeuvres(scene)
-        self.tables = {**self.tables, **self._told.tables}
+        self._steering = RecordedManoeuvres(scene)
+        self.tables = {**self.tables, **self._steering.tables}
 
     def of_flights(self, group: Group, read: Read) -> FloatArray:
         """Return what `read` makes of every replica's flights as flown, (values, replicas)."""
-        return read_flights(
-            group, self.p.step_s, self.p.target, read, self._told.of(group),
-            to_the_end=True,
-        )  # fmt: skip
+        steering = self._steering.of(group)
+        return read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
 
 
 class ClosestApproach(_Encounter):
@@ -247,22 +166,12 @@ class WellClear(_Encounter):
 
     Parameters = WellClearParameters
 
-    @staticmethod
-    def _said(sizes_m: tuple[float, float], standard: Volume) -> str:
-        """Return what a result's description says of its cylinder."""
-        horizontal_m, vertical_m = sizes_m
-        name = " (ASTM F3442)" if standard is _WELL_CLEAR else ""
-        if (horizontal_m, vertical_m) == (standard.horizontal_m, standard.vertical_m):
-            feet = horizontal_m / FOOT_M, vertical_m / FOOT_M
-            return f"within {feet[0]:.0f} ft and {feet[1]:.0f} ft{name}"
-        return f"within {horizontal_m:g} m and {vertical_m:g} m"
-
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""
         tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
         found = [
-            Result("well_clear_lost", EVENT, self._said(self.p.sizes_m[0], _WELL_CLEAR) + tau),
-            Result("nmac", EVENT, self._said(self.p.sizes_m[1], _NMAC)),
+            Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
+            Result("nmac", EVENT, _cylinder_text(self.p.sizes_m[1], _NMAC)),
             Result("well_clear_loss_time_s", NUMBER, "when well clear is lost, s", _LOSS_CUT_OFF),
         ]
         found += [
@@ -292,41 +201,115 @@ class WellClear(_Encounter):
         return found
 
 
+def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
+    """Return the words for a cylinder in a result's description."""
+    horizontal_m, vertical_m = sizes_m
+    name = " (ASTM F3442)" if standard is _WELL_CLEAR else ""
+    if (horizontal_m, vertical_m) == (standard.horizontal_m, standard.vertical_m):
+        feet = horizontal_m / FOOT_M, vertical_m / FOOT_M
+        return f"within {feet[0]:.0f} ft and {feet[1]:.0f} ft{name}"
+    return f"within {horizontal_m:g} m and {vertical_m:g} m"
+
+
 def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
-    """Return smallest range (m), its time (s), and the place in `_ENDS` of where it is cut off."""
+    """Return smallest range (m), its time (s), and the number in `_ENDS` of how it is censored."""
     best = min((closest(flight) for flight in flights), default=_NOWHERE)
     if not np.isfinite(best[0]):
         return float("nan"), float("nan"), 0.0
     return best[0], best[1], float(_ENDS.index(best[2]))
 
 
-def losses_s(
-    sizes_m: tuple[tuple[float, float], ...],
-    runs: Sequence[list[RelativeFlight]],
-    tau_s: float = 0.0,
-) -> FloatArray:
-    """Return when well clear is first lost, when a collision first threatens, and the start, s.
+class AlertTimeParameters(TargetParameters, SizeParameters):
+    """Parameters of alert times."""
 
-    Parameters
-    ----------
-    sizes_m : ((horizontal, vertical) of well clear, those of a collision)
-    runs : sequence of list of RelativeFlight
-    tau_s : float
-        Modified tau of well clear; 0 for a cylinder.
+    level: int = Field(default=2, ge=1, description="Alerts of this level or above count.")
+    late_s: float = Field(
+        default=15.0, ge=0, description="An alert is late if the loss comes sooner after it, s."
+    )
+    surprise_s: float = Field(
+        default=5.0, ge=0, description="A level is a surprise sooner after the one below it, s."
+    )
+    step_s: float | None = STEP
+    steered: bool = Field(
+        default=False,
+        description="Take the flights as the ownship was told to fly them, not as planned.",
+    )
 
-    Returns
-    -------
-    (3, runs)
-        NaN for what never happens; the first of several flights counts.
+
+class AlertTimes(TargetMetric):
+    """When alerts come before well clear is lost, and which are late, missed or for nothing.
+
+    Where the ownship is steered, losses are by default those of what it would have flown: an alert
+    that was heeded is no nuisance.
+
+    Of each block that records alerts, so that one fed by the truth and one fed by tracks stand side
+    by side. An alert is *missed* if well clear is lost and none came before, *late* if it came less
+    than `late_s` before the loss or is missed, a *nuisance* if well clear is never lost, and a
+    *surprise* if the level below had not been on for `surprise_s` when it came.
     """
-    flights = [flight for run in runs for flight in run]
-    of_run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
-    first = first_losses_s(flights, *sizes_m)
-    if tau_s > 0.0:
-        volume = Volume(*sizes_m[0], horizontal_time_s=tau_s)
-        first[:, 0] = [first_violation_s(flight, volume) for flight in flights]
-    found = np.full((3, len(runs)), np.nan)
-    for value in (0, 1):
-        np.fmin.at(found[value], of_run, first[:, value])
-    found[2, of_run] = 0.0
-    return found
+
+    Parameters = AlertTimeParameters
+    tables = {"alerts": ("block", "target", "time_s", "level")}
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        traffic = traffic_block(scene).name
+        #: Whether losses are of what was flown, so that a run that ended early has no later ones.
+        self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
+        self._blocks = recorded_by(scene, "alerts")
+        if parameters.steered:
+            self._steering = RecordedManoeuvres(scene)
+            self.tables = {**self.tables, **self._steering.tables}
+
+    def results(self) -> list[Result]:
+        """Return times and events of each alerting block."""
+        found = []
+        for name in self._blocks:
+            found += [
+                Result(f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s"),
+                Result(f"alert_to_loss_s.{name}", NUMBER, "from it to loss of well clear, s"),
+                Result(f"alert_to_nmac_s.{name}", NUMBER, "to a near mid-air collision, s"),
+                Result(f"alert_missed.{name}", EVENT, "well clear lost without an alert before"),
+                Result(f"alert_late.{name}", EVENT, "alert missed or shortly before the loss"),
+                Result(f"alert_nuisance.{name}", EVENT, "alert, and well clear is never lost"),
+                Result(f"alert_surprise.{name}", EVENT, "alert hardly after the level below it"),
+            ]
+        return found
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all of it for every replica."""
+        steering = self._steering.of(group) if self.p.steered else None
+        lost_s, nmac_s, _ = read_flights(
+            group, self.p.step_s, self.p.target, self.p.losses_s, steering,
+            to_the_end=self._as_flown,
+        )  # fmt: skip
+        columns = group.tables["alerts"]
+        counts = of_target(columns, self.p.target)
+        found: dict[str, AnyArray] = {}
+        for name in self._blocks:
+            mine = counts & is_named(columns["block"], name)
+            first_s = _first_s(columns, mine & (columns["level"] >= self.p.level), len(group))
+            below_s = _first_s(columns, mine & (columns["level"] >= self.p.level - 1), len(group))
+            alerted, lost = ~np.isnan(first_s), ~np.isnan(lost_s)
+            before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
+            lead_s = np.where(before, lost_s - first_s, np.nan)
+            missed = lost & ~before
+            found[f"first_alert_time_s.{name}"] = first_s
+            found[f"alert_to_loss_s.{name}"] = lead_s
+            found[f"alert_to_nmac_s.{name}"] = nmac_s - first_s
+            sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
+            for what, event in {
+                "missed": missed,
+                "late": missed | (before & (np.nan_to_num(lead_s) < self.p.late_s)),
+                "nuisance": alerted & ~lost,
+                "surprise": sudden,
+            }.items():
+                found[f"alert_{what}.{name}"] = event.astype(float)
+        return found
+
+
+def _first_s(columns: Mapping[str, Any], rows: BoolArray, replicas: int) -> FloatArray:
+    """Return the time of each replica's first row of those chosen, NaN without one."""
+    first = np.full(replicas, np.inf)
+    np.minimum.at(first, columns["replica"][rows], columns["time_s"][rows])
+    return np.where(np.isfinite(first), first, np.nan)

@@ -1,14 +1,20 @@
-"""The share of two sensors' detections that are fused with each other (``fused_share``)."""
+"""The share of two sensors' detections that are fused with each other (``fused_share``).
+
+What is expected of two periodic clocks is exact: the scans of one fall on finitely many phases of
+the other's period, q equally spaced ones, where f1/f2 = p/q in lowest terms. Of clocks that jitter
+or run at slightly wrong rates the grid instants are exact ticks; jitter is normal and independent
+from scan to scan, so the difference of two instants is normal about the grid's difference.
+"""
 
 import itertools
+import math
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr
 
-from components.metrics.clock_coincidence import coincidence_share
-from components.metrics.jittered_coincidence import mean_coincidence_share
 from components.metrics.rows import (
     FUSED,
     SensorMetricParameters,
@@ -24,7 +30,10 @@ from dsa_des.block.message import Text
 from dsa_des.block.run_end import ends_its_run
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
-from dsa_des.time.clock import ClockSpec
+from dsa_des.time.clock import ClockSpec, ScanClock
+
+#: Beyond so many standard deviations nothing is expected to happen.
+_SIGMAS = 6.0
 
 
 class FusedShare(TargetMetric):
@@ -167,3 +176,83 @@ def _latest(own: dict[str, Any], fused: dict[str, Any], delay_s: float) -> IntAr
     asked = order >= start
     found = order[last[asked][last[asked] >= 0]]
     return np.unique(found)
+
+
+def coincidence_share(
+    rate_hz: Fraction,
+    other_rate_hz: Fraction,
+    *,
+    offset_s: Fraction = Fraction(0),
+    other_offset_s: Fraction = Fraction(0),
+    before_s: Fraction = Fraction(0),
+    after_s: Fraction = Fraction(0),
+) -> Fraction:
+    """Return the share of a clock's scans t that meet one of the other clock, in the long run.
+
+    That is one at t - before_s ≤ t' ≤ t + after_s, both bounds inclusive and 0 or more.
+    """
+    period = 1 / other_rate_hz
+    phases = (other_rate_hz / rate_hz).denominator
+    spacing = period / phases
+    phase = (offset_s - other_offset_s) % spacing
+    if before_s + after_s >= period:
+        return Fraction(1)
+    # Phases are phase + j·spacing for j = 0 ... phases - 1; an earlier partner is that far away.
+    early = _count(before_s, phase, spacing, phases)
+    late = _count(after_s, (-phase) % spacing, spacing, phases)
+    both = 1 if phase == 0 else 0  # the same instant is early and late
+    return Fraction(min(phases, early + late - both), phases)
+
+
+def _count(reach: Fraction, first: Fraction, spacing: Fraction, most: int) -> int:
+    """Return how many of first, first + spacing, ... lie within reach, at most `most`."""
+    if reach < first:
+        return 0
+    return min(most, math.floor((reach - first) / spacing) + 1)
+
+
+def mean_coincidence_share(
+    own: ClockSpec,
+    other: ClockSpec,
+    *,
+    ticks_per_s: int,
+    end_tick: int,
+    gate_ticks: int,
+    delay_ticks: int = 0,
+    other_delay_ticks: int = 0,
+) -> float | None:
+    """Return the expected share of a clock's scans that arrive within a gate of the other's.
+
+    Scans and arrivals before `end_tick` count: drift makes the share depend on how long a run is.
+    None where two scans of one clock may lie in one gate: the probabilities of single pairs do not
+    add up then.
+    """
+    for clock in (own, other):
+        if 2 * gate_ticks + _SIGMAS * clock.jitter_s * ticks_per_s >= clock.period_s * ticks_per_s:
+            return None
+    sigma = math.hypot(own.jitter_s, other.jitter_s) * ticks_per_s
+    mine = _grid(own, ticks_per_s, end_tick) + delay_ticks
+    theirs = _grid(other, ticks_per_s, end_tick) + other_delay_ticks
+    theirs = theirs[theirs < end_tick]
+    if not len(mine) or not len(theirs):
+        return None
+    after = np.searchsorted(theirs, mine)
+    share = np.zeros(len(mine))
+    period_ticks = float(other.period_s * ticks_per_s)
+    reach = 1 + math.ceil((gate_ticks + _SIGMAS * sigma) / period_ticks)
+    for step in range(-reach, reach):
+        place = after + step
+        there = np.flatnonzero((place >= 0) & (place < len(theirs)))
+        share[there] += _within(theirs[place[there]] - mine[there], gate_ticks, sigma)
+    return float(np.mean(np.minimum(share, 1.0)))
+
+
+def _grid(spec: ClockSpec, ticks_per_s: int, end_tick: int) -> IntArray:
+    return ScanClock(spec, ticks_per_s).between(0, end_tick)[1]
+
+
+def _within(apart: IntArray, gate: int, sigma: float) -> FloatArray:
+    """Return the probability that a distance with normal error lies within the gate."""
+    if sigma == 0.0:
+        return np.asarray(np.abs(apart) <= gate, dtype=float)
+    return np.asarray(ndtr((gate - apart) / sigma) - ndtr((-gate - apart) / sigma))

@@ -1,14 +1,188 @@
-"""The risk ratio: how much of a collision risk is left, over encounters that were run twice.
+"""Risk of an encounter: losses with and without avoidance, their severity, and the risk ratio.
 
 Every encounter is run without avoidance (*nominal*) and with it (*mitigated*), on the same random
-numbers, and has a weight that says how often it happens in the airspace. The numbers are those of
-`dsa_des.studies.ratio`, under the field's names.
+numbers, and has a weight that says how often it happens in the airspace. The risk ratio is what
+`dsa_des.studies.ratio` computes, under the field's names.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from components.metrics.encounter import STEP, SizeParameters, size
+from components.metrics.flown_flights import RecordedManoeuvres, each_alone, read_flights
+from components.metrics.rows import TargetMetric, TargetParameters
+from components.metrics.separation import RelativeFlight, relative_states, traffic_block
+from components.well_clear.collision_probability import collision_probability
+from components.well_clear.severity import loss_severity
+from components.well_clear.volume import FOOT_M
+from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Metric, Result
 from dsa_des.studies.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 
-__all__ = ["METHODS", "RiskRatio", "risk_ratio", "risk_ratios_by_class"]
+__all__ = [
+    "METHODS", "Mitigated", "RiskParameters", "RiskRatio", "Severity", "risk_ratio",
+    "risk_ratios_by_class",
+]  # fmt: skip
 
 RiskRatio = PairedRatio
 risk_ratio = paired_ratio
 risk_ratios_by_class = ratios_by_class
+
+# The best of the grid is looked at again with this much finer steps to both sides.
+_FINER = 50
+
+
+class RiskParameters(SizeParameters):
+    """What counts as a loss of well clear, and as a near mid-air collision, and how it is found."""
+
+    step_s: float | None = STEP
+
+
+class Mitigated(Metric):
+    """Events with and without the manoeuvres that the ownship was told to fly."""
+
+    Parameters = RiskParameters
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        self._steering = RecordedManoeuvres(scene)
+        if not self._steering:
+            name = traffic_block(scene).name
+            raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
+        self.tables = {**self.tables, **self._steering.tables}
+
+    def results(self) -> list[Result]:
+        """Return both events, nominal and mitigated."""
+        sizes = self.p.sizes_m
+        return [
+            Result(f"{name}_{which}", EVENT, f"{how} within {radius:g} m and {half:g} m")
+            for name, (radius, half) in zip(("well_clear_lost", "nmac"), sizes, strict=True)
+            for which, how in (("nominal", "without manoeuvres,"), ("mitigated", "as steered,"))
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all of it for every replica."""
+        read = self.p.losses_s
+        nominal = read_flights(group, self.p.step_s, None, read)[:2]
+        steering = self._steering.of(group)
+        mitigated = read_flights(group, self.p.step_s, None, read, steering)[:2]
+        found: dict[str, AnyArray] = {}
+        for k, name in enumerate(("well_clear_lost", "nmac")):
+            found[f"{name}_nominal"] = (~np.isnan(nominal[k])).astype(float)
+            found[f"{name}_mitigated"] = (~np.isnan(mitigated[k])).astype(float)
+        return found
+
+
+class SeverityParameters(TargetParameters):
+    """Sizes of the boundary, and whose altimeters are which."""
+
+    horizontal_m: float = size(4000 * FOOT_M, "Horizontal size of well clear, m.")
+    vertical_m: float = size(450 * FOOT_M, "Vertical size of well clear, m.")
+    tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
+    nmac_horizontal_m: float = size(
+        500 * FOOT_M, "Horizontal distance of a near mid-air collision, m."
+    )
+    nmac_vertical_m: float = size(
+        100 * FOOT_M, "Difference in height of a near mid-air collision, m."
+    )
+    mode_c_own: bool = Field(
+        default=False,
+        description="The ownship's altimeter is that of Mode C, or of no transponder.",
+    )
+    mode_c_target: bool = Field(
+        default=False, description="The targets' altimeters are that of Mode C, or of none."
+    )
+    step_s: float = Field(
+        default=0.1, gt=0, le=10, description="Spacing of the times that are looked at first, s."
+    )
+
+
+class Severity(TargetMetric):
+    """Largest severity of a loss of well clear, and probability of a near mid-air collision.
+
+    Of several targets the most severe counts, for each of the two by itself.
+    """
+
+    Parameters = SeverityParameters
+    tables: Any = {}
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        traffic_block(scene)
+        self._steering = RecordedManoeuvres(scene)
+        self.tables = self._steering.tables
+
+    def results(self) -> list[Result]:
+        """Return both."""
+        return [
+            Result("slowc_percent", NUMBER, "largest severity of the loss of well clear, percent"),
+            Result("pnmac", FRACTION, "probability of an NMAC, errors of the altimeters included"),
+        ]
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return both for every replica; NaN where no target is ever there with the ownship."""
+        read, steering = each_alone(self._severities), self._steering.of(group)
+        found = read_flights(group, self.p.step_s, self.p.target, read, steering, to_the_end=True)
+        return {"slowc_percent": found[0], "pnmac": found[1]}
+
+    def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
+        each = [(self._severity(flight), self._collision(flight)) for flight in flights]
+        values = np.array(each, dtype=np.float64).reshape(-1, 2)
+        if not len(values) or np.isnan(values).all():
+            return float("nan"), float("nan")
+        largest: FloatArray = np.fmax.reduce(values)
+        return float(largest[0]), float(largest[1])
+
+    def _severity(self, flight: RelativeFlight) -> float:
+        """Return the largest severity of a flight over its times, and about the largest."""
+        sizes = self.p.horizontal_m, self.p.vertical_m, self.p.tau_s
+
+        def at(time_s: FloatArray) -> FloatArray:
+            return loss_severity(relative_states(flight, time_s), *sizes)
+
+        best, best_s = float("nan"), float("nan")
+        for piece in flight.pieces():
+            time_s = piece.time_s[np.isfinite(piece.range_m)]
+            if len(time_s):
+                found = at(time_s)
+                place = int(np.argmax(found))
+                if not found[place] <= best:
+                    best, best_s = float(found[place]), float(time_s[place])
+        if not best > 0.0:
+            return best
+        return max(best, float(at(self._about(flight, best_s)).max()))
+
+    def _collision(self, flight: RelativeFlight) -> float:
+        """Return the probability at the horizontal closest approach."""
+        best, best_s = float("inf"), float("nan")
+        for piece in flight.pieces():
+            place = int(np.argmin(piece.horizontal_m))
+            if piece.horizontal_m[place] < best:
+                best, best_s = float(piece.horizontal_m[place]), float(piece.time_s[place])
+        if not np.isfinite(best):
+            return float("nan")
+        time_s = self._about(flight, best_s)
+        across_m = flight.at(time_s).horizontal_m
+        place = int(np.argmin(across_m))
+        own, other = flight.states(time_s[place : place + 1])
+        own_m, other_m = (np.asarray(state.alt_m, dtype=np.float64) for state in (own, other))
+        found = collision_probability(
+            across_m[place],
+            own_m - other_m,
+            (own_m, other_m),
+            (self.p.mode_c_own, self.p.mode_c_target),
+            self.p.nmac_horizontal_m,
+            self.p.nmac_vertical_m,
+        )
+        return float(found[0])
+
+    def _about(self, flight: RelativeFlight, time_s: float) -> FloatArray:
+        """Return finer times about one, within the time at which both are there."""
+        first_s, last_s = (float(times[0]) for times in flight.present_s())
+        step_s = self.p.step_s / _FINER
+        about = time_s + step_s * np.arange(-_FINER, _FINER + 1)
+        return np.clip(about, max(first_s, 0.0), min(last_s, flight.end_s))

@@ -1,4 +1,4 @@
-"""Array tools that metrics share: rows of a group of replicas, chosen and reduced by replica."""
+"""Rows of a group of replicas: chosen, reduced by replica, and censored by a run's start."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,19 +6,22 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from components.sensor.cut_off import START, in_scan, said
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import Metric, recorded_by
+from dsa_des.studies.metric import TRIALS, Group, Metric, recorded_by
 
 FUSED = "fused"
+#: Columns of the sensors' scans that `scan_time_s` needs.
+SCANS = {"scans": ("block", "time_s")}
 
 
 class TargetParameters(Parameters):
-    """What most metrics can be told."""
+    """Parameters of most metrics."""
 
     target: str | None = Field(
         default=None, description="Name of the target that counts; by default any of them."
@@ -34,7 +37,7 @@ class SensorMetricParameters(TargetParameters):
 
 
 class TargetMetric(Metric):
-    """A metric that can be told which target counts."""
+    """A metric of one target, or of any."""
 
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Refuse a target that the traffic does not have."""
@@ -46,13 +49,7 @@ class TargetMetric(Metric):
 
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
-    """Return the sensors to measure: those chosen, or all, and `extra` names.
-
-    Raises
-    ------
-    ValueError
-        If one of those chosen is not there.
-    """
+    """Return the sensors to measure: those chosen, or all, and `extra` names."""
     known = [*recorded_by(scene, "detections"), *extra]
     for name in chosen or ():
         if name not in known:
@@ -79,46 +76,38 @@ def of_target(columns: Columns, target: str | None) -> BoolArray:
 
 def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
     """Return the chosen rows of ``replica`` and the named columns."""
-    place = np.flatnonzero(rows)
+    kept = np.flatnonzero(rows)
     found: dict[str, Any] = {}
     for name in ("replica", *names):
         values: Any = columns[name]
         text = isinstance(values, Text)
-        found[name] = Text(values.codes[place], values.names) if text else values[place]
+        found[name] = Text(values.codes[kept], values.names) if text else values[kept]
     return found
 
 
 def first_rows(columns: Columns, rows: IntArray, count: int) -> IntArray:
     """Return the row of each replica's first report, -1 where it has none.
 
-    Of several rows of one instant the one with the smallest true range counts.
-
-    Parameters
-    ----------
-    columns : mapping
-        With ``replica``, ``tick`` and ``true_range_m``, in recorded order.
-    rows : (n,)
-        The rows to look at, ascending.
-    count : int
-        Number of replicas.
+    Rows to look at and columns are in recorded order; of several rows of one instant the one with
+    the smallest true range counts.
     """
     table: Any = columns
     if len(rows) == 0:
         return np.full(count, -1, dtype=np.int64)
     replica = table["replica"][rows]
     starts = np.flatnonzero(np.append(True, replica[1:] != replica[:-1]))
-    tick, place, found_at = table["tick"], starts, [starts]
-    while len(place := place[place + 1 < len(rows)]):  # those of the same instant follow
-        ahead = rows[place + 1]
-        same = (replica[place + 1] == replica[place]) & (tick[ahead] == tick[rows[place]])
-        place = place[same] + 1
-        found_at.append(place)
-    rows = rows[np.sort(np.concatenate(found_at))]
+    tick, index, together = table["tick"], starts, [starts]
+    while len(index := index[index + 1 < len(rows)]):  # those of the same instant follow
+        ahead = rows[index + 1]
+        same = (replica[index + 1] == replica[index]) & (tick[ahead] == tick[rows[index]])
+        index = index[same] + 1
+        together.append(index)
+    rows = rows[np.sort(np.concatenate(together))]
     ranges = table["true_range_m"][rows]
     order = np.lexsort((np.where(np.isnan(ranges), np.inf, ranges), table["replica"][rows]))
-    numbers, place = np.unique(table["replica"][rows][order], return_index=True)
+    numbers, first = np.unique(table["replica"][rows][order], return_index=True)
     found = np.full(count, -1, dtype=np.int64)
-    found[numbers] = rows[order][place]
+    found[numbers] = rows[order][first]
     return found
 
 
@@ -132,8 +121,6 @@ def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
 
 def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
     """Return a share and its trials; NaN where there was no trial."""
-    from dsa_des.studies.metric import TRIALS
-
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)
     return {name: share, name + TRIALS: trials.astype(float)}
@@ -148,3 +135,31 @@ def name_ranks(column: Any) -> IntArray:
     )
     rank[-1] = -1
     return np.asarray(rank[column.codes])
+
+
+def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
+    """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
+    time_s, start, end = group.once(("scans_of", name), lambda: _scans_of(group, name))
+    at = start + number - 1
+    found = np.full(len(group), np.nan)
+    found[at < end] = time_s[at[at < end]]
+    return found
+
+
+def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the times of a sensor's scans, and where those of each replica start and end."""
+    columns: Any = group.tables["scans"]
+    rows = np.flatnonzero(is_named(columns["block"], name))
+    replica, numbers = columns["replica"][rows], np.arange(len(group))
+    ends = np.searchsorted(replica, numbers), np.searchsorted(replica, numbers, side="right")
+    return columns["time_s"][rows], *ends
+
+
+def at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
+    """Return whether what takes so many scans of a sensor was seen as early as a start lets it."""
+    return in_scan(time_s, scan_time_s(group, name, scans))
+
+
+def start_or_never(cut: BoolArray, values: FloatArray) -> AnyArray:
+    """Return the column that says where values are left-censored, by the start of the run."""
+    return said(np.where(cut, START, ""), values)

@@ -1,4 +1,4 @@
-"""True distances of the aircraft of an encounter: slant, horizontal and vertical.
+"""True distances and velocities of the aircraft of an encounter, relative to the ownship.
 
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
@@ -8,21 +8,14 @@ from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
-from math import isnan
 from typing import Any
 
 import numpy as np
 
-from components.flights.closest_approach import end_of_look, present_together_s
-from components.flights.sample_times import (
-    SampleTimes,
-    SharedTimes,
-    regular_count,
-    regular_times_s,
-)
-from components.geometry.ellipsoid import line_of_sight
+from components.flights.closest_approach import present_together_s
+from components.flights.sample_times import SampleTimes, SharedTimes, regular_count, regular_times_s
+from components.geometry.ellipsoid import line_of_sight, north_east_up
 from components.traffic.source import TrafficSource
-from components.well_clear.cylinder import inside_cylinder
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
 from dsa_des.scene.block import Block
@@ -31,24 +24,22 @@ from dsa_des.time.randomness import Streams
 
 #: Times looked at together: it bounds the memory, however long the run.
 MOST_AT_ONCE = 65_536
+#: Spacing of the grid where none is given, s.
+STEP_S = 0.1
 # Times of a flight that are kept for metrics that ask for them again.
 _KEPT = 4096
+# The speeds of turns and long legs hold to 2e-4, and the ownship's level plane turns with it.
+_SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
+# Velocities are differences of positions so far apart, s.
+_BASE_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Distances of one target from the ownship over time.
+    """Distances of one target from the ownship at some times; infinite where either is absent.
 
-    Parameters
-    ----------
-    name : str
-    time_s : (times,)
-    range_m : (times,)
-        Slant range; infinite where either is absent.
-    horizontal_m : (times,)
-        In the ownship's local level plane.
-    vertical_m : (times,)
-        Difference of the altitudes above the ellipsoid, not negative.
+    The horizontal one lies in the ownship's level plane, the vertical one is the difference of the
+    altitudes above the ellipsoid, not negative.
     """
 
     name: str
@@ -59,13 +50,7 @@ class Separation:
 
 
 def traffic_block(scene: Scene) -> Block:
-    """Return the block that moves the aircraft.
-
-    Raises
-    ------
-    ValueError
-        If the scene has none, or one that cannot say where aircraft are.
-    """
+    """Return the block that moves the aircraft; ValueError where not one knows its flights."""
     found = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
     if len(found) != 1:
         raise ValueError(
@@ -74,32 +59,26 @@ def traffic_block(scene: Scene) -> Block:
     return found[0]
 
 
-#: Spacing of the grid where none is given, s.
-STEP_S = 0.1
-# The speeds of turns and long legs hold to 2e-4, and the ownship's level plane turns with it.
-_SPEED_MARGIN, _TURN_MARGIN_MPS = 1.001, 0.1
-
-
-def separations(
-    scene: Scene, step_s: float | None, until_s: float = math.inf
-) -> "list[RelativeFlight]":
-    """Return the distances of every target of a scene, on a regular grid and at the samples.
-
-    Parameters
-    ----------
-    scene : Scene
-    step_s : float or None
-        Spacing of the grid; the times at which the source itself has samples are added. None looks
-        between them for losses, with a grid of `STEP_S` for all else.
-    until_s : float
-        When the run ended, where that was before its time.
-    """
+def traffic_of(scene: Scene) -> tuple[Any, float]:
+    """Return the traffic source of a scene as it is before a run, and how long that lasts, s."""
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
     context.duration_s = duration
-    end_s = min(float(duration), until_s)
+    return source, float(duration)
+
+
+def separations(
+    scene: Scene, step_s: float | None, until_s: float = math.inf
+) -> "list[RelativeFlight]":
+    """Return the distances of every target of a scene, up to an early end of the run at `until_s`.
+
+    They are taken on a grid of `step_s` and at the times of the source's own samples. None looks
+    between them for losses, with a grid of `STEP_S` for all else.
+    """
+    source, duration_s = traffic_of(scene)
+    end_s = min(duration_s, until_s)
     count = regular_count(step_s or STEP_S, end_s)
     return [
         RelativeFlight(source, number, step_s, count, end_s)
@@ -110,17 +89,7 @@ def separations(
 class RelativeFlight:
     """The distances of one target from the ownship, in pieces of time one after the other.
 
-    Parameters
-    ----------
-    source : TrafficSource
-    number : int
-        Which of its targets.
-    step_s : float or None
-        Spacing of the grid; None also looks between its times.
-    count : int
-        Number of its times.
-    end_s : float
-        Of the run.
+    A grid of `count` times, `step_s` apart; a spacing of None also looks between them.
     """
 
     def __init__(
@@ -170,7 +139,7 @@ class RelativeFlight:
 
     def at(self, time_s: FloatArray) -> Separation:
         """Return the distances at some times."""
-        return _separation(self.own, self.target, time_s)
+        return Separation(self.name, time_s, *distances_m(*self.states(time_s)))
 
     def states(self, time_s: FloatArray) -> tuple[Any, Any]:
         """Return the states of ownship and target at some times."""
@@ -178,7 +147,7 @@ class RelativeFlight:
 
     def pieces(self) -> Iterator[Separation]:
         """Give the distances, about `MOST_AT_ONCE` at a time; those of a short run are kept."""
-        if self._count > _KEPT:
+        if not self.is_short:
             yield from self._pieces()
             return
         if self._known is None:
@@ -194,15 +163,12 @@ class RelativeFlight:
             last_s = float(time_s[-1])
             for times in samples:
                 time_s = np.union1d(time_s, _between(times, self._number, after_s, last_s))
-            yield _separation(self.own, self.target, time_s)
+            yield self.at(time_s)
             after_s = float(np.nextafter(last_s, np.inf))
 
     def _samples(self) -> list[SampleTimes]:
         every: list[SampleTimes] = self._source.sample_times()
-        if every:
-            return every
-        times = SharedTimes(self._source.sample_times_s(self.target))
-        return [times]
+        return every or [SharedTimes(self._source.sample_times_s(self.target))]
 
 
 def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> FloatArray:
@@ -211,10 +177,6 @@ def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> 
     first, last = times.between(one, np.array([first_s]), np.array([last_s]))
     number = np.arange(first[0], last[0] + 1)
     return times.at(np.full(len(number), target), number)
-
-
-def _separation(ownship: Any, target: Any, time_s: FloatArray) -> Separation:
-    return Separation(target.name, time_s, *distances_m(ownship.at(time_s), target.at(time_s)))
 
 
 def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -234,40 +196,37 @@ def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArra
     )
 
 
-def closest(flight: RelativeFlight) -> tuple[float, float, str]:
-    """Return the smallest range (m), its time (s), the first of several, and where it is cut off.
+def position_of(state: Any) -> list[FloatArray]:
+    """Return latitude and longitude (deg) and altitude (m) of a state."""
+    parts = state.lat_deg, state.lon_deg, state.alt_m
+    return [np.ascontiguousarray(part, dtype=np.float64) for part in parts]
 
-    See `components.flights.closest_approach.end_of_look`.
+
+def relative_states(flight: RelativeFlight, time_s: FloatArray) -> tuple[FloatArray, ...]:
+    """Return where the ownship is relative to a target, and how fast, at some times.
+
+    East and north in the ownship's level plane and difference of altitudes, m, and their rates,
+    m/s: ownship less target.
     """
-    best = (float("inf"), float("nan"))
-    looked_s = np.full(2, np.nan)
-    for piece in flight.pieces():
-        place = int(np.argmin(piece.range_m))
-        if piece.range_m[place] < best[0]:
-            best = float(piece.range_m[place]), float(piece.time_s[place])
-        there_s = piece.time_s[np.isfinite(piece.range_m)]
-        if len(there_s):
-            looked_s = np.array([np.fmin(looked_s[0], there_s[0]), there_s[-1]])
-    present_s = np.array(flight.present_s())[:, 0]
-    return *best, end_of_look(best[1], looked_s, present_s, flight.end_s)
+    first_s, last_s = (float(times[0]) for times in flight.present_s())
+    before = np.maximum(time_s - _BASE_S, max(first_s, 0.0))
+    after = np.minimum(time_s + _BASE_S, last_s)
+    return mean_states(flight, time_s, before, after)
 
 
-def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
-    """Return when a target first is within each pair of distances (exclusive), s; NaN if never.
+def mean_states(
+    flight: RelativeFlight, time_s: FloatArray, before: FloatArray, after: FloatArray
+) -> tuple[FloatArray, ...]:
+    """Return `relative_states` at some times, with the mean velocities from before to after."""
+    here, _ = flight.states(time_s)
+    origin = position_of(here)
 
-    Asked at the flight's times only; `components.metrics.flights_together` looks between them.
+    def apart(at_s: FloatArray) -> FloatArray:
+        mine, theirs = map(position_of, flight.states(at_s))
+        own, other = (north_east_up(*origin, *position) for position in (mine, theirs))
+        return np.stack([own[1] - other[1], own[0] - other[0], mine[2] - theirs[2]])
 
-    Parameters
-    ----------
-    flight : RelativeFlight
-    *limits_m : (horizontal, vertical)
-    """
-    found = [float("nan")] * len(limits_m)
-    for piece in flight.pieces():
-        for number, (horizontal_m, vertical_m) in enumerate(limits_m):
-            inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
-            if isnan(found[number]) and inside.any():
-                found[number] = float(piece.time_s[np.argmax(inside)])
-        if not any(map(isnan, found)):
-            break
-    return found
+    now = apart(time_s)
+    lasts_s = np.where(after > before, after - before, 1.0)
+    rate = (apart(after) - apart(before)) / lasts_s
+    return (*now, *rate)

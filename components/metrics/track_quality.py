@@ -1,7 +1,9 @@
 """Freshness, steadiness and errors of the fused picture (``age_of_information``,
 ``track_updates``, ``position_error``)."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,6 @@ from pydantic import Field
 
 from components.geometry.attitude import unit_vector_unchecked
 from components.geometry.directions import angle_of_chord, chord_between
-from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
 from components.metrics.rows import (
     FUSED,
     TargetMetric,
@@ -18,11 +19,11 @@ from components.metrics.rows import (
     name_ranks,
     of_target,
 )
-from components.metrics.single_sensor import only_feed
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, recorded_by
+from dsa_des.time.clock import ClockSpec
 
 
 class _Lines:
@@ -65,10 +66,10 @@ def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) 
     order = np.lexsort((values, replica))
     many = np.bincount(replica, minlength=count)
     start = np.cumsum(many) - many
-    place = start + np.maximum(np.ceil(share * many).astype(np.int64) - 1, 0)
+    at = start + np.maximum(np.ceil(share * many).astype(np.int64) - 1, 0)
     found = np.full(count, np.nan)
     some = many > 0
-    found[some] = values[order][place[some]]
+    found[some] = values[order][at[some]]
     return found
 
 
@@ -120,12 +121,11 @@ class AgeOfInformation(TargetMetric):
         feed = only_feed(scene, self.fusion)
         if feed is None:
             return {}
-        period_s = float(feed.clock.period_s / (1 + feed.clock.rate_error_ppm / 1_000_000))
         jitter_s = feed.clock.jitter_s
-        mean = mean_age_s(period_s, feed.through, jitter_s)
+        mean = mean_age_s(feed.period_s, feed.through, jitter_s)
         found = {"age_of_information_mean_s": feed.delay_s + mean}
         if jitter_s == 0.0:
-            p95 = age_quantile_s(period_s, feed.through, 0.95)
+            p95 = age_quantile_s(feed.period_s, feed.through, 0.95)
             found["age_of_information_p95_s"] = feed.delay_s + p95
         return found
 
@@ -232,8 +232,7 @@ class TrackUpdates(TargetMetric):
         onward = [wire for wire in scene.wires if wire.source in fusion]
         if feed is None or any(wire.jitter_s or wire.drop_probability for wire in onward):
             return {}
-        period_s = float(feed.clock.period_s / (1 + feed.clock.rate_error_ppm / 1_000_000))
-        return {"track_update_interval_s": mean_interval_s(period_s, feed.through)}
+        return {"track_update_interval_s": mean_interval_s(feed.period_s, feed.through)}
 
 
 class PositionError(TargetMetric):
@@ -271,3 +270,67 @@ class PositionError(TargetMetric):
             "fused_position_error_m": np.sqrt(_means(replica[ranged], square, count)),
             "fused_angle_error_deg": np.degrees(np.sqrt(_means(replica, angle**2, count))),
         }
+
+
+@dataclass(frozen=True)
+class Feed:
+    """A sensor's way to a block: clock, share that no wire loses, and delay with all latency."""
+
+    clock: ClockSpec
+    through: float
+    delay_s: float
+
+    @property
+    def period_s(self) -> float:
+        """From scan to scan, at the rate at which the clock truly runs, s."""
+        return float(self.clock.period_s / (1 + self.clock.rate_error_ppm / 1_000_000))
+
+
+def only_feed(scene: Scene, block: str) -> Feed | None:
+    """Return the way of the one sensor that feeds a block, directly; None if there are several.
+
+    None also where lateness is random or queues decide about it: no formula is known then.
+    """
+    sensors = {
+        name
+        for name in recorded_by(scene, "detections")
+        if getattr(scene.blocks[name].parameters, "enabled", True)
+    }
+    wires = [wire for wire in scene.wires if wire.target == block and wire.source in sensors]
+    if len(wires) != 1 or wires[0].jitter_s or wires[0].queued or wires[0].delay_scans:
+        return None
+    name = wires[0].source
+    clock = scene.blocks[name].cls.clock_of(scene.blocks[name].parameters)
+    through = 1.0 - wires[0].drop_probability
+    if clock is None or through <= 0:
+        return None
+    return Feed(clock, through, float(wires[0].total_delay_s))
+
+
+def mean_interval_s(period_s: float, through: float) -> float:
+    """Return the mean time between scans that come through, s."""
+    return period_s / through
+
+
+def mean_age_s(period_s: float, through: float, jitter_s: float = 0.0) -> float:
+    """Return the mean over time of the time since the last scan that came through, s.
+
+    Scans come through independently with probability q = `through`, so the number N of periods
+    between two that do is geometric: E[N] = 1/q, E[N²] = (2 - q)/q². By the renewal-reward theorem
+    the mean age is E[g²] / (2 E[g]) of the gaps g between them. Jitter of standard deviation s
+    about the grid adds 2s² to E[g²].
+    """
+    square = period_s**2 * (2.0 - through) / through**2 + 2.0 * jitter_s**2
+    return square * through / (2.0 * period_s)
+
+
+def age_quantile_s(period_s: float, through: float, share: float) -> float:
+    """Return the age that is not exceeded for `share` of the time, without jitter, s.
+
+    The age lies beyond n periods for the share (1 - through)^n of the time, and is uniform
+    between two multiples of the period.
+    """
+    left, lost = 1.0 - share, 1.0 - through
+    whole = 0 if lost == 0.0 else math.floor(math.log(left) / math.log(lost))
+    beyond = lost**whole
+    return period_s * (whole + (beyond - left) / (beyond * through))

@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.state_tracks import COVARIANCE, STATUSES
-from components.metrics.coverage import Coverage
 from components.metrics.rows import is_named
-from components.metrics.track_tally import ToldTracks, TrackTally, innovation_results
-from components.metrics.true_states import RecordedTruth
+from components.metrics.separation import traffic_of
+from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
+from components.metrics.true_states import Coverage, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.errors import did_you_mean
@@ -33,8 +33,8 @@ _RESULTS = {
     "track_vertical_error_m": "its vertical part, rms, m",
     "track_velocity_error_m_s": "error of their velocity, rms, m/s",
     **{
-        f"track_{axis}_error_{unit}": f"error of their {what} {axis}, rms, {told}"
-        for what, unit, told in (("position", "m", "m"), ("velocity", "m_s", "m/s"))
+        f"track_{axis}_error_{unit}": f"error of their {what} {axis}, rms, {written}"
+        for what, unit, written in (("position", "m", "m"), ("velocity", "m_s", "m/s"))
         for axis in ("north", "east", "down")
     },
     "track_ospa_m": "OSPA distance of tracks and targets, mean over time, m",
@@ -98,8 +98,8 @@ class TrackingParameters(Parameters):
 class Tracking(Metric):
     """Compares confirmed tracks that have a range with all targets, instant by instant.
 
-    At every instant of the grid the last tracks told before it count, each at the instant its state
-    speaks of. How tracks and targets belong together, and what is counted: `TrackTally`; what
+    At every instant of the grid the last tracks reported before it count, each at the instant its
+    state speaks of. How tracks and targets belong together, and what is counted: `TrackTally`; what
     covers a target: `Coverage`.
     """
 
@@ -149,8 +149,8 @@ class Tracking(Metric):
         held = np.isin(columns["track_status"].codes, _codes(columns["track_status"].names))
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
-            told = _told_by(columns["block"], scene, self.p.block)
-            mine = np.flatnonzero((replica == number) & told)
+            asked = _is_asked_for(columns["block"], scene, self.p.block)
+            mine = np.flatnonzero((replica == number) & asked)
             tally, names = self._tally(columns, mine, held, scene, float(group.duration_s[number]))
             first = _first_detections(group.tables["detections"], number)
             entered = Coverage(scene).entered_s(self.p.step_s, float(group.duration_s[number]))
@@ -165,35 +165,36 @@ class Tracking(Metric):
     def _tally(
         self, columns: Any, rows: IntArray, held: BoolArray, scene: Scene, duration_s: float
     ) -> tuple[TrackTally, list[str]]:
-        truth = RecordedTruth(scene)
+        targets = traffic_of(scene)[0].targets
         tally = TrackTally(self.p.within_m, self.p.order, self.p.step_s)
         time_s = columns["time_s"][rows]
         instants, start = np.unique(time_s, return_index=True)
         ends = np.append(start[1:], len(rows))
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
-        place = np.searchsorted(instants, grid, side="right") - 1
-        told = np.unique(place[(place >= 0) & (grid >= self.p.from_s)])
+        last = np.searchsorted(instants, grid, side="right") - 1
+        used = np.unique(last[(last >= 0) & (grid >= self.p.from_s)])
         kept = held & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
         confirmed = _first_of_each(columns, rows[kept[rows]])
-        messages = [rows[start[i] : ends[i]] for i in told.tolist()]
+        messages = [rows[start[i] : ends[i]] for i in used.tolist()]
         messages = [m[kept[m]] for m in messages]
         every = np.concatenate([rows[:0], *messages])
         origin = np.stack([columns[name][every] for name in _ORIGIN])
-        state, _ = truth.at(columns["state_s"][every], origin)
-        _, there = truth.at(instants[told], np.zeros((3, len(told))))
+        state, _ = states_in_frame(targets, columns["state_s"][every], origin)
+        there = [np.broadcast_to(t.at(instants[used]).present, used.shape) for t in targets]
+        present = np.array(there, dtype=bool).reshape(len(targets), len(used))
         first_row = 0
         for k, message in enumerate(messages):
             last_row = first_row + len(message)
-            here = _told(columns, message, float(instants[told[k]]), confirmed)
-            tally.add(here, state[:, :, first_row:last_row], np.flatnonzero(there[:, k]))
+            reported = _reported(columns, message, float(instants[used[k]]), confirmed)
+            tally.add(reported, state[:, :, first_row:last_row], np.flatnonzero(present[:, k]))
             first_row = last_row
-        return tally, truth.names
+        return tally, [target.name for target in targets]
 
     def _innovations(self, columns: Any, rows: IntArray) -> tuple[FloatArray, IntArray]:
         """Return the innovations of confirmed tracks, each once, and their degrees of freedom."""
         kept = (columns["nis_freedom"][rows] > 0) & (columns["state_s"][rows] >= self.p.from_s)
         rows = rows[kept]
-        # A look that is worked on again, after one that came late, is told again.
+        # A look that is worked on again, after an out-of-sequence one, is reported again.
         track, when = columns["track"][rows], columns["state_s"][rows]
         order = np.lexsort((when, track))
         same = (np.diff(track[order]) == 0) & (np.diff(when[order]) == 0)
@@ -205,7 +206,7 @@ def _at(end_s: float, of: str) -> str:
     return f"track_nees.time_s{of}.{end_s:g}"
 
 
-def _told_by(column: Any, scene: Scene, block: str | None) -> Any:
+def _is_asked_for(column: Any, scene: Scene, block: str | None) -> Any:
     """Return which rows are of the block that is asked for, or of those that are last."""
     names = column.names
     if block is None:
@@ -218,14 +219,14 @@ def _told_by(column: Any, scene: Scene, block: str | None) -> Any:
     return np.isin(column.codes, wanted)
 
 
-def _told(
+def _reported(
     columns: Any, rows: IntArray, time_s: float, confirmed_s: Mapping[int, float]
-) -> ToldTracks:
+) -> ReportedTracks:
     covariance = np.empty((len(rows), 6, 6))
     for (i, j), name in COVARIANCE.items():
         covariance[:, i, j] = covariance[:, j, i] = columns[name][rows]
     number = columns["track"][rows]
-    return ToldTracks(
+    return ReportedTracks(
         time_s,
         number,
         np.stack([columns[name][rows] for name in _STATE]),
@@ -235,7 +236,7 @@ def _told(
 
 
 def _first_of_each(columns: Any, rows: IntArray) -> dict[int, float]:
-    """Return when each track was first told in some rows, by number."""
+    """Return when each track was first reported in some rows, by number."""
     number, first = np.unique(columns["track"][rows], return_index=True)
     time_s = columns["time_s"][rows[first]]
     return dict(zip(number.tolist(), time_s.tolist(), strict=True))

@@ -1,12 +1,16 @@
-"""Where the targets of a scene truly are, in the frame of a tracker."""
+"""Where the aircraft of a run truly are: in the frame of a tracker, and in sensors' coverage."""
 
-from fractions import Fraction
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from components.geometry.ellipsoid import north_east_up
-from components.metrics.separation import traffic_block
+from components.geometry.attitude import body_angles_unchecked, ned_to_body_unchecked
+from components.geometry.ellipsoid import line_of_sight_ned, north_east_up
+from components.messages.detections import SensorOffer
+from components.messages.reach import EVALUATE, Reach
+from components.metrics.separation import position_of, traffic_of
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.component import Context
 from dsa_des.scene.scene import Scene
@@ -14,55 +18,131 @@ from dsa_des.time.randomness import Streams
 
 # Velocities are differences of positions so long apart, s.
 _STEP_S = 0.02
+# An entry into coverage is known so well, s.
+_WELL_S = 1e-3
 
 
-class RecordedTruth:
-    """The targets of one scene, asked at any time.
+def position_in_frame(
+    flight: Any, time_s: FloatArray, origin: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return north, east and down (3, n) of an aircraft, m, and whether it is there.
 
-    Parameters
-    ----------
-    scene : Scene
+    The origin (3, n) is latitude, longitude (deg) and height (m) of the frame at each time.
+    """
+    state = flight.at(time_s)
+    north, east, up = north_east_up(*origin, *position_of(state))
+    return np.stack([north, east, -up]), np.broadcast_to(state.present, time_s.shape)
+
+
+def states_in_frame(
+    flights: Sequence[Any], time_s: FloatArray, origin: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return positions and velocities (flights, 6, n), m and m/s, and presence (flights, n)."""
+    state = np.empty((len(flights), 6, len(time_s)))
+    present = np.empty((len(flights), len(time_s)), dtype=bool)
+    for number, flight in enumerate(flights):
+        state[number, :3], present[number] = position_in_frame(flight, time_s, origin)
+        before = np.maximum(time_s - _STEP_S, 0.0)
+        after = before + 2.0 * _STEP_S
+        first, _ = position_in_frame(flight, before, origin)
+        last, _ = position_in_frame(flight, after, origin)
+        state[number, 3:] = (last - first) / (after - before)
+    return state, present
+
+
+class TargetsInFrame:
+    """Targets in one frame, north, east and down of an origin in deg and m; NaN if not there."""
+
+    def __init__(self, flights: Sequence[Any], origin: Sequence[float]) -> None:
+        self._flights, self._origin = flights, np.array(origin)
+        self.names = [flight.name for flight in flights]
+
+    def position(self, flight: Any, time_s: FloatArray) -> FloatArray:
+        """Return where an aircraft is, (3, n), m."""
+        origin = np.repeat(self._origin[:, np.newaxis], len(time_s), axis=1)
+        position, there = position_in_frame(flight, time_s, origin)
+        return np.where(there, position, np.nan)
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """Return where the targets are, (targets, 3, n), m."""
+        found = [self.position(flight, time_s) for flight in self._flights]
+        return np.array(found).reshape(len(found), 3, len(time_s))
+
+    def states(self, time_s: FloatArray) -> FloatArray:
+        """Return positions and velocities, (targets, 6, n), m and m/s."""
+        before = np.maximum(time_s - _STEP_S, 0.0)
+        after = before + 2.0 * _STEP_S
+        velocity = (self.at(after) - self.at(before)) / (2.0 * _STEP_S)
+        return np.concatenate([self.at(time_s), velocity], axis=1)
+
+
+def reaches_of(scene: Scene) -> list[Reach]:
+    """Return where the sensors of a scene look, in the ownship's body axes."""
+    found = []
+    for block in scene.blocks.values():
+        if "detections" not in block.cls.outputs:
+            continue
+        context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
+        offer = block.cls(block.name, block.parameters, context).offer("detections")
+        if isinstance(offer, SensorOffer) and offer.reach is not None:
+            found.append(offer.reach)
+    return found
+
+
+class Coverage:
+    """Whether targets lie in the field of view and within the range of any sensor.
+
+    Hills and the horizon are not asked, nor are manoeuvres of the ownship: it flies on.
     """
 
     def __init__(self, scene: Scene) -> None:
-        block = traffic_block(scene)
-        context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
-        source: Any = block.cls(block.name, block.parameters, context)
-        self._source = source
-        duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
-        context.duration_s = duration
-        self.names = [target.name for target in source.targets]
+        self._source, self.duration_s = traffic_of(scene)
+        self._reaches = reaches_of(scene)
 
-    def at(self, time_s: FloatArray, origin: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Return states and presence of every target.
+    def holds(self, target: Any, time_s: FloatArray) -> BoolArray:
+        """Return whether a target is covered at times (n,)."""
+        own, other = self._source.own.at(time_s), target.at(time_s)
+        ends = [
+            np.ascontiguousarray(np.broadcast_to(value, time_s.shape))
+            for state in (own, other)
+            for value in position_of(state)
+        ]
+        north, east, down = line_of_sight_ned(*ends)
+        attitude = [np.broadcast_to(v, time_s.shape) for v in (own.yaw_rad, own.pitch_rad,
+                                                               own.roll_rad)]  # fmt: skip
+        body = ned_to_body_unchecked(north, east, down, *attitude)
+        angles = body_angles_unchecked(*(np.ascontiguousarray(axis) for axis in body))
+        distance = np.sqrt(north**2 + east**2 + down**2)
+        there = np.broadcast_to(own.present & other.present, time_s.shape)
+        found = np.zeros(time_s.shape, dtype=bool)
+        for reach in self._reaches:
+            found |= reach.decide(*angles, distance, there) == EVALUATE
+        return found
 
-        Parameters
-        ----------
-        time_s : (n,)
-        origin : (3, n)
-            Latitude, longitude (deg) and height (m) of each frame.
+    def entered_s(self, step_s: float, until_s: float = math.inf) -> dict[str, float]:
+        """Return when each target that ever is covered is so for the first time, to a millisecond.
 
-        Returns
-        -------
-        state : (targets, 6, n)
-            Position and velocity: north, east, down, m and m/s.
-        present : (targets, n) of bool
+        A stay shorter than `step_s` may be missed; a run may have ended early, at `until_s`.
         """
-        state = np.empty((len(self.names), 6, len(time_s)))
-        present = np.empty((len(self.names), len(time_s)), dtype=bool)
-        for number, target in enumerate(self._source.targets):
-            state[number, :3], present[number] = _position(target, time_s, origin)
-            before = np.maximum(time_s - _STEP_S, 0.0)
-            after = before + 2.0 * _STEP_S
-            first, _ = _position(target, before, origin)
-            last, _ = _position(target, after, origin)
-            state[number, 3:] = (last - first) / (after - before)
-        return state, present
+        end_s = min(self.duration_s, until_s)
+        grid = np.append(np.arange(0.0, end_s, step_s), end_s)
+        found = {}
+        for target in self._source.targets:
+            inside = self.holds(target, grid)
+            if not inside.any():
+                continue
+            first = int(np.argmax(inside))
+            found[target.name] = float(grid[first])
+            if first:
+                found[target.name] = self._entry(target, grid[first - 1], grid[first])
+        return found
 
-
-def _position(target: Any, time_s: FloatArray, origin: FloatArray) -> tuple[FloatArray, BoolArray]:
-    there = target.at(time_s)
-    place = [np.ascontiguousarray(v, dtype=float) for v in (there.lat_deg, there.lon_deg,
-                                                            there.alt_m)]  # fmt: skip
-    north, east, up = north_east_up(*origin, *place)
-    return np.stack([north, east, -up]), np.broadcast_to(there.present, time_s.shape)
+    def _entry(self, target: Any, out_s: float, in_s: float) -> float:
+        """Return when a target enters that is outside at one time and inside at the other."""
+        for _ in range(math.ceil(math.log2(max((in_s - out_s) / _WELL_S, 1.0)))):
+            middle = 0.5 * (out_s + in_s)
+            if self.holds(target, np.array([middle]))[0]:
+                in_s = middle
+            else:
+                out_s = middle
+        return float(in_s)

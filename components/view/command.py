@@ -17,6 +17,6 @@ def view(**options: Any) -> None:
     RUN is a run's folder or a .daa file. The page holds all its data and asks for nothing else; it
     opens from disk.
     """
-    from components.view.make import make_view
+    from components.view.run_picture import make_view
 
     make_view(**options)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from websockets.sync.client import connect
 
-from components.cdti import crew as crew_module
+from components.cdti import control as control_module
 from components.cdti import session as session_module
 from components.examples import folder
 
@@ -39,7 +39,7 @@ class Session:
         self._pacers = []
         made = session_module.LivePacer
         monkeypatch.setattr(session_module, "LivePacer", lambda *a: self._noted(made(*a)))
-        for module in (session_module, crew_module):
+        for module in (session_module, control_module):
             monkeypatch.setattr(module, "say", lambda text="", err=False: self.said.append(text))
         given = {
             "scene": SCENE, "sets": LATER, "swaps": (), "seed": None, "duration": None,

@@ -123,7 +123,7 @@ def targets(count, duration, **_):
 def frames(count, **_):
     """How long the page of ``dsa-des view`` draws a picture with so many targets."""
     import dsa_des
-    from components.view.make import make_view
+    from components.view.run_picture import make_view
 
     with many(count) as scene, TemporaryDirectory() as place:
         swap = ["operator=operator.recorded"]

@@ -18,7 +18,7 @@ pytest.importorskip("websockets", reason="needs the package websockets")
 from live import Session, hear, page, say, wait_for  # noqa: E402
 
 import dsa_des  # noqa: E402
-from components.cdti import crew  # noqa: E402
+from components.cdti import control  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 if CHROMIUM is None:
@@ -49,7 +49,7 @@ def kill(process):
 
 
 def test_a_browser_that_is_killed_leaves_a_run_that_another_goes_on_with(tmp_path, monkeypatch):
-    monkeypatch.setattr(crew, "GONE_S", 0.2)
+    monkeypatch.setattr(control, "GONE_S", 0.2)
     sets = ("blocks.operator.unattended='pauses'", "record.truth=true")
     session = Session(monkeypatch, tmp_path / "run", factor="8", duration="8", sets=sets)
     with chromium(tmp_path / "profile") as (process, orders), sync_api.sync_playwright() as play:

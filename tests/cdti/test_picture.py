@@ -9,11 +9,9 @@ from matplotlib.path import Path as Outline
 
 import dsa_des
 from components.aircraft.aircraft import VisibleAreas
-from components.cdti.camera_picture import silhouette
-from components.cdti.contacts import Contacts, contacts_of_lines
-from components.cdti.lost_area import lost_area
-from components.cdti.own_flight import OwnFlight
-from components.cdti.scope import Scope
+from components.cdti.camera import silhouette
+from components.cdti.contacts import Contacts, OwnFlight, contacts_of_lines
+from components.cdti.scope import Scope, lost_area
 from components.messages.tracks import Tracks
 from components.optical.convex_hull import union_area
 from components.well_clear.violation import violates

@@ -15,7 +15,7 @@ from live import LATER, Session, hear, page, say, wait_for  # noqa: E402
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
 
 import dsa_des  # noqa: E402
-from components.cdti import crew  # noqa: E402
+from components.cdti import control  # noqa: E402
 
 TURN = {"type": "decide", "decision": "turn", "target": 0, "value": 45}
 
@@ -184,14 +184,14 @@ def test_a_page_that_draws_nothing_gets_two_pictures_and_holds_nobody_up(tmp_pat
 
 @pytest.mark.parametrize("unattended", ["goes on", "pauses"])
 def test_the_run_goes_on_or_pauses_without_its_operator(tmp_path, monkeypatch, unattended):
-    monkeypatch.setattr(crew, "GONE_S", 0.1)
+    monkeypatch.setattr(control, "GONE_S", 0.1)
     sets = ("record.truth=false", f"blocks.operator.unattended='{unattended}'")
     session = Session(monkeypatch, tmp_path / "run", factor="8", duration="6", sets=sets)
     with page(session) as (socket, _), session.socket() as other:
         assert hear(other, "welcome")["role"] == "watcher"
         say(socket, type="ready")
         hear(socket, "frame")
-        monkeypatch.setattr(crew, "FRAME_S", 1e9)
+        monkeypatch.setattr(control, "FRAME_S", 1e9)
         while hear(other, "frame")["operators"] == 0:
             pass
         socket.close()

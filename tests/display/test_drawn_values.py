@@ -15,7 +15,7 @@ from matplotlib.patches import Polygon
 from scipy.stats import chi2
 
 import dsa_des
-from components.display.fields_of_view import draw_outline, outline_of
+from components.display.map_view import draw_outline, outline_of
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR

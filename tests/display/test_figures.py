@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from components.display.flights import Flights
-from components.display.marks import Detected
+from components.display.recorded_rows import Detected, SensorScans, read_scans
 from components.display.report import DetectAndSenseReport, sensor_names
-from components.display.scan_times import SensorScans, read_scans
 from components.display.timeline import find_close_up
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import ObserverSink, Recorder

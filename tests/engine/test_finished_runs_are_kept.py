@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.display import figures
+from components.display import plan
 from components.display.report import DetectAndSenseReport
 from components.display.summary import FusedSummary, SensorSummary
 from components.traffic.source import TrafficSource
@@ -34,7 +34,7 @@ def test_a_figure_that_fails_leaves_the_run(configs, tmp_path, monkeypatch, erro
     def fail(*_):
         raise error
 
-    monkeypatch.setattr(figures, "draw", fail)
+    monkeypatch.setattr(plan, "draw_plan", fail)
     result = run(configs, tmp_path / "kept", "--quiet")
     assert result.exit_code == 0
     assert result.stderr.startswith("note: drawing failed: ")
@@ -48,7 +48,7 @@ def test_a_figure_that_cannot_be_written_leaves_the_run(configs, tmp_path, monke
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(figures, "draw", fail)
+    monkeypatch.setattr(plan, "draw_plan", fail)
     result = run(configs, tmp_path / "kept", "--quiet")
     assert result.exit_code == 1
     assert result.stderr == (

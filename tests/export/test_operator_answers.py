@@ -7,8 +7,8 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from components.display.recorded_run import RecordedTables
 from components.export.operator_answers import operator_csv
-from components.export.recorded import RecordedTables
 from dsa_des.errors import UsageError
 
 WALL = 1.8e9

@@ -190,12 +190,12 @@ def import_everything() -> None:
     for module in (
         "dsa_des.record.arrow", "dsa_des.studies.output", "dsa_des.studies.figures", "rich.console",
         "rich.table", "rich.progress", "matplotlib.figure", "matplotlib.backends.backend_agg",
-        "scipy.special", "scipy.stats", "components.display.figures", "trimesh",
+        "scipy.special", "scipy.stats", "components.display.plan", "trimesh",
         "components.evidence.silhouettes.comparison_command", "components.optical.mesh",
-        "components.encounters.set_commands", "components.encounters.set_commands",
-        "components.encounters.encounter_tables", "components.encounters.model_commands",
-        "components.encounters.set_commands", "components.export.exported", "scipy.io",
-        "components.view.make", "pyarrow.parquet", "pyarrow.csv",
+        "components.encounters.convert_command", "components.encounters.show_command",
+        "components.encounters.risk_table", "components.encounters.generate_command",
+        "components.encounters.split_command", "components.export.exported", "scipy.io",
+        "components.view.run_picture", "pyarrow.parquet", "pyarrow.csv",
     ):  # fmt: skip
         with contextlib.suppress(ImportError):
             importlib.import_module(module)

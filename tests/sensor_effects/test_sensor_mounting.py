@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.display.fields_of_view import outline_of, reach_text
+from components.display.map_view import outline_of, reach_text
 from components.messages.reach import Reach
 from components.sensor.mounting import MountedAxes
 from dsa_des.errors import SceneError

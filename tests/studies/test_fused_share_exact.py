@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.metrics.clock_coincidence import coincidence_share
+from components.metrics.fused_share import coincidence_share
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import Scene, load_scene

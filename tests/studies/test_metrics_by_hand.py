@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.metrics.flights_together import first_losses_s, nearest_of, ways_of
-from components.metrics.separation import Separation, closest, first_inside, separations
+from components.metrics.losses import closest, first_inside, first_losses_s, nearest_of, ways_of
+from components.metrics.separation import Separation, separations
 from components.metrics.track_quality import _ramp_quantiles
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from components.metrics.jittered_coincidence import mean_coincidence_share
-from components.metrics.lossy_scans import age_quantile_s, mean_age_s, mean_interval_s
+from components.metrics.fused_share import mean_coincidence_share
+from components.metrics.track_quality import age_quantile_s, mean_age_s, mean_interval_s
 from dsa_des.cli import main
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.formats.csv_file import read_csv
-from components.formats.daa_file import TrafficFileError, read_daa
+from components.formats.daa_file import read_daa
 from components.formats.sample_table import elapsed_times
+from components.formats.text_rows import TrafficFileError
 from components.geometry.ellipsoid import line_of_sight
 
 KNOT = 1852 / 3600

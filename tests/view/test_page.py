@@ -14,9 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
+from components.display.symbols import sensor_marks
 from components.sensor import marks
 from components.view.command import view
-from components.view.sensor_marks import sensor_marks
 
 HOSTILE = '</script><script>alert(1)</script>{{script}} & "q"'
 SCENE = """

@@ -8,7 +8,7 @@ from wired import chain, measured, rows, run, sensor
 
 import dsa_des
 from components.metrics.encounter import ClosestApproach, WellClear
-from components.metrics.severity import Severity
+from components.metrics.risk import Severity
 from dsa_des.files.toml_text import to_toml
 from dsa_des.replicas import replicas
 from dsa_des.replicas.changed_scene import Replica

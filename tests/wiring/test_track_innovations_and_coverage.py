@@ -10,7 +10,7 @@ import pytest
 from covering import covers
 from wired import chain, measured, rows, run
 
-from components.metrics.coverage import Coverage
+from components.metrics.true_states import Coverage
 from dsa_des import load_scene
 
 STATED = {"errors": "stated", "quantised": False, "azimuth_error_deg": 0.1,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.display.styles import styles_of
+from components.display.symbols import styles_of
 from components.evidence.thesis.basis import configured
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.display.fields_of_view import outline_of
-from components.display.styles import styles_of
+from components.display.map_view import outline_of
+from components.display.symbols import styles_of
 from components.evidence.thesis.plotting import GREY, RADAR
 from components.evidence.thesis.scene_run import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray

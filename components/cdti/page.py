@@ -1,0 +1,168 @@
+"""The page of the display: what it holds and may do, which page may decide, and what it may say."""
+
+import secrets
+from functools import cache
+from hmac import compare_digest
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from components.view.page import page_filled, page_part, page_program
+
+_PACKAGE = "components.cdti"
+#: The program's parts, in the order in which they need each other.
+SCRIPTS = ("link.js", "symbols.js", "scope.js", "camera.js", "sound.js", "panel.js", "app.js")
+OPERATOR, WATCHER = "operator", "watcher"
+#: A message is a line of text; this is some ten times the longest that a page sends, bytes.
+LARGEST_BYTES = 2048
+_MOST_DEG, _MOST_M = 180.0, 3000.0
+
+
+@cache
+def page() -> tuple[str, str]:
+    """Return the page, which holds nothing of the run, and its program's digest.
+
+    All that is said of a run comes over the socket, and is put on screen as text.
+    """
+    script, digest = page_program(_PACKAGE, SCRIPTS)
+    contents = {"style": page_part(_PACKAGE, "style.css"), "script": script}
+    return page_filled(_PACKAGE, "cdti.html", contents), digest
+
+
+def headers(socket_address: str) -> dict[str, str]:
+    """Return the headers with which the page is sent.
+
+    The browser may run the one program inside, talk to this server's socket, and nothing else.
+    """
+    _, digest = page()
+    policy = (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        f"connect-src {socket_address}; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    )
+    return {
+        "Content-Type": "text/html; charset=utf-8",
+        "Content-Security-Policy": policy,
+        "Cache-Control": "no-store",
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+        "X-Frame-Options": "DENY",
+    }
+
+
+class Admission:
+    """Hands out the right to decide, to one page at a time.
+
+    The address holds a token. The first page that comes with it may decide, and gets a key by which
+    it is known when it comes back; the token then is used up, and only lets watch. When the page of
+    the operator is gone for good, `renew` gives a new token.
+    """
+
+    def __init__(self) -> None:
+        self.token = _secret()
+        self._fresh = True
+        self._watching = [self.token]
+        self._key = ""
+
+    def knows(self, token: str) -> bool:
+        """Return whether a token is one of this run, used up or not."""
+        return any(_same(token, known) for known in self._watching)
+
+    def role(self, token: str, key: str) -> tuple[str, str]:
+        """Return what a page with a token of this run may do, and the key of who decides."""
+        if self._key and _same(key, self._key):
+            return OPERATOR, self._key
+        if self._fresh and _same(token, self.token):
+            self._fresh = False
+            self._key = _secret()
+            return OPERATOR, self._key
+        return WATCHER, ""
+
+    def renew(self) -> str:
+        """Return a token with which a page may decide again; the last one's key stays valid."""
+        if not self._fresh:
+            self.token, self._fresh = _secret(), True
+            self._watching.append(self.token)
+        return self.token
+
+
+def _secret() -> str:
+    return secrets.token_urlsafe(24)
+
+
+def _same(one: str, other: str) -> bool:
+    return compare_digest(one.encode("utf-8", "replace"), other.encode())
+
+
+class _FromPage(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Ready(_FromPage):
+    """The operator is there: the run may begin."""
+
+    type: Literal["ready"]
+
+
+class Drawn(_FromPage):
+    """A frame is on screen: another one may be sent."""
+
+    type: Literal["drawn"]
+    frame: int = Field(ge=0, le=2**53)
+
+
+class Chosen(_FromPage):
+    """A contact was chosen, whose camera picture is wanted."""
+
+    type: Literal["chosen"]
+    target: int = Field(ge=-1, le=10**7)
+
+
+class _Decided(_FromPage):
+    type: Literal["decide"]
+    id: str = Field(pattern=r"^[0-9a-f]{8,40}$")
+
+
+class Judged(_Decided):
+    """An alert is on screen, was looked at, or was judged."""
+
+    decision: Literal["shown", "looked", "verified", "rejected"]
+    target: int = Field(ge=0, le=10**7)
+
+
+class Turned(_Decided):
+    """The ownship is told to turn, deg to the right."""
+
+    decision: Literal["turn"]
+    target: int = Field(ge=-1, le=10**7)
+    value: float = Field(ge=-_MOST_DEG, le=_MOST_DEG, allow_inf_nan=False)
+
+
+class Climbed(_Decided):
+    """The ownship is told to climb, m upward."""
+
+    decision: Literal["climb"]
+    target: int = Field(ge=-1, le=10**7)
+    value: float = Field(ge=-_MOST_M, le=_MOST_M, allow_inf_nan=False)
+
+
+Decided = Annotated[Judged | Turned | Climbed, Field(discriminator="decision")]
+PageMessage = Ready | Drawn | Chosen | Judged | Turned | Climbed
+_READER: TypeAdapter[PageMessage] = TypeAdapter(
+    Annotated[Ready | Drawn | Chosen | Decided, Field()]
+)
+
+
+def read_message(text: str | bytes) -> PageMessage:
+    """Return the message of a page; ValueError with a reason that holds nothing of it."""
+    if isinstance(text, bytes):
+        raise ValueError("is not text")
+    if len(text) > LARGEST_BYTES:
+        raise ValueError("is too long")
+    try:
+        return _READER.validate_json(text)
+    except ValidationError as error:
+        kinds = sorted({problem["type"] for problem in error.errors(include_input=False)})
+        raise ValueError(f"is no message of this page ({', '.join(kinds[:3])})") from None

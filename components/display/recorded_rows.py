@@ -1,0 +1,254 @@
+"""A run's tables read for figures, row group by row group: no table is ever in memory as a whole.
+
+Detections are thinned where they are many; of scans each sensor's count, times and first hit are
+kept, and single scans of a part of the run.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.mark import Mark
+
+MOST_ROWS = 400_000
+"""More detections than this are thinned when they are read, those of long series first."""
+
+#: Columns that are read as codes and names.
+TEXT = ("block", "target", "sensors")
+_SCANS = ("block", "time_s", "detected")
+_DETECTIONS = ("block", "target", "time_s", "true_range_m")
+
+
+def each_row_group(path: Path, columns: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Give columns of each row group that has rows, in order; a table that is not there has none.
+
+    They are arrays, text is codes (-1 is null) and names.
+    """
+    if not path.is_file():
+        return
+    import pyarrow.parquet as pq
+
+    text = [name for name in columns if name in TEXT]
+    with pq.ParquetFile(path, read_dictionary=text) as file:
+        for number in range(file.num_row_groups):
+            table = file.read_row_group(number, columns=list(columns))
+            if table.num_rows:
+                yield {name: _array(table[name], name in TEXT) for name in columns}
+
+
+def _array(column: Any, text: bool) -> Any:
+    if not text:
+        return column.combine_chunks().to_numpy(zero_copy_only=False)
+    if column.num_chunks > 1:
+        column = column.unify_dictionaries()
+    chunks = column.chunks
+    codes = [chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False) for chunk in chunks]
+    return np.concatenate(codes).astype(np.int64), chunks[0].dictionary.to_pylist()
+
+
+def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, list[str]]]:
+    """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
+    for rows in each_row_group(folder / "fused.parquet", ("time_s", "sensors")):
+        code, names = rows["sensors"]
+        yield rows["time_s"], code, names
+
+
+@dataclass
+class Detected:
+    """When each sensor detected which target, and how far away, in the order of its series.
+
+    ``target`` is an index into the names of targets; ranges are true slant ranges.
+    """
+
+    sensors: list[str]
+    time_s: dict[str, FloatArray]
+    range_m: dict[str, FloatArray]
+    target: dict[str, IntArray]
+    names: list[str]
+    #: How each sensor is marked.
+    styles: dict[str, Mark] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
+        """Read the table ``detections`` of a run folder, if there is one."""
+        rows = ThinnedStream(MOST_ROWS, 2)
+        known: dict[str, int] = {}
+        series: dict[tuple[str, int], int] = {}
+        for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
+            code, names = group["target"]
+            # Codes of a row group speak of that row group's names only.
+            lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
+            index = np.flatnonzero(code >= 0)  # a false alarm has no place to be marked at
+            block, blocks = group["block"]
+            pair, which = np.unique(block[index] * len(lookup) + code[index], return_inverse=True)
+            ids = [
+                series.setdefault((blocks[a], int(lookup[b])), len(series))
+                for a, b in zip(*(part.tolist() for part in divmod(pair, len(lookup))), strict=True)
+            ]
+            number = np.array(ids, dtype=np.int64)[which]
+            rows.add(number, group["time_s"][index], group["true_range_m"][index])
+        number, (time_s, range_m) = rows.rows()
+        all_sensors = sorted({*sensors, *(name for name, _ in series)})
+        sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
+        target = np.array([target for _, target in series], dtype=np.int64)[number]
+        chosen = {name: np.flatnonzero(sensor == i) for i, name in enumerate(all_sensors)}
+        return cls(
+            all_sensors,
+            {name: time_s[index] for name, index in chosen.items()},
+            {name: range_m[index] for name, index in chosen.items()},
+            {name: target[index] for name, index in chosen.items()},
+            list(known),
+        )
+
+
+class ThinnedStream:
+    """Rows of many series that come piece by piece, of which no more are kept than fit.
+
+    Every series keeps its first row and every n-th from there on, with n a power of two that
+    follows from how many rows each series has. So what is kept rests on the rows, not on the
+    pieces they came in, and a series with few rows keeps them beside one with millions. More rows
+    than `most` are never kept, unless there are more series: each keeps one.
+    """
+
+    def __init__(self, most: int, columns: int) -> None:
+        self._most = most
+        self._series: IntArray = np.empty(0, dtype=np.int64)
+        #: How many rows of its series came before each row that is kept.
+        self._number: IntArray = np.empty(0, dtype=np.int64)
+        self._columns: list[FloatArray] = [np.empty(0) for _ in range(columns)]
+        self._seen: IntArray = np.empty(0, dtype=np.int64)
+
+    def add(self, series: IntArray, *columns: FloatArray) -> None:
+        """Take rows, `most` or fewer at a time, of series 0, 1, 2, ... with none left out."""
+        new = int(series.max(initial=-1)) + 1 - len(self._seen)
+        self._seen = np.concatenate((self._seen, np.zeros(max(0, new), dtype=np.int64)))
+        number = self._seen[series] + places_in_groups(series)
+        self._seen += np.bincount(series, minlength=len(self._seen))
+        every = strides(self._seen, self._most)
+        old, more = self._number % every[self._series] == 0, number % every[series] == 0
+        self._series = np.concatenate((self._series[old], series[more]))
+        self._number = np.concatenate((self._number[old], number[more]))
+        self._columns = [
+            np.concatenate((kept[old], column[more]))
+            for kept, column in zip(self._columns, columns, strict=True)
+        ]
+
+    def rows(self) -> tuple[IntArray, list[FloatArray]]:
+        """Return the series and the columns of the rows that are kept, in the order they came."""
+        return self._series, self._columns
+
+
+def strides(counts: IntArray, most: int) -> IntArray:
+    """Return every how many rows of each series one is kept, a power of two.
+
+    Series of up to some length keep all their rows, longer ones at most that length, such that
+    all together keep `most`, or one each. Where any count grows, no stride shrinks.
+    """
+    if int(counts.sum()) <= most:
+        return np.ones(len(counts), dtype=np.int64)
+    ascending = np.sort(counts)
+    shorter = np.concatenate(([0], np.cumsum(ascending)[:-1]))
+    # The length when the i-th and all longer series share what the shorter ones leave over.
+    shared = (most - shorter) // np.arange(len(counts), 0, -1)
+    longest = max(1, int(shared[np.argmax(shared < ascending)]))
+    every: IntArray = np.ones(len(counts), dtype=np.int64)
+    while (long := -(-counts // every) > longest).any():
+        every[long] *= 2
+    return every
+
+
+def places_in_groups(group: IntArray) -> IntArray:
+    """Return how many rows of its own group come before each row, shape (rows,)."""
+    order = np.argsort(group, kind="stable")
+    starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+    lengths = np.diff(starts, append=len(group))
+    places = np.empty(len(group), dtype=np.int64)
+    places[order] = np.arange(len(group)) - np.repeat(starts, lengths)
+    return places
+
+
+@dataclass
+class SensorScans:
+    """All scans of a sensor: count, first and last, and the first with a detection."""
+
+    count: int
+    first_s: float
+    last_s: float
+    first_hit_s: float | None
+
+    @property
+    def period_s(self) -> float | None:
+        """Mean time from scan to scan; None for a single scan."""
+        if self.count < 2:
+            return None
+        return (self.last_s - self.first_s) / (self.count - 1)
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Mean number of scans per second; None where all are at one time."""
+        if self.last_s <= self.first_s:
+            return None
+        return (self.count - 1) / (self.last_s - self.first_s)
+
+
+@dataclass
+class ScansShown:
+    """Single scans of a sensor in a part of a run, and those that hit, also the last one before."""
+
+    time_s: FloatArray
+    hit_s: FloatArray
+
+
+def read_scans(folder: Path) -> dict[str, SensorScans]:
+    """Return what the table ``scans`` of a run folder says of each sensor, by name."""
+    found: dict[str, SensorScans] = {}
+    for rows in each_row_group(folder / "scans.parquet", _SCANS):
+        for name, (time_s, hit_s) in _by_sensor(rows).items():
+            first, last = float(time_s[0]), float(time_s[-1])
+            scans = found.setdefault(name, SensorScans(0, first, last, None))
+            scans.count += len(time_s)
+            scans.last_s = last
+            if scans.first_hit_s is None and len(hit_s):
+                scans.first_hit_s = float(hit_s[0])
+    return dict(sorted(found.items()))
+
+
+def scans_between(
+    folder: Path, start_s: float, end_s: float, scans: Iterable[str]
+) -> dict[str, ScansShown]:
+    """Return the scans of some sensors in [start_s, end_s]."""
+    times: dict[str, list[FloatArray]] = {name: [] for name in scans}
+    hits: dict[str, list[FloatArray]] = {name: [] for name in times}
+    before: dict[str, FloatArray] = {}
+    for rows in each_row_group(folder / "scans.parquet", _SCANS):
+        if float(rows["time_s"][0]) > end_s:
+            break
+        for name, (time_s, hit_s) in _by_sensor(rows).items():
+            first, last = np.searchsorted(hit_s, start_s), np.searchsorted(hit_s, end_s, "right")
+            before[name] = hit_s[:first][-1:] if first else before.get(name, hit_s[:0])
+            hits[name].append(hit_s[first:last])
+            times[name].append(time_s[(time_s >= start_s) & (time_s <= end_s)])
+    nothing = np.empty(0)
+    return {
+        name: ScansShown(
+            np.concatenate([*times[name], nothing]),
+            np.concatenate([before.get(name, nothing), *hits[name]]),
+        )
+        for name in times
+    }
+
+
+def _by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return for each sensor of a row group its times, and those of scans with a detection."""
+    code, names = rows["block"]
+    found = {}
+    for number, name in enumerate(names):
+        mine = code == number
+        if mine.any():
+            time_s = rows["time_s"][mine]
+            found[name] = time_s, time_s[rows["detected"][mine] > 0]
+    return found

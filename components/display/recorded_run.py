@@ -1,0 +1,136 @@
+"""The tables of a run's folder, for pages and for files of other programs."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray
+from dsa_des.errors import UsageError
+from dsa_des.record.run_folder import Run, with_columns_of_rows
+
+_STATE = (
+    "time_s", "lat_deg", "lon_deg", "alt_m", "velocity_north_m_s", "velocity_east_m_s",
+    "velocity_down_m_s", "heading_rad", "pitch_rad", "roll_rad",
+)  # fmt: skip
+OWNSHIP = "ownship"
+# Greater than any position, speed or time of a run.
+_LARGEST = 1e10
+
+
+@dataclass(frozen=True)
+class RecordedTables:
+    """A run's tables by name, as Arrow holds them; what they lack is a `UsageError`."""
+
+    folder: Path
+    tables: Mapping[str, Any]
+
+    @cached_property
+    def _with_pose(self) -> Any:
+        return with_columns_of_rows(self.tables, "detections")
+
+    def table(self, name: str) -> Any:
+        """Return a table; detections have with them where the ownship was at each."""
+        return self._with_pose if name == "detections" else self.tables[name]
+
+    def flights(self) -> dict[str, dict[str, FloatArray]]:
+        """Return the true flight of each aircraft by its name, the ownship first.
+
+        The columns of `_STATE` in order of time; refused without truth, or if a target is called as
+        the ownship is here.
+        """
+        if "truth" not in self.tables:
+            raise UsageError(
+                f"{self.folder}: has no truth.parquet, which holds the flights: it is recorded "
+                "where it is small; ask for it with truth = true under [record]"
+            )
+        names = self.texts("truth", "target")
+        if OWNSHIP in names:
+            raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
+        found: dict[str, dict[str, FloatArray]] = {}
+        columns = {name: self.numbers("truth", name) for name in _STATE}
+        self.refuse_large("truth", columns)
+        aircraft = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
+        for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
+            mine = np.flatnonzero(aircraft == name)
+            mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
+            time_s, first = np.unique(columns["time_s"][mine], return_index=True)
+            if len(time_s):
+                found[name] = {key: values[mine][first] for key, values in columns.items()}
+        return found
+
+    def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
+        """Refuse what is no number, or greater than any of a run, by name and row."""
+        for name, values in columns.items():
+            large = ~(np.abs(values) <= _LARGEST)
+            if large.any():
+                row = int(np.argmax(large))
+                raise UsageError(
+                    f"{self.folder}: {table}.parquet: {name} in row {row} is {values[row]:g}: a "
+                    f"flight needs numbers within ±{_LARGEST:g}"
+                )
+
+    def numbers(self, table: str, name: str) -> FloatArray:
+        """Return a column as numbers, NaN where nothing stands; refuse any other."""
+        try:
+            column = self._column(table, name).to_numpy(zero_copy_only=False)
+            return np.asarray(column, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise UsageError(f"{self.folder}: {table}.parquet: {name} holds no numbers") from None
+
+    def texts(self, table: str, name: str) -> list[str | None]:
+        """Return a column of texts, as `numbers` does one of numbers."""
+        found = self._column(table, name).to_pylist()
+        if not all(text is None or isinstance(text, str) for text in found):
+            raise UsageError(
+                f"{self.folder}: {table}.parquet: {name} holds something else than text"
+            )
+        return found
+
+    def values(self, table: str, name: str) -> Any:
+        """Return a column of texts as a list, any other as an array of its own type."""
+        import pyarrow as pa
+
+        column = self._column(table, name)
+        if pa.types.is_string(column.type) or pa.types.is_dictionary(column.type):
+            return column.to_pylist()
+        return column.to_numpy(zero_copy_only=False)
+
+    def _column(self, table: str, name: str) -> Any:
+        columns = self.table(table)
+        if columns.column_names.count(name) != 1:
+            raise UsageError(f"{self.folder}: {table}.parquet: there is no column {name!r}")
+        return columns[name]
+
+
+def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
+    """Return the tables of a run: a folder's path, or what `dsa_des.run` returns."""
+    if isinstance(run, Run):
+        return RecordedTables(run.path or Path("the run"), run.tables)
+    return read_tables(os.fspath(run))
+
+
+def read_tables(run: str) -> RecordedTables:
+    """Read all tables of a run's folder; `UsageError` where it is none or one cannot be read."""
+    folder = Path(run)
+    if not folder.is_dir():
+        raise UsageError(f"{run}: there is no such folder")
+    paths = sorted(folder.glob("*.parquet"))
+    if not (folder / "run.json").is_file() or not paths:
+        raise UsageError(f"{run}: holds no run: run.json or its tables are missing")
+    return RecordedTables(folder, {path.stem: read_table(path) for path in paths})
+
+
+def read_table(path: Path) -> Any:
+    """Read a table of a run; `UsageError` where it cannot be read."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"{path}: is no Parquet file that can be read ({error})") from error

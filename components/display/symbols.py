@@ -1,0 +1,205 @@
+"""The kit of symbols of all pictures: marks of sensors, marks left out, and names beside them."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from components.sensor.marks import EO, IR, RADAR
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.block.mark import Mark, marks_of, told_apart
+
+FONT_SIZE = 8
+_LINE_PX = FONT_SIZE * 1.9
+_LETTER_PX = FONT_SIZE * 0.95
+_GAP_PX = 8.0
+_CELL_PX = 6.0
+# Between marks of different sensors on one path, and how many are drawn of one sensor.
+_SPACING_PX, _MOST_MARKS = 9.0, 5000
+
+#: How far the second and the third of a kind are from its colour towards white, or black if minus;
+#: of a light colour the other way round.
+_SHADES = (0.0, 0.4, -0.35)
+_LIGHT = 0.25
+_KINDS = (("radar", RADAR), ("optical.ir", IR), ("optical", EO))
+
+Box = tuple[float, float, float, float]
+
+
+def styles_of(names: Iterable[str], blocks: Mapping[str, Any]) -> dict[str, Mark]:
+    """Return name → mark of sensors by the classes of a run's blocks, alike in every figure."""
+    return marks_of({name: type(blocks[name]) if name in blocks else None for name in names})
+
+
+def mark_of(style: Mark) -> dict[str, Any]:
+    """Return how a sensor's detections are marked: big ones open, small ones filled."""
+    big = style.size_pt > 7
+    return {
+        "linestyle": "none",
+        "marker": style.marker,
+        "markersize": style.size_pt,
+        "markeredgecolor": style.colour,
+        "markerfacecolor": "none" if big else style.colour,
+        "markeredgewidth": 1.2 if big else 0.4,
+    }
+
+
+def sensor_marks(types: Mapping[str, str]) -> dict[str, Mark]:
+    """Return name → mark of sensors by the types of their blocks, also those of one kind apart.
+
+    Markers are those of figures. Lines of sight and scans have none: colours differ too, in shades
+    of that of the kind.
+    """
+    kinds = {
+        name: next((mark for start, mark in _KINDS if kind.startswith(start)), None)
+        for name, kind in types.items()
+    }
+    found = told_apart(kinds)
+    before: dict[Mark, int] = {}
+    for name, kind in sorted(kinds.items()):
+        if kind is not None:
+            again = before.get(kind, 0)
+            before[kind] = again + 1
+            found[name] = replace(found[name], colour=_shade(kind.colour, again))
+    return found
+
+
+def _shade(colour: str, again: int) -> str:
+    parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    share = _SHADES[again % len(_SHADES)] * (1 if _luminance(parts) < _LIGHT else -1)
+    towards = 255 if share > 0 else 0
+    mixed = [round(part + abs(share) * (towards - part)) for part in parts]
+    return "#" + "".join(f"{part:02X}" for part in mixed)
+
+
+def _luminance(parts: list[int]) -> float:
+    """Return the relative luminance of sRGB (WCAG 2.2)."""
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4
+              for p in (part / 255 for part in parts)]  # fmt: skip
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def staggered(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
+    """Return the indices of marks about `spacing_px` apart along a path, ascending.
+
+    Several sensors that mark the same path take turns on it, each at its `phase`, a share of the
+    spacing, so that their marks alternate instead of covering each other; every mark stays where it
+    belongs. The first point is always kept, a gap stays a gap, and NaN is left out.
+    """
+    known = np.flatnonzero(np.isfinite(along_px))
+    bins = np.floor(along_px[known] / spacing_px - phase)
+    return known[np.diff(bins, prepend=-np.inf) > 0]
+
+
+def evenly(count: int, most: int) -> IntArray:
+    """Return at most `most` indices spread over ``range(count)``, with both ends."""
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).astype(np.int64)
+
+
+def in_turns(
+    along_px: FloatArray, styles: Mapping[str, Mark], name: str, shift: float = 0.0
+) -> IntArray:
+    """Return the indices of the marks of a sensor whose turn it is among all on a path."""
+    phase = list(styles).index(name) / len(styles) + shift
+    return staggered(along_px, _SPACING_PX * len(styles), phase)
+
+
+def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
+    """Mark a sensor's detections (n, 2) on axes of given limits, and return how many."""
+    few = points[evenly(len(points), _MOST_MARKS)]
+    axes.plot(
+        few[:, 0], few[:, 1], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
+        scalex=False, scaley=False,
+    )  # fmt: skip
+    return len(few)
+
+
+def by_target(target: IntArray) -> list[tuple[int, IntArray]]:
+    """Return each target that occurs and its rows, ascending."""
+    order = np.argsort(target, kind="stable")
+    starts = np.flatnonzero(np.diff(target[order], prepend=-1))
+    return [(int(target[rows[0]]), rows) for rows in np.split(order, starts[1:]) if len(rows)]
+
+
+class Labels:
+    """Puts each label beside its point on axes, where there is room.
+
+    Limits are (low, high), `unit_per_px` the scale of both axes, and obstacles (points, 2) places
+    that are better left free, in units of the axes.
+    """
+
+    def __init__(
+        self,
+        axes: Any,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        unit_per_px: float,
+        obstacles: FloatArray,
+    ) -> None:
+        self._axes = axes
+        self._x = x
+        self._y = y
+        self._unit_per_px = unit_per_px
+        self._taken: list[Box] = []
+        cells = np.floor((obstacles - (x[0], y[0])) / (unit_per_px * _CELL_PX))
+        # One number per cell: sorting rows is ten times slower. Cells out of sight do not matter.
+        cells = cells[(cells >= 0).all(axis=1) & (cells < 10_000).all(axis=1)]
+        numbers = np.unique(cells[:, 0] * 10_000 + cells[:, 1])
+        self._obstacles = (np.column_stack(np.divmod(numbers, 10_000)) + 0.5) * _CELL_PX
+
+    def add(
+        self, text: str, x: float, y: float, colour: str = "#000000", weight: str = "normal"
+    ) -> None:
+        """Write `text` beside the point (x, y), in the first free place of eight around it."""
+        px = (x - self._x[0]) / self._unit_per_px
+        py = (y - self._y[0]) / self._unit_per_px
+        width, height = len(text) * _LETTER_PX, _LINE_PX
+        right = (self._x[1] - self._x[0]) / self._unit_per_px
+        top = (self._y[1] - self._y[0]) / self._unit_per_px
+        best: tuple[float, Box] | None = None
+        for distance in (1.0, 2.5, 4.5):
+            gap = _GAP_PX * distance
+            for left, bottom in (
+                (px + gap, py - height / 2),
+                (px - gap - width, py - height / 2),
+                (px + gap, py + gap / 2),
+                (px + gap, py - gap / 2 - height),
+                (px - gap - width, py + gap / 2),
+                (px - gap - width, py - gap / 2 - height),
+                (px - width / 2, py + gap),
+                (px - width / 2, py - gap - height),
+            ):
+                box = (left, bottom, left + width, bottom + height)
+                cost = sum(_overlap(box, other) for other in self._taken)
+                cost += 2 * (width * height - _overlap(box, (0.0, 0.0, right, top)))
+                # A free place must not seem taken by the rounding of its corners.
+                cost = round(cost + self._covered(box), 6)
+                if best is None or cost < best[0]:
+                    best = (cost, box)
+            if best is not None and best[0] == 0:
+                break
+        assert best is not None
+        box = best[1]
+        self._taken.append(box)
+        self._axes.text(
+            self._x[0] + box[0] * self._unit_per_px,
+            self._y[0] + (box[1] + box[3]) / 2 * self._unit_per_px,
+            text, fontsize=FONT_SIZE, color=colour, weight=weight, va="center", clip_on=True,
+            bbox={"facecolor": "white", "alpha": 0.65, "edgecolor": "none", "pad": 0.8}, zorder=4.0,
+        )  # fmt: skip
+
+    def _covered(self, box: Box) -> float:
+        """Return about the area of the obstacles that a box would cover."""
+        x, y = self._obstacles.T
+        inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
+        return 0.5 * _CELL_PX**2 * int(np.count_nonzero(inside))
+
+
+def _overlap(one: Box, other: Box) -> float:
+    """Return the area that two boxes share."""
+    wide = min(one[2], other[2]) - max(one[0], other[0])
+    high = min(one[3], other[3]) - max(one[1], other[1])
+    return max(0.0, wide) * max(0.0, high)

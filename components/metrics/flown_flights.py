@@ -1,0 +1,131 @@
+"""True flights of a group of replicas, as planned and as the ownship was steered."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from components.flights.steered_flights import ManyFlights, OwnFlights, SteeredFlight
+from components.messages.steering import Manoeuvre
+from components.metrics.separation import RelativeFlight, separations, traffic_block
+from dsa_des.arrays.types import FloatArray
+from dsa_des.scene.scene import Scene
+from dsa_des.studies.metric import Group
+
+_COLUMNS = Manoeuvre._fields
+
+#: Manoeuvres and when they came, s, in order.
+Steering = Sequence[tuple[float, Manoeuvre]]
+
+
+def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[SteeredFlight]:
+    """Return what ownships fly, each steered by at least one manoeuvre."""
+    flights = OwnFlights(ManyFlights(own), len(own))
+    for turn in range(max(map(len, steering), default=0)):
+        now = [number for number, one in enumerate(steering) if len(one) > turn]
+        times_s = np.array([steering[number][turn][0] for number in now])
+        flights.steer(np.array(now), times_s, [steering[number][turn][1] for number in now])
+    return [SteeredFlight(flight, flights.parts_of(number)) for number, flight in enumerate(own)]
+
+
+class RecordedManoeuvres:
+    """The manoeuvres that reach the traffic block of a scene, by wires of a fixed delay only."""
+
+    def __init__(self, scene: Scene) -> None:
+        traffic = traffic_block(scene).name
+        #: Block that steers → delay of its manoeuvres.
+        self._delays_s: dict[str, float] = {}
+        for wire in scene.wires:
+            if (wire.target, wire.input) == (traffic, "manoeuvres"):
+                if wire.jitter_s or wire.drop_probability or wire.queued or wire.delay_scans:
+                    raise ValueError(
+                        f"the wire from {wire.source!r} to {traffic!r} must have a fixed delay in "
+                        "seconds, without jitter, loss or a processor: when manoeuvres begin is "
+                        "not recorded"
+                    )
+                self._delays_s[wire.source] = float(wire.total_delay_s)
+
+    def __bool__(self) -> bool:
+        """Whether anything steers the ownship."""
+        return bool(self._delays_s)
+
+    @property
+    def tables(self) -> dict[str, tuple[str, ...]]:
+        """Tables and columns that a metric has to read for it."""
+        return {"manoeuvres": ("block", "time_s", *_COLUMNS)} if self else {}
+
+    def of(self, group: Group) -> Mapping[int, Steering]:
+        """Return the manoeuvres of every replica of a group that has any."""
+        found: dict[int, list[tuple[float, Manoeuvre]]] = {}
+        if not self:
+            return found
+        table: Any = group.tables["manoeuvres"]
+        names = table["block"].names
+        rows = zip(
+            table["replica"].tolist(), table["block"].codes.tolist(), table["time_s"].tolist(),
+            *(table[name].tolist() for name in _COLUMNS), strict=True,
+        )  # fmt: skip
+        for replica, block, time_s, *values in rows:
+            if names[block] not in self._delays_s:
+                continue
+            came_s = time_s + self._delays_s[names[block]]
+            if came_s < group.duration_s[replica]:
+                found.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
+        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in found.items()}
+
+
+#: What is read of runs, each a list of its flights: (values, runs).
+Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
+
+
+def each_alone(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
+    """Return what reads the flights of one run after the other."""
+    return lambda runs: np.array([read(flights) for flights in runs]).T
+
+
+def read_flights(
+    group: Group,
+    step_s: float | None,
+    target: str | None,
+    read: Read,
+    steering: Mapping[int, Steering] | None = None,
+    *,
+    to_the_end: bool = False,
+) -> FloatArray:
+    """Return what `read` makes of every replica's flights, shape (values, replicas).
+
+    Flights are computed once for all replicas that share them. Distances are taken every `step_s`;
+    None looks between them for losses. A target of None is all of them. The ownship of a replica
+    flies as `steering` says, if anything. A run that ended early is looked at `to_the_end` of it,
+    or as long as it was meant to last.
+    """
+    steering = steering or {}
+    block = f"blocks.{traffic_block(group.scene).name}."
+    runs: list[list[RelativeFlight]] = []
+    known: dict[Any, int] = {}
+    run_of, steered = np.empty(len(group), dtype=np.int64), []
+    for number, replica in enumerate(group.replicas):
+        mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
+        until_s = math.inf
+        if to_the_end and group.ended_early[number]:
+            until_s = float(group.duration_s[number])
+        key = (until_s, *sorted((k, repr(v)) for k, v in mine.items()))
+        alone = number in steering
+        run_of[number] = known.setdefault((key, number if alone else None), len(runs))
+        if run_of[number] < len(runs):
+            continue
+        scene = group.scenes[number] if mine else group.scene
+        make = partial(separations, scene, step_s, until_s)
+        flights = group.once(("separations", step_s, key), make)
+        runs.append([flight for flight in flights if target in (None, flight.name)])
+        if alone and runs[-1]:
+            steered.append(number)
+    flown = flown_as_steered(
+        [runs[run_of[number]][0].own for number in steered],
+        [steering[number] for number in steered],
+    )
+    for number, own in zip(steered, flown, strict=True):
+        runs[run_of[number]] = [flight.flown_by(own) for flight in runs[run_of[number]]]
+    return read(runs)[:, run_of]

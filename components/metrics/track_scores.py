@@ -1,0 +1,254 @@
+"""Scores of the tracks of one run against the truth: errors, NEES, OSPA, GOSPA, SIAP, identities.
+
+Sources: Schuhmacher, Vo, Vo, IEEE Trans. Signal Proc. 56 (2008), eq. 3 (OSPA); Rahmathullah,
+García-Fernández, Svensson, *Generalized optimal sub-pattern assignment metric*, FUSION 2017, with
+alpha = 2, where missed and false ones are told apart.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.studies.statistics import chi_square_bounds
+
+_AXES = ("north", "east", "down")
+_SETS = (
+    "track_ospa_m", "track_gospa_m", "track_gospa_localisation_m", "track_gospa_missed_m",
+    "track_gospa_false_m",
+)  # fmt: skip
+
+
+class SetDistance(NamedTuple):
+    """OSPA, from 0 to the cut-off, and GOSPA, whose p-th power is the sum of those of its parts."""
+
+    ospa_m: float
+    gospa_m: float
+    localisation_m: float
+    missed_m: float
+    false_m: float
+
+
+def set_distance(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) -> SetDistance:
+    """Return OSPA and GOSPA from distances (tracks, truths); p is the order, 1 or more."""
+    tracks, truths = distance_m.shape
+    if tracks == 0 and truths == 0:
+        return SetDistance(0.0, 0.0, 0.0, 0.0, 0.0)
+    powers = np.minimum(distance_m, cutoff_m) ** order
+    row, column = assigned(powers)
+    near = powers[row, column]
+    apart = abs(tracks - truths)
+    ospa = (near.sum() + cutoff_m**order * apart) / max(tracks, truths)
+    # A pair at the cut-off costs as much as one missed and one false: GOSPA leaves it unassigned.
+    together = near[distance_m[row, column] < cutoff_m]
+    half = 0.5 * cutoff_m**order
+    missed, false = half * (truths - len(together)), half * (tracks - len(together))
+    parts = [float(together.sum()), missed, false]
+    return SetDistance(
+        float(ospa) ** (1.0 / order),
+        math.fsum(parts) ** (1.0 / order),
+        *(part ** (1.0 / order) for part in parts),
+    )
+
+
+def assigned(cost: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return rows and columns of the assignment that costs least."""
+    if cost.size == 0:
+        none = np.empty(0, dtype=np.int64)
+        return none, none
+    from scipy.optimize import linear_sum_assignment
+
+    row, column = linear_sum_assignment(cost)
+    return row, column
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedTracks:
+    """Confirmed tracks that have a range, as reported at one instant.
+
+    State (6, tracks) is position and velocity north, east, down, with its covariance
+    (tracks, 6, 6); ``confirmed_s`` is when each was first reported as confirmed.
+    """
+
+    time_s: float
+    number: IntArray
+    state: FloatArray
+    covariance: FloatArray
+    confirmed_s: FloatArray
+
+
+@dataclass
+class TrackTally:
+    """Sums over the instants of one run.
+
+    At every instant tracks and targets are assigned one to one so that the sum of distances is
+    least. A track that is left over belongs to the nearest target, as one too many, if that is
+    within `within_m`, the cut-off of OSPA and GOSPA of an order; otherwise it is spurious. Instants
+    are `step_s` apart.
+    """
+
+    within_m: float
+    order: float
+    step_s: float
+    nees: list[float] = field(default_factory=list)
+    error: list[FloatArray] = field(default_factory=list)
+    paired_s: list[float] = field(default_factory=list)
+    accuracy: list[tuple[float, float]] = field(default_factory=list)
+    sets: list[SetDistance] = field(default_factory=list)
+    present: int = 0
+    tracked: int = 0
+    tracks: int = 0
+    spurious: int = 0
+    numbers: dict[int, list[int]] = field(default_factory=dict)
+    since: dict[int, float] = field(default_factory=dict)
+    confirmed: set[int] = field(default_factory=set)
+    owned: set[int] = field(default_factory=set)
+    steps_present: dict[int, int] = field(default_factory=dict)
+    before_s: float = 0.0
+
+    def add(self, tracks: ReportedTracks, true: FloatArray, present: IntArray) -> None:
+        """Compare the tracks of an instant with the targets that are present.
+
+        True states (targets, 6, tracks) are at the instant that each track's state speaks of.
+        """
+        count = len(tracks.number)
+        apart = np.empty((count, len(present)))
+        for k, target in enumerate(present.tolist()):
+            apart[:, k] = np.sqrt(((tracks.state[:3] - true[target, :3]) ** 2).sum(axis=0))
+        found = set_distance(apart, self.within_m, self.order)
+        self.sets.append(found)
+        self.present += len(present)
+        self.tracks += count
+        self.confirmed |= set(tracks.number.tolist())
+        for target in present.tolist():
+            self.steps_present[target] = self.steps_present.get(target, 0) + 1
+        left = set(range(count))
+        for track, k in zip(*assigned(np.minimum(apart, self.within_m)), strict=True):
+            if apart[track, k] >= self.within_m:
+                continue
+            left.discard(int(track))
+            self._pair(tracks, true, int(track), int(present[k]))
+        for track in left:
+            near = int(np.argmin(apart[track])) if len(present) else -1
+            if near < 0 or apart[track, near] >= self.within_m:
+                self.spurious += 1
+                continue
+            self.owned.add(int(tracks.number[track]))
+            self._accuracy(tracks.state[:, track] - true[present[near], :, track])
+        self.before_s = tracks.time_s
+
+    def _pair(self, tracks: ReportedTracks, true: FloatArray, track: int, target: int) -> None:
+        error = tracks.state[:, track] - true[target, :, track]
+        self.tracked += 1
+        self.nees.append(float(error @ np.linalg.solve(tracks.covariance[track], error)))
+        self.error.append(error)
+        self.paired_s.append(tracks.time_s)
+        self._accuracy(error)
+        number = int(tracks.number[track])
+        self.numbers.setdefault(target, []).append(number)
+        # Between two instants it was confirmed when that was reported, not at the next instant.
+        self.since.setdefault(target, max(float(tracks.confirmed_s[track]), self.before_s))
+        self.owned.add(number)
+
+    def _accuracy(self, error: FloatArray) -> None:
+        self.accuracy.append((float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))))
+
+    def results(
+        self,
+        names: list[str],
+        detected_s: Mapping[str, float],
+        covered_s: Mapping[str, float],
+        duration_s: float,
+    ) -> dict[str, float]:
+        """Return the scores, by when each target was first detected and entered the coverage."""
+        found = self._errors()
+        sets = np.array(self.sets).reshape(-1, len(_SETS))
+        found |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
+        associated = len(self.accuracy)
+        found["track_completeness"] = _ratio(self.tracked, self.present)
+        found["track_ambiguity"] = _ratio(associated, self.tracked)
+        found["track_spuriousness"] = _ratio(self.spurious, self.tracks)
+        accuracy = np.array(self.accuracy).reshape(-1, 2)
+        found["track_positional_accuracy_m"] = mean_of(accuracy[:, 0])
+        found["track_velocity_accuracy_m_s"] = mean_of(accuracy[:, 1])
+        longest = sum(max(own.count(n) for n in set(own)) for own in self.numbers.values())
+        found["track_longest_share"] = _ratio(longest, sum(self.steps_present.values()))
+        broken, swapped = changes(self.numbers)
+        found["track_broken"], found["track_swapped"] = broken, swapped
+        found["track_number_changes_per_s"] = _ratio(broken + swapped, self.tracked * self.step_s)
+        since = {names[t]: value for t, value in self.since.items()}
+        found["track_confirmation_s"] = _delay(since, detected_s)
+        found["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
+        there = [name for name in covered_s if names.index(name) in self.steps_present]
+        found["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
+        false = len(self.confirmed - self.owned)
+        found["track_false_per_hour"] = _ratio(3600.0 * false, duration_s)
+        return found
+
+    def last_nees(self, after_s: float, up_to_s: float) -> float:
+        """Return the mean normalised error squared at the last instant of a stretch with any."""
+        time_s = np.array(self.paired_s)
+        inside = (time_s > after_s) & (time_s <= up_to_s)
+        if not inside.any():
+            return float("nan")
+        return float(np.mean(np.array(self.nees)[time_s == time_s[inside].max()]))
+
+    def _errors(self) -> dict[str, float]:
+        low, high = chi_square_bounds(6)
+        nees = np.array(self.nees)
+        square = np.array(self.error).reshape(-1, 6) ** 2
+        parts = {
+            "track_position_error_m": square[:, :3].sum(axis=1),
+            "track_horizontal_error_m": square[:, :2].sum(axis=1),
+            "track_vertical_error_m": square[:, 2],
+            "track_velocity_error_m_s": square[:, 3:].sum(axis=1),
+        }
+        for i, axis in enumerate(_AXES):
+            parts[f"track_{axis}_error_m"] = square[:, i]
+            parts[f"track_{axis}_error_m_s"] = square[:, 3 + i]
+        found = {name: mean_of(values) ** 0.5 for name, values in parts.items()}
+        found["track_nees_mean"] = mean_of(nees)
+        found["track_nees_inside"] = mean_of((nees >= low) & (nees <= high))
+        return found
+
+
+def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:
+    """Return consistency from normalised innovations squared and their degrees of freedom."""
+    inside = np.zeros(len(nis), dtype=bool)
+    for many in np.unique(freedom).tolist():
+        low, high = chi_square_bounds(many)
+        mine = freedom == many
+        inside[mine] = (nis[mine] >= low) & (nis[mine] <= high)
+    return {
+        "track_nis_per_freedom": _ratio(float(nis.sum()), float(freedom.sum())),
+        "track_nis_inside": mean_of(inside),
+    }
+
+
+def changes(numbers: Mapping[int, list[int]]) -> tuple[float, float]:
+    """Return how often tracks of targets go on under new numbers, and under another's."""
+    broken = swapped = 0
+    for target, own in numbers.items():
+        others = {n for other, theirs in numbers.items() if other != target for n in theirs}
+        for before, after in pairwise(own):
+            if before != after:
+                swapped += after in others
+                broken += after not in others
+    return float(broken), float(swapped)
+
+
+def _delay(since: Mapping[str, float], begin_s: Mapping[str, float]) -> float:
+    return mean_of(np.array([since[name] - begin_s[name] for name in since if name in begin_s]))
+
+
+def mean_of(values: Any) -> float:
+    """Return the mean, NaN of nothing."""
+    return float(np.mean(values)) if len(values) else float("nan")
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")

@@ -1,0 +1,303 @@
+"""Running summaries, against columns written by hand and against the recorded tables."""
+
+import json
+import math
+
+import numpy as np
+import pyarrow.parquet as pq
+import pymap3d
+import pytest
+
+import dsa_des
+from components.display.summary import FusedSummary, ManoeuvreSummary, SensorSummary, TrackSummary
+from components.display.terminal import outcome_lines, unseen_lines
+from components.messages.state_tracks import STATUSES
+from dsa_des.block.message import Text
+from dsa_des.running.recorded_run import record_run
+
+NAMES = ("eo", "radar")
+TARGETS = ("a", "b", "c")
+
+
+def text(names, all_names):
+    codes = [-1 if name is None else all_names.index(name) for name in names]
+    return Text(np.array(codes, dtype=np.int32), all_names)
+
+
+def scans(rows):
+    """Columns from rows of (block, tick, evaluated, skipped_range)."""
+    return {
+        "block": text([row[0] for row in rows], NAMES),
+        "tick": np.array([row[1] for row in rows], dtype=np.int64),
+        "evaluated": np.array([row[2] for row in rows], dtype=np.int64),
+        "skipped_range": np.array([row[3] for row in rows], dtype=np.int64),
+    }
+
+
+def detections(rows):
+    """Columns from rows of (block, tick, target, true range); ten ticks are a second."""
+    tick = np.array([row[1] for row in rows], dtype=np.int64)
+    return {
+        "block": text([row[0] for row in rows], NAMES),
+        "tick": tick,
+        "time_s": tick / 10,
+        "target": text([row[2] for row in rows], TARGETS),
+        "true_range_m": np.array([row[3] for row in rows], dtype=np.float64),
+    }
+
+
+SEEN = [
+    ("eo", 10, "b", 500.0),
+    ("radar", 10, "a", 900.0),
+    ("radar", 10, "b", 500.0),
+    ("radar", 10, "c", 700.0),
+    ("radar", 20, "a", 800.0),
+    ("eo", 30, "c", 300.0),
+    ("eo", 30, "a", 700.0),
+    ("radar", 30, "a", 700.0),
+]
+
+
+def sensors_of(pieces, sensors=NAMES):
+    observer = SensorSummary(sensors)
+    for table, columns in pieces:
+        observer.update(table, columns)
+    return observer.result()["sensors"]
+
+
+def test_first_and_last_are_the_nearest_of_their_instant():
+    result = sensors_of([("detections", detections(SEEN))])
+    assert result["radar"]["detections"] == 5
+    assert result["radar"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
+    assert result["radar"]["last_detection"] == {"time_s": 3.0, "range_m": 700.0, "target": "a"}
+    assert result["eo"]["first_detection"] == {"time_s": 1.0, "range_m": 500.0, "target": "b"}
+    assert result["eo"]["last_detection"] == {"time_s": 3.0, "range_m": 300.0, "target": "c"}
+
+
+def test_scans_are_counted_with_what_was_skipped():
+    rows = [("eo", 0, 2, 1), ("radar", 0, 3, 0), ("eo", 5, 1, 2), ("eo", 10, 0, 3)]
+    result = sensors_of([("scans", scans(rows))])
+    assert (result["eo"]["scans"], result["eo"]["evaluated"]) == (3, 3)
+    assert (result["radar"]["scans"], result["radar"]["evaluated"]) == (1, 3)
+    assert result["eo"]["skipped"] == {
+        "absent": 0,
+        "off": 0,
+        "field_of_view": 0,
+        "range": 6,
+        "culled": 0,
+    }
+
+
+@pytest.mark.parametrize("cut", range(1, len(SEEN)))
+def test_the_same_however_the_rows_arrive(cut):
+    whole = sensors_of([("detections", detections(SEEN))])
+    parts = [("detections", detections(SEEN[:cut])), ("detections", detections(SEEN[cut:]))]
+    assert sensors_of(parts) == whole
+    row_by_row = [("detections", detections([row])) for row in SEEN]
+    assert sensors_of(row_by_row) == whole
+
+
+def test_a_sensor_that_saw_nothing_is_there():
+    result = sensors_of([], sensors=("radar", "ir"))
+    assert list(result) == ["ir", "radar"]
+    assert result["ir"] == {
+        "scans": 0,
+        "evaluated": 0,
+        "detections": 0,
+        "false_alarms": 0,
+        "skipped": {"absent": 0, "off": 0, "field_of_view": 0, "range": 0, "culled": 0},
+        "first_detection": None,
+        "last_detection": None,
+    }
+
+
+def test_an_unknown_range_is_null_and_never_the_nearest():
+    rows = [("radar", 10, "a", math.nan), ("radar", 10, "b", 900.0), ("radar", 20, "a", math.nan)]
+    for pieces in ([rows], [rows[:1], rows[1:]]):
+        result = sensors_of([("detections", detections(piece)) for piece in pieces])["radar"]
+        assert result["first_detection"]["target"] == "b"
+        assert result["last_detection"] == {"time_s": 2.0, "range_m": None, "target": "a"}
+
+
+def test_results_are_plain_json():
+    result = sensors_of([("detections", detections(SEEN)), ("scans", scans([("eo", 0, 2, 1)]))])
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_fused_rows_are_counted_by_combination():
+    names = ("radar", "radar+eo", "eo")
+    observer = FusedSummary()
+    assert observer.result() == {"fused": {}}
+    observer.update("fused", {"sensors": text(["radar", "radar+eo", "radar"], names)})
+    observer.update("fused", {"sensors": text(["eo", "radar", None], names)})
+    result = observer.result()["fused"]
+    assert result == {"eo": 1, "radar": 3, "radar+eo": 1}
+    assert list(result) == sorted(result)
+
+
+def test_sightings_at_the_first_and_the_last_scan_are_marked():
+    rows = [("radar", 10, 1, 0), ("radar", 20, 1, 0), ("radar", 30, 1, 0)]
+    early = [("eo", 5, 1, 0), ("eo", 30, 1, 0), ("eo", 40, 1, 0)]
+    pieces = [("scans", scans(rows)), ("scans", scans(early)), ("detections", detections(SEEN))]
+    found = sensors_of(pieces)
+    assert found["radar"]["first_detection"]["at"] == "the start"
+    assert found["radar"]["last_detection"]["at"] == "the end of the run"
+    assert "at" not in found["eo"]["first_detection"]
+    assert "at" not in found["eo"]["last_detection"]
+
+
+ORIGIN = ("origin_lat_deg", "origin_lon_deg", "origin_alt_m")
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory, configs):
+    folder = tmp_path_factory.mktemp("crossing") / "run"
+    scene = dsa_des.load_scene(
+        configs / "avoidance/crossing_tracked.toml",
+        sets=[
+            "blocks.pilot.held_s=0",
+            "blocks.pilot.initial_delay_s=1",
+            "blocks.pilot.coordination_s=0",
+        ],
+        duration_s="34",
+    )
+    return folder, record_run(scene, folder, draw=False)
+
+
+def test_errors_of_tracks_are_those_by_pymap3d(crossing):
+    folder, summary = crossing
+    tracks = pq.read_table(folder / "state_tracks.parquet").to_pylist()
+    held = [row for row in tracks if row["track_status"] in ("confirmed", "coasted")]
+    told = summary["tracks"]["tracker"]
+    assert told["confirmed"] == len({row["track"] for row in held}) > 0
+    truth = {
+        round(row["time_s"], 6): row
+        for row in pq.read_table(folder / "truth.parquet").to_pylist()
+        if row["target"] is not None
+    }
+    apart = {}
+    for row in held:
+        there = truth[round(row["state_s"], 6)]
+        north, east, down = pymap3d.geodetic2ned(
+            there["lat_deg"], there["lon_deg"], there["alt_m"],
+            row["origin_lat_deg"], row["origin_lon_deg"], row["origin_alt_m"],
+        )  # fmt: skip
+        place = [row["north_m"] - north, row["east_m"] - east, row["down_m"] - down]
+        apart.setdefault(row["track"], []).append(np.linalg.norm(place))
+    near = np.concatenate(list(apart.values()))
+    near = near[near < 300.0]
+    assert told["position_error_m"] == pytest.approx(np.sqrt(np.mean(near**2)), rel=1e-6)
+    assert told["false"] == sum(min(values) >= 300.0 for values in apart.values())
+
+
+class Still:
+    """Targets that stay where they are: 0, 0, 0 and 1000 m north of it, the second until 5 s."""
+
+    names = ("a", "b")
+
+    def at(self, time_s):
+        place = np.zeros((2, 3, len(time_s)))
+        place[1, 0] = np.where(time_s < 5.0, 1000.0, np.nan)
+        return place
+
+
+def test_who_never_comes_near_a_target_is_false():
+    rows = [
+        # number, status, range, instant, north: the rms of 3, 4 and 12 m is 7.5 m
+        (1, "tentative", True, 1.0, 0.0), (1, "confirmed", True, 2.0, 3.0),
+        (1, "coasted", True, 3.0, 4.0), (2, "confirmed", True, 1.0, 988.0),
+        (2, "confirmed", True, 6.0, 988.0), (3, "confirmed", True, 6.0, 988.0),
+        (4, "confirmed", False, 1.0, np.nan), (5, "deleted", True, 1.0, 500.0),
+    ]  # fmt: skip
+    columns = {
+        "block": Text(np.zeros(len(rows), dtype=np.int32), ("t",)),
+        "track": np.array([row[0] for row in rows]),
+        "track_status": Text(np.array([STATUSES.index(row[1]) for row in rows]), STATUSES),
+        "has_range": np.array([row[2] for row in rows]),
+        "state_s": np.array([row[3] for row in rows]),
+        "north_m": np.array([row[4] for row in rows]),
+        **{name: np.zeros(len(rows)) for name in ("east_m", "down_m", *ORIGIN)},
+    }
+    for pieces in (1, len(rows)):
+        summary = TrackSummary(["t", "u"], lambda origin: Still())
+        for part in np.array_split(np.arange(len(rows)), pieces):
+            some = {
+                name: Text(of.codes[part], of.names) if isinstance(of, Text) else of[part]
+                for name, of in columns.items()
+            }
+            summary.update("state_tracks", some)
+        assert summary.result()["tracks"] == {
+            "t": {"confirmed": 4, "false": 1, "position_error_m": pytest.approx(7.505553)},
+            "u": {"confirmed": 0, "false": None, "position_error_m": None},
+        }
+
+
+def test_first_alerts_and_manoeuvres_are_the_recorded_ones(crossing):
+    folder, summary = crossing
+    alerts = pq.read_table(folder / "alerts.parquet").to_pylist()
+    for block, first_s in summary["alerts"].items():
+        mine = [row for row in alerts if row["block"] == block and row["level"] > 0]
+        levels = sorted({row["level"] for row in mine})
+        assert first_s == {
+            str(level): min(row["time_s"] for row in mine if row["level"] == level)
+            for level in levels
+        } != {}  # fmt: skip
+    flown = pq.read_table(folder / "manoeuvres.parquet")["time_s"].to_pylist()
+    assert summary["manoeuvres"]["pilot"] == {
+        "count": len(flown), "first_s": flown[0], "last_s": flown[-1]
+    }  # fmt: skip
+
+
+def test_manoeuvres_come_piece_by_piece():
+    summary = ManoeuvreSummary(["a", "b"])
+    for codes, times_s in (([0, 1, 0], [1.0, 2.0, 3.0]), ([0, 0], [5.0, 8.0])):
+        block = Text(np.array(codes), ("a", "b"))
+        summary.update("manoeuvres", {"block": block, "time_s": np.array(times_s)})
+    assert summary.result()["manoeuvres"] == {
+        "a": {"count": 4, "first_s": 1.0, "last_s": 8.0},
+        "b": {"count": 1, "first_s": 2.0, "last_s": 2.0},
+    }
+
+
+def test_without_recorded_truth_nothing_is_said_of_it_and_without_such_blocks_nothing(configs):
+    scene = configs / "avoidance/crossing_tracked.toml"
+    summary = dsa_des.run(dsa_des.load_scene(scene, sets=["record.truth=false"], duration_s="5"))
+    assert summary.summary["tracks"] == {"tracker": {"confirmed": 1}}
+    plain = dsa_des.run(dsa_des.load_scene(configs / "first_light.toml", duration_s="1")).summary
+    assert {"tracks", "alerts", "manoeuvres"}.isdisjoint(plain)
+
+
+def test_a_line_for_each_block():
+    summary = {
+        "tracks": {
+            "ekf": {"confirmed": 3, "false": 1, "position_error_m": 34.56},
+            "eo": {"confirmed": 1, "false": None, "position_error_m": None},
+            "ir": {"confirmed": 0},
+        },
+        "alerts": {"alerting": {"1": 12.0, "3": 14.25}, "true": {}},
+        "manoeuvres": {
+            "a": {"count": 0, "first_s": None, "last_s": None},
+            "b": {"count": 1, "first_s": 22.0, "last_s": 22.0},
+            "c": {"count": 2, "first_s": 22.0, "last_s": 34.0},
+        },
+    }
+    assert outcome_lines(summary) == [
+        "ekf: 3 confirmed tracks, 1 of them false; position error 34.6 m rms",
+        "eo: 1 confirmed track",
+        "ir: no confirmed track",
+        "alerting: alerts of level 1 from 12.0 s, level 3 from 14.2 s",
+        "true: no alert",
+        "a: no manoeuvre",
+        "b: 1 manoeuvre, at 22.0 s",
+        "c: 2 manoeuvres, from 22.0 s to 34.0 s",
+    ]
+    assert outcome_lines({}) == []
+
+
+def test_a_sensor_that_is_off_is_said_to_be(configs):
+    scene = dsa_des.load_scene(
+        configs / "first_light.toml", sets=["blocks.ir.enabled=false"], duration_s="0.1"
+    )
+    sensors = dsa_des.run(scene).summary["sensors"]
+    assert "ir saw nothing: it is switched off (enabled = false)" in unseen_lines(sensors)
+    assert [name for name, told in sensors.items() if "enabled" in told] == ["ir"]

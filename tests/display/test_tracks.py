@@ -1,0 +1,87 @@
+"""``tracks.png`` and ``consistency.png``: what a tracker confirmed, and how honest it is."""
+
+import numpy as np
+import pytest
+
+import dsa_des
+from components.display.summary import distances
+from components.display.tracks import DrawnTracks, draw_consistency, draw_tracks, errors_squared
+from components.messages.state_tracks import COVARIANCE
+from dsa_des.running.simulation import Simulation
+
+EKF = "blocks.tracker.type='tracking.ekf'"
+
+
+def told(tmp_path, *sets):
+    scene = dsa_des.load_scene(
+        "first_light",
+        sets=["duration_s=3", "blocks.fusion.type='fusion.pass_through'",
+              "blocks.traffic.intruders.0.north_m=3000", *sets],
+    )  # fmt: skip
+    dsa_des.run(scene, out=tmp_path / "run")
+    return DrawnTracks.read(Simulation(scene), tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    return told(tmp_path_factory.mktemp("shown"), EKF)
+
+
+@pytest.mark.parametrize("draw", [draw_tracks, draw_consistency])
+def test_confirmed_tracks_are_drawn_the_same_every_time(tmp_path, draw, shown):
+    paths = [draw(tmp_path / name, shown) for name in ("one.png", "two.png")]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert paths[0].read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize("sets", [(), (EKF, "blocks.tracker.confirm_m=60",
+                                       "blocks.tracker.confirm_n=62", "duration_s=1")])  # fmt: skip
+def test_where_nothing_is_confirmed_there_is_no_figure(tmp_path, sets):
+    assert told(tmp_path, *sets) is None
+
+
+def test_tracks_are_false_that_never_come_near_a_target(tmp_path, shown):
+    """A bias of 900 m puts every track beside its target."""
+    stated = [
+        f"blocks.radar.{key}"
+        for key in (
+            "errors='stated'",
+            "azimuth_error_deg=0.1",
+            "elevation_error_deg=0.1",
+            "range_error_m=5",
+            "biases='fixed'",
+            "range_bias_m=900",
+        )
+    ]
+    wrong = told(tmp_path, EKF, *stated)
+    assert wrong.tracks and all(one.false for one in wrong.tracks)
+    assert draw_consistency(tmp_path / "none.png", wrong) is None
+    draw_tracks(tmp_path / "false.png", wrong)
+    assert shown.tracks and not any(one.false for one in shown.tracks)
+
+
+def one_track(rng):
+    columns = {name: rng.normal(size=4) for name in ("north_m", "east_m", "down_m", "north_m_s",
+                                                     "east_m_s", "down_m_s")}  # fmt: skip
+    root = rng.normal(size=(4, 6, 6))
+    spread = root @ root.swapaxes(1, 2) + np.eye(6)
+    columns |= {name: spread[:, i, j] for (i, j), name in COVARIANCE.items()}
+    return {**columns, "state_s": np.arange(4.0)}, spread
+
+
+def test_errors_are_those_to_the_nearest_target_at_the_same_time():
+    rng = np.random.default_rng(2)
+    columns, spread = one_track(rng)
+    states = rng.normal(size=(3, 6, 4)) * 5.0
+    states[0, :3] += 1e4  # far away all the time
+    states[1, :, 2] = states[2, :, 2] = np.nan  # and at one instant nobody is near
+    found, known = errors_squared(columns, states)
+    assert known.tolist() == [True, True, False, True] and np.isnan(found[2])
+    estimate = np.array([columns[name] for name in list(columns)[:6]])
+    for row in (0, 1, 3):
+        apart = [np.linalg.norm(estimate[:3, row] - states[t, :3, row]) for t in range(3)]
+        error = estimate[:, row] - states[int(np.argmin(apart)), :, row]
+        assert found[row] == pytest.approx(error @ np.linalg.inv(spread[row]) @ error)
+    np.testing.assert_allclose(distances(columns, slice(None), states[:, :3])[:, 0], [
+        np.linalg.norm(estimate[:3, 0] - states[t, :3, 0]) for t in range(3)])  # fmt: skip
+    assert not errors_squared(columns, np.empty((0, 6, 4)))[1].any()
