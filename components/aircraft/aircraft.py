@@ -292,15 +292,6 @@ class ReplicaRoster(Roster):
 def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Roster | None:
     """Return the roster of all replicas, or None where they cannot have one.
 
-    Parameters
-    ----------
-    first : Roster
-        Of the first replica.
-    aircraft : sequence of (name, Aircraft)
-        Of all targets of the first replica, of the second, and so on.
-
-    Notes
-    -----
     Radar cross-sections may differ: how far a radar looks, and which physics it has, does not rest
     on how large they are. Whatever else differs may decide how far a sensor looks.
     """

@@ -18,13 +18,7 @@ _POLE_DEG = 90.0 + 1e-9
 
 
 def dbsm_to_m2(rcs_dbsm: ArrayLike) -> Any:
-    """Return the RCS in m² of one in dBsm (dB above 1 m²).
-
-    Raises
-    ------
-    ValueError
-        If a value is not within ±1000 dBsm.
-    """
+    """Return the RCS in m² of one in dBsm (dB above 1 m²)."""
     shape, (flat,) = broadcast_flat(rcs=finite("rcs_dbsm", rcs_dbsm))
     refuse("rcs_dbsm", flat, np.abs(flat) > 1000.0, "lie in [-1000, 1000]")
     return unflatten(np.power(10.0, flat / 10.0), shape)
@@ -73,23 +67,7 @@ class RcsTable:
             )
 
     def dbsm(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
-        """Return the RCS in dBsm seen from a direction.
-
-        Parameters
-        ----------
-        azimuth_rad, elevation_rad : array_like, rad
-            Direction of the radar in the target's body axes: any azimuth, elevation within
-            [-pi/2, pi/2].
-
-        Returns
-        -------
-        array of the broadcast shape, dBsm
-
-        Raises
-        ------
-        ValueError
-            If a direction is not finite or an elevation lies beyond the poles.
-        """
+        """Return the RCS in dBsm seen from a direction."""
         shape, (azimuth, elevation) = broadcast_flat(
             azimuth_rad=finite("azimuth_rad", azimuth_rad),
             elevation_rad=finite("elevation_rad", elevation_rad),
@@ -124,24 +102,7 @@ class RcsTable:
     def from_rows(
         az_deg: ArrayLike, el_deg: ArrayLike, dbsm: ArrayLike, *, symmetric: bool = False
     ) -> RcsTable:
-        """Build a table from one row per node, in any order.
-
-        Parameters
-        ----------
-        az_deg, el_deg, dbsm : (k,) array_like
-            Azimuths in any turn; a node that appears twice (0 and 360) must say the same.
-        symmetric : bool
-            The rows cover azimuths 0 to 180; the left side mirrors the right one.
-
-        Returns
-        -------
-        RcsTable
-
-        Raises
-        ------
-        ValueError
-            If a node is missing (it is named), contradicts itself or is out of range.
-        """
+        """Build a table from one row per node, in any order."""
         columns = [
             finite(name, value).reshape(-1)
             for name, value in (("az_deg", az_deg), ("el_deg", el_deg), ("dbsm", dbsm))
@@ -179,21 +140,6 @@ class RcsTable:
 
         Column names may be written in capitals, in any order, among others; rows may be in any
         order; blank lines and lines that start with # are skipped.
-
-        Parameters
-        ----------
-        path : path of the file
-        symmetric : bool
-            As for `from_rows`.
-
-        Returns
-        -------
-        RcsTable
-
-        Raises
-        ------
-        ValueError
-            If a column is missing, a cell is not a number, or the table has a hole.
         """
         wanted = ("az_deg", "el_deg", "dbsm")
         header: list[str] = []

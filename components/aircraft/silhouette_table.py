@@ -91,22 +91,7 @@ class SilhouetteTable:
         object.__setattr__(self, "area_m2", area)
 
     def area(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
-        """Interpolate the area at an observer's direction in the target's body axes.
-
-        Parameters
-        ----------
-        azimuth_rad, elevation_rad : array_like, rad
-            Direction of the observer seen from the target; elevation within [-pi/2, pi/2].
-
-        Returns
-        -------
-        array of the broadcast shape, m²
-
-        Raises
-        ------
-        ValueError
-            If a direction is not finite or an elevation lies beyond the poles.
-        """
+        """Interpolate the area at an observer's direction in the target's body axes."""
         elevation = finite("elevation_rad", elevation_rad)
         refuse(
             "elevation_rad",
@@ -141,20 +126,6 @@ def table_from_nodes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: 
 
     Azimuths may lie in any turn; a node given twice (0 and 360) must say the same both times. The
     rows of the poles, where all azimuths are one direction, are averaged.
-
-    Parameters
-    ----------
-    azimuth_deg, elevation_deg : (k,) array_like, degrees
-    area_m2 : (k,) array_like, m²
-
-    Returns
-    -------
-    SilhouetteTable
-
-    Raises
-    ------
-    ValueError
-        If a node is missing (the first one is named), contradicts itself, or is out of range.
     """
     azimuth = finite("azimuth_deg", azimuth_deg).ravel()
     elevation = finite("elevation_deg", elevation_deg).ravel()
@@ -193,19 +164,6 @@ def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
     The area column carries its unit in its name: `area_m2`, `a_m2` or plain `area` are square
     metres, `area_ft2`, `a_ft2` and `a_ft` square feet. Other columns, blank lines and lines that
     start with # are ignored. See `SilhouetteTable` for the axes.
-
-    Parameters
-    ----------
-    path : path of the file
-
-    Returns
-    -------
-    SilhouetteTable
-
-    Raises
-    ------
-    ValueError
-        If a column is missing, a cell is not a number, or the table has a hole.
     """
     rows: list[tuple[float, float, float]] = []
     header: list[str] | None = None

@@ -14,12 +14,6 @@ def table_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
 
     Blank lines and lines that start with # are left out. A cell never spans lines, so that a
     stray quote cannot swallow what follows it.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is not UTF-8 text, or a cell is longer than any number,
-        naming the line.
     """
     try:
         text = read_input_text(Path(path))
@@ -43,21 +37,7 @@ def row_values(
     columns: Sequence[int],
     quantities: Sequence[str],
 ) -> list[float]:
-    """Return the numbers of a row.
-
-    Parameters
-    ----------
-    place : str
-        File and line, for messages.
-    header, cells : names of the columns, and what the row has in them
-    columns : numbers of the columns to read
-    quantities : what they hold, with units at the end (`dsa_des.block.limits`)
-
-    Raises
-    ------
-    ValueError
-        If a cell is missing, is no number, or holds one that cannot be computed with.
-    """
+    """Return the numbers of a row."""
     values = []
     for column, quantity in zip(columns, quantities, strict=True):
         try:

@@ -64,13 +64,7 @@ class EncounterTable:
 
 
 def read_table(text: str) -> EncounterTable:
-    """Read a table by the name that a user wrote.
-
-    Raises
-    ------
-    UsageError
-        If it cannot be read, has no rows, or a row is cut short.
-    """
+    """Read a table by the name that a user wrote."""
     try:
         path = resolve_home(text)
         if is_folder(path):
@@ -142,16 +136,7 @@ def _parquet(path: Path, content: bytes) -> EncounterTable:
 def numbers(
     table: EncounterTable, name: str, option: str, *, flag: bool
 ) -> tuple[FloatArray, dict[int, str]]:
-    """Return a column as numbers, and row → what is wrong with it.
-
-    Parameters
-    ----------
-    table : EncounterTable
-    name, option : str
-        The column, and the option that names it.
-    flag : bool
-        Whether it must be 0 or 1; otherwise a finite number of 0 or more.
-    """
+    """Return a column as numbers, and row → what is wrong with it."""
     cells = table.column(name, option)
     values = np.array([_number(cell) for cell in cells])
     with np.errstate(invalid="ignore"):
@@ -181,16 +166,7 @@ def _number(cell: object) -> float:
 
 
 def kept_rows(table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool) -> BoolArray:
-    """Return which rows are good, or raise UsageError with what is wrong with the others.
-
-    Parameters
-    ----------
-    table : EncounterTable
-    wrong : sequence of dict
-        Row → what is wrong with it.
-    skip : bool
-        Whether damaged rows are left out.
-    """
+    """Return which rows are good, or raise UsageError with what is wrong with the others."""
     found: dict[int, list[str]] = {}
     for some in wrong:
         for row, said in some.items():
@@ -223,13 +199,7 @@ def show_risk(
     skip_damaged: bool,
     as_json: bool,
 ) -> None:
-    """Print the risk ratio of a table, and one per class where that is asked for.
-
-    Raises
-    ------
-    UsageError
-        If the table, a row or a column cannot be used, or nothing can be said of it.
-    """
+    """Print the risk ratio of a table, and one per class where that is asked for."""
     if edges is not None and by is None:
         raise UsageError("--edges belongs to --by COLUMN: which column has these edges?")
     content = read_table(table)

@@ -41,16 +41,7 @@ MOST_FLOWN = 600
 
 
 def encounter_flights(found: EncounterSet, place: int, dynamics: str) -> list[SampledTrajectory]:
-    """Return the flights of an encounter, the ownship's first.
-
-    Parameters
-    ----------
-    found : EncounterSet
-    place : int
-        Of the encounter, from 0.
-    dynamics : {"euler", "point_mass"}
-        How events are flown.
-    """
+    """Return the flights of an encounter, by its place in the set, the ownship's first."""
     key = _key(found, place, dynamics)
     if key not in _FLOWN:
         (flights,) = flights_of([(found, place)], dynamics)
@@ -266,13 +257,7 @@ class ModelTraffic(_EncounterTraffic):
 
 
 def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter that a block's parameters name, and its place there.
-
-    Raises
-    ------
-    ValueError
-        If there is no such file, model or encounter.
-    """
+    """Return the set of an encounter that a block's parameters name, and its place there."""
     if issubclass(cls, ModelTraffic):
         return _made(_model_key(parameters), parameters.encounter), 0
     found = read_set(parameters.file, parameters.skip_damaged)

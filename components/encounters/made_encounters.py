@@ -101,13 +101,7 @@ class Recipe:
 
 
 def read_recipe(text: str) -> Recipe:
-    """Read a table of encounters.
-
-    Raises
-    ------
-    UsageError
-        With everything that is wrong.
-    """
+    """Read a table of encounters."""
     try:
         path = resolve_home(text)
         tables = parse_toml(read_input_text(path))
@@ -213,13 +207,7 @@ def _is_number(value: Any) -> bool:
 
 
 def made_set(recipe: Recipe) -> EncounterSet:
-    """Return the encounters of a recipe, combination after combination.
-
-    Raises
-    ------
-    UsageError
-        If an encounter cannot be as it is asked for, naming it.
-    """
+    """Return the encounters of a recipe, combination after combination."""
     total = recipe.count * len(recipe.fixed)
     combination = np.repeat(np.arange(len(recipe.fixed)), recipe.count)
     draws = EncounterDraws(recipe.seed, "made encounters")

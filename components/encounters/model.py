@@ -109,24 +109,9 @@ def make_network(
     counts: FloatArray,
     drawn: Sequence[int],
 ) -> BayesNetwork:
-    """Return a checked network.
+    """Return a checked network; arrows are 1 where the row's variable is a parent of the column's.
 
-    Parameters
-    ----------
-    labels : sequence of str
-    sizes : sequence of int
-        Bins of each variable.
-    arrows : (n, n)
-        1 where the row's variable is a parent of the column's.
-    counts : (m,)
-        Of all drawn variables, one behind the other.
-    drawn : sequence of int
-        Places of the variables that are drawn, in the order of their counts.
-
-    Raises
-    ------
-    NetworkError
-        If counts are missing or left over, a variable has no count at all, or arrows form a circle.
+    Counts (m,) are those of all drawn variables, one behind the other, in the order of `drawn`.
     """
     nodes, start = {}, 0
     for place in drawn:

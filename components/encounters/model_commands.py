@@ -42,15 +42,7 @@ def sample_tracks(
     dynamics: str,
     out: str,
 ) -> None:
-    """Write the tracks that the command line asks for.
-
-    Raises
-    ------
-    UsageError
-        If the model cannot be used, or the table not be written.
-    OutputError
-        If writing fails.
-    """
+    """Write the tracks that the command line asks for."""
     found = open_model(model)
     path = named(out)
     check_file(path)
@@ -78,13 +70,7 @@ def sample_tracks(
 
 
 def open_model(text: str) -> EncounterModel:
-    """Return the model in a file that a user named.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
+    """Return the model in a file that a user named."""
     try:
         return read_model(resolve_home(text))
     except ModelFileError as error:
@@ -179,15 +165,7 @@ def generate_set(
     vertical: tuple[str, str] | None,
     out: str,
 ) -> None:
-    """Write a set of paired encounters, or of those that a table describes.
-
-    Raises
-    ------
-    UsageError
-        If a model cannot be used, or the set not be written.
-    OutputError
-        If writing fails.
-    """
+    """Write a set of paired encounters, or of those that a table describes."""
     check_place(at)
     if made is not None:
         if model is not None or intruder_model is not None or count is not None:

@@ -43,17 +43,7 @@ class ModelFileError(ValueError):
 
 
 def read_model(path: Path) -> EncounterModel:
-    """Read and check a model file.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    ModelFileError
-        If it cannot be read, is cut short, or any part of it cannot be.
-    """
+    """Read and check a model file."""
     try:
         state = path.stat()
         return _read(path, (state.st_mtime_ns, state.st_size))

@@ -92,19 +92,7 @@ class Pairs:
 
 
 class PairSampler:
-    """Makes encounters of two models by their numbers.
-
-    Parameters
-    ----------
-    own, intruder : EncounterModel
-    seed : int
-    rules : PairingRules
-
-    Raises
-    ------
-    TrackError
-        If tracks of a model cannot be flown.
-    """
+    """Makes encounters of two models by their numbers."""
 
     def __init__(
         self, own: EncounterModel, intruder: EncounterModel, seed: int, rules: PairingRules
@@ -123,19 +111,7 @@ class PairSampler:
             yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 
     def pairs(self, numbers: range, *, paths: bool = True) -> Pairs:
-        """Return the pairs with these numbers.
-
-        Parameters
-        ----------
-        numbers : range
-        paths : bool
-            Whether with their whole paths, or as `Pairs.at_start`.
-
-        Raises
-        ------
-        TrackError
-            If a pair is rejected time after time.
-        """
+        """Return the pairs with these numbers."""
         wanted = np.arange(numbers.start, numbers.stop, numbers.step)
         parts: list[Pairs] = []
         left, attempt = np.arange(len(wanted)), np.zeros(len(wanted), dtype=np.int64)
@@ -167,13 +143,8 @@ class PairSampler:
     def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
         """Return which proposals may be accepted by their first second alone.
 
-        Returns
-        -------
-        hopeful : (n,) of int
-        narrow : (n,) of int
-            Which aircraft's layer is the narrower one: its altitude is kept.
-        bound : (n,)
-            Chance with which they were let through.
+        With them go which aircraft's layer is the narrower one, whose altitude is kept, and the
+        chance with which they were let through.
         """
         both = [t.sample(numbers, 0, attempts) for t in self._tracks]
         good: BoolArray = np.ones(len(numbers), dtype=np.bool_)
@@ -363,17 +334,7 @@ def _course(
 def set_of_pairs(
     pairs: Pairs, closest_s: int, reference_deg: tuple[float, float], source: str
 ) -> EncounterSet:
-    """Return a set with one encounter per pair.
-
-    Parameters
-    ----------
-    pairs : Pairs
-    closest_s : int
-        When the pairs are closest.
-    reference_deg : (latitude, longitude)
-        Where the ownship is at the closest approach.
-    source : str
-    """
+    """Return a set with one encounter per pair."""
     count = len(pairs.numbers)
     commands = np.stack([pairs.climb_ft_s, pairs.turn_rad_s, pairs.acceleration_ft_s2])
     # (quantity, pair, aircraft, second): rows of the file in their order.

@@ -135,18 +135,11 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
 
 
 def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return how the nearest intruder meets the ownship at the closest approach, degrees.
+    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
 
-    Parameters
-    ----------
-    runs : sequence of list of RelativeFlight
-
-    Returns
-    -------
-    (2, runs)
-        Course: the intruder's less the ownship's. Bearing from where the intruder closes in,
-        clockwise from the ownship's course: opposite to its velocity relative to the ownship. NaN,
-        both, where they never are there together.
+    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
+    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
+    never meet.
     """
     flights = [flight for run in runs for flight in run]
     distance_m, time_s = nearest_of(flights)

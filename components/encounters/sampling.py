@@ -22,13 +22,7 @@ Ints = Sequence[int] | IntArray
 
 
 class EncounterDraws:
-    """Uniform numbers for one purpose.
-
-    Parameters
-    ----------
-    seed : int
-    purpose : str
-    """
+    """Uniform numbers for one purpose."""
 
     def __init__(self, seed: int, purpose: str) -> None:
         self._key = np.array(
@@ -55,17 +49,7 @@ class EncounterDraws:
         return found[:count]
 
     def uniform(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
-        """Return draws in [0, 1) with 53 bits, shape (count, encounters).
-
-        Parameters
-        ----------
-        numbers : sequence of int
-            Encounters, from 0.
-        count : int
-            How many for each; fewer are the first ones of more.
-        attempts : int or sequence of int
-            How often an encounter was rejected before; one for each, or for all.
-        """
+        """Return draws in [0, 1) with 53 bits, shape (count, encounters)."""
         numbers = np.asarray(numbers).tolist()
         tries = np.broadcast_to(attempts, len(numbers)).tolist()
         counter = np.zeros(4, dtype=np.uint64)
@@ -124,13 +108,7 @@ class SampledTracks:
 
 
 class TrackSampler:
-    """Samples tracks of a model.
-
-    Parameters
-    ----------
-    model : EncounterModel
-    draws : EncounterDraws
-    """
+    """Samples tracks of a model."""
 
     def __init__(self, model: EncounterModel, draws: EncounterDraws) -> None:
         self.model = model
@@ -144,16 +122,7 @@ class TrackSampler:
         ]
 
     def sample(self, numbers: Ints, seconds: int, attempts: Ints | int = 0) -> SampledTracks:
-        """Return tracks by their numbers.
-
-        Parameters
-        ----------
-        numbers : sequence of int
-        seconds : int
-            Length; there is one instant more.
-        attempts : int or sequence of int
-            How often each was rejected before.
-        """
+        """Return tracks by their numbers."""
         model = self.model
         variables, changing = len(model.labels), len(model.dynamic)
         uniform = self._draws.few(numbers, variables, attempts)

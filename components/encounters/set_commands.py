@@ -31,15 +31,7 @@ def convert_sets(
     skip_damaged: bool,
     out: str,
 ) -> None:
-    """Write what is in some files as one set, or as a file of waypoints.
-
-    Raises
-    ------
-    UsageError
-        With what is wrong, naming file and encounter.
-    OutputError
-        If writing fails.
-    """
+    """Write what is in some files as one set, or as a file of waypoints."""
     if at is not None:
         check_place(at)
     path = named(out)
@@ -147,15 +139,7 @@ def _closest(found: EncounterSet, place: int) -> tuple[float, ...]:
 
 
 def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
-    """Print what is in a set, and draw it where that is asked for.
-
-    Raises
-    ------
-    UsageError
-        If the set cannot be used.
-    OutputError
-        If the figure cannot be written.
-    """
+    """Print what is in a set, and draw it where that is asked for."""
     path = None if figure is None else named(figure, "--figure")
     if path is not None:
         check_ending(path, PICTURES, "--figure")
@@ -260,15 +244,7 @@ def split_encounters(
     seed: int,
     out: str,
 ) -> None:
-    """Write a set of copies of another set's encounters.
-
-    Raises
-    ------
-    UsageError
-        If the set or the scores cannot be used.
-    OutputError
-        If writing fails.
-    """
+    """Write a set of copies of another set's encounters."""
     if (scores is None) != (score is None):
         raise UsageError("--scores TABLE and --score COLUMN belong together: give both, or neither")
     path = named(out)

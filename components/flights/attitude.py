@@ -42,25 +42,12 @@ def fit_path(
     *,
     window_s: float = WINDOW_S,
 ) -> tuple[Vector, Vector]:
-    """Estimate velocity and acceleration at each sample by a parabola fitted around it.
+    """Return velocity (m/s) and acceleration (m/s²) of a parabola fitted around each sample.
 
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-        Strictly increasing.
-    lat_deg, lon_deg, alt_m : ndarray, shape (n,) or (n, aircraft)
-        The path of one aircraft, or those of several that have the same times.
-    window_s : float
-        Whole width of the window. Samples within half of it, and always the two neighbours,
-        enter the least-squares parabola with equal weight.
-
-    Returns
-    -------
-    velocity : tuple of three ndarray
-        East, north, up in m/s, in each sample's own local frame.
-    acceleration : tuple of three ndarray
-        East, north, up in m/s², relative to the straight line over the ellipsoid; zero where
-        the window holds fewer than three samples or too clumped ones (a straight line is fitted).
+    Both are east, north and up in the sample's own frame, of one aircraft (n,) or of several that
+    have the same times (n, aircraft). Samples within half of the window, and always the two
+    neighbours, have equal weight; where there are fewer than three, or too clumped ones, a straight
+    line is fitted.
     """
     east, north, up = local_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -86,36 +73,11 @@ def attitude_from_path(
     wind_east_north_mps: tuple[float, float] = (0.0, 0.0),
     window_s: float = WINDOW_S,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Derive yaw, pitch and roll at each sample from the flight path.
+    """Return yaw, pitch and roll (rad) at each sample of a path (n,) or of several (n, aircraft).
 
-    Yaw is the track over ground, pitch the flight-path angle, roll the bank of a coordinated
-    turn, atan(V·(track rate)/g). No angle of attack or sideslip is known, so none is used. Where a
-    wind is given, all three are those of the velocity through the air.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-        Strictly increasing.
-    lat_deg, lon_deg, alt_m : ndarray, shape (n,) or (n, aircraft)
-        The path of one aircraft, or those of several that have the same times.
-    velocity_enu_mps : tuple of three ndarray, optional
-        Measured velocity (east, north, up). Yaw and pitch then come from it at the sample
-        itself, and the track rate from a straight line fitted to it over the window. Without it
-        a parabola is fitted to the positions.
-    wind_east_north_mps : tuple of two float
-        Where the air goes, the same everywhere.
-    window_s : float
-        Whole width of the smoothing window.
-
-    Returns
-    -------
-    yaw_rad : ndarray
-        Clockwise from true north in [0, 2 pi). While the aircraft is slower than 0.5 m/s the
-        last yaw is held; before it first moves, its first one; 0 if it never moves.
-    pitch_rad : ndarray
-        Positive nose up, in (-pi/2, pi/2); 0 while slower than 0.5 m/s.
-    roll_rad : ndarray
-        Positive right wing down, in (-pi/2, pi/2); 0 while slower than 0.5 m/s.
+    Yaw and pitch are those of the velocity, measured or fitted to the positions, through the air;
+    the roll is the bank of a coordinated turn. Slower than 0.5 m/s the last yaw is held, and pitch
+    and roll are 0.
     """
     if velocity_enu_mps is None:
         velocity, acceleration = fit_path(time_s, lat_deg, lon_deg, alt_m, window_s=window_s)
@@ -266,21 +228,10 @@ def scene_wind(weather: Any) -> Wind | None:
 def heading_and_airspeed(
     track_rad: FloatArray, ground_speed_mps: FloatArray, wind: Wind
 ) -> tuple[FloatArray, FloatArray]:
-    """Return heading and level airspeed of who flies along a track over the ground.
+    """Return heading (rad) and level airspeed (m/s) of who flies along a track over the ground.
 
-    The velocity through the air is that over the ground less the wind.
-
-    Parameters
-    ----------
-    track_rad, ground_speed_mps : arrays of one shape
-    wind : Wind
-
-    Returns
-    -------
-    heading_rad : array
-        In [0, 2 pi); the track itself where there is next to no velocity through the air
-        (below 0.5 m/s), which points nowhere, or over the ground.
-    airspeed_mps : array
+    The velocity through the air is that over the ground less the wind; below 0.5 m/s of either,
+    which point nowhere, the heading is the track.
     """
     east = ground_speed_mps * np.sin(track_rad) - wind.east_mps
     north = ground_speed_mps * np.cos(track_rad) - wind.north_mps
@@ -293,16 +244,6 @@ def ground_speed_mps(track_rad: float, airspeed_mps: float, wind: Wind) -> float
     """Return the ground speed along a track at an airspeed: the other side of the triangle.
 
     tail + sqrt(airspeed² - cross²), with the wind's parts along and across the track.
-
-    Parameters
-    ----------
-    track_rad, airspeed_mps : float
-    wind : Wind
-
-    Raises
-    ------
-    ValueError
-        If the wind is too strong to keep the track, or to get along it at all.
     """
     tail = wind.east_mps * math.sin(track_rad) + wind.north_mps * math.cos(track_rad)
     cross = wind.east_mps * math.cos(track_rad) - wind.north_mps * math.sin(track_rad)
@@ -327,21 +268,10 @@ def attitude_in_wind(
     ground_speed: FloatArray,
     wind: Wind,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Turn an attitude that follows from the path over the ground into that in wind.
+    """Return yaw, pitch and roll in wind of an attitude that follows from the path over the ground.
 
-    Parameters
-    ----------
-    track_rad, pitch_rad, roll_rad : arrays of one shape
-        Track, flight-path angle over the ground, and bank of a coordinated turn.
-    ground_speed : array of that shape, m/s
-        NaN where the attitude is to stay as it is.
-    wind : Wind
-
-    Returns
-    -------
-    yaw_rad, pitch_rad, roll_rad : arrays
-        Heading; climb over the airspeed; and the bank for the part of the turn's acceleration
-        that is across the nose.
+    That is heading, climb over the airspeed, and the bank for the part of the turn's acceleration
+    that is across the nose. Where the ground speed (m/s) is NaN the attitude stays as it is.
     """
     known = np.isfinite(ground_speed)
     speed = np.where(known, ground_speed, 0.0)

@@ -80,18 +80,7 @@ class TrafficEnvelope:
 def traffic_envelope(
     own: Any, targets: Any, fleet: Any, duration_s: float, reach_m: float
 ) -> TrafficEnvelope:
-    """Bound a run's lines of sight up to a reach.
-
-    Parameters
-    ----------
-    own : object with `at(time_s)` and `max_speed_mps`
-    targets : sequence of the like
-    fleet : object with `at(time_s)`
-        All targets.
-    duration_s : float
-    reach_m : float
-        Infinite where a sensor has no limit.
-    """
+    """Bound a run's lines of sight up to a reach."""
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(targets)))
     intervals = max(1, math.ceil(count))
     half_s = 0.5 * duration_s / intervals
@@ -166,13 +155,7 @@ class OwnshipFlight(Protocol):
 
 
 class FlightOf:
-    """One flight of many that are evaluated together.
-
-    Parameters
-    ----------
-    fleet : object with `each(aircraft, time_s)`
-    aircraft : int
-    """
+    """One flight of many that are evaluated together."""
 
     def __init__(self, fleet: Any, aircraft: int) -> None:
         self._fleet, self._aircraft = fleet, aircraft
@@ -184,21 +167,7 @@ class FlightOf:
 
 
 def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float) -> None:
-    """Refuse terrain that the ownship does not fly above.
-
-    Parameters
-    ----------
-    own : OwnshipFlight
-    terrain_m : float, m
-        Altitude of the ground.
-    duration_s : float, s
-        Length of the run; the flight is looked at every second.
-
-    Raises
-    ------
-    ValueError
-        If the ground is as high as the ownship somewhere, or higher.
-    """
+    """Refuse terrain that the ownship does not fly above."""
     count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
     times = np.linspace(0.0, duration_s, count)
     state = own.at(times)
@@ -214,22 +183,7 @@ def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float)
 def check_on_raster(
     own: OwnshipFlight, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
-    """Refuse a raster over which the ownship never flies, or whose ground it flies through.
-
-    Parameters
-    ----------
-    own : OwnshipFlight
-    raster : ElevationRaster
-    offset_m : float
-        Height above the ellipsoid of the raster's zero.
-    duration_s : float, s
-        Length of the run; the flight is looked at every second.
-
-    Raises
-    ------
-    ValueError
-        If they do not overlap, or the ownship is below the ground somewhere.
-    """
+    """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
     count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
     times = np.linspace(0.0, duration_s, count)
     state = own.at(times)

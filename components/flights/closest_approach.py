@@ -56,24 +56,9 @@ def closest_approaches(
 ) -> Approaches:
     """Find the time of the smallest slant range of each target; the first one of several.
 
-    Parameters
-    ----------
-    own_at : callable
-        States of the ownships of targets (n,) of int, each at a time (n,) of its own.
-    targets_at : callable
-        States of targets (n,) of int, each at a time (n,) of its own.
-    times : SampleTimes
-        Where distances are compared.
-    closing_speed_mps : (targets,)
-        Largest speed of the target plus that of the ownship.
-    present_s : two (targets,)
-        First and last time that are looked at; who is not there at a time in between is left out.
-    best : Approaches, optional
-        What other times gave; improved in place.
-
-    Returns
-    -------
-    Approaches
+    Flights are asked by `own_at` and `targets_at` of targets (n,), each at a time (n,) of its own;
+    only times from `present_s[0]` to `present_s[1]` are looked at. What is known already, `best`,
+    is improved in place.
     """
     closing = closing_speed_mps * _SPEED_MARGIN
     best = Approaches.none(len(closing)) if best is None else best
@@ -134,17 +119,7 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
 def looked_at_one_by_one(
     own: Any, targets: Sequence[Any], times_of: Callable[[Any], FloatArray], end_s: float
 ) -> Approaches:
-    """Find closest approaches by looking at every time of every target.
-
-    Parameters
-    ----------
-    own : object with `at(time_s)`
-    targets : sequence of the like
-    times_of : callable
-        Gives the times (n,) of a target.
-    end_s : float
-        Times outside [0, `end_s`] are left out.
-    """
+    """Find closest approaches by looking at every time of every target."""
     best = Approaches.none(len(targets))
     for number, target in enumerate(targets):
         times = times_of(target)
@@ -158,22 +133,7 @@ def looked_at_one_by_one(
 
 
 def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
-    """Say of each closest approach whether it is at an end of what was looked at.
-
-    Parameters
-    ----------
-    source : TrafficSource
-    time_s : (targets,)
-        When each target is closest; NaN for those never there.
-    end_s : float
-        Of the run.
-
-    Returns
-    -------
-    list of str
-        ``"the start"``, ``"the end of the run"``, ``"the start of its flight"`` or
-        ``"the end of its flight"``; empty where the aircraft are nearer than before and after.
-    """
+    """Say of each closest approach whether it is at an end of what was looked at."""
     present_s = np.array(present_together_s(source.own, source.targets, end_s))
     looked_s = np.array(_looked_at_s(source, *present_s))
     return [
@@ -183,16 +143,7 @@ def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[s
 
 
 def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
-    """Say of one closest approach whether it is at an end of what was looked at.
-
-    Parameters
-    ----------
-    time_s : float
-    looked_s, present_s : (2,)
-        First and last time that was looked at, and at which both aircraft may be there.
-    end_s : float
-        Of the run.
-    """
+    """Say of one closest approach whether it is at an end of what was looked at."""
     if time_s <= looked_s[0]:
         return "the start of its flight" if present_s[0] > 0.0 else "the start"
     if time_s >= looked_s[1]:

@@ -57,17 +57,7 @@ def intruder_heading(
 ) -> tuple[FloatArray, FloatArray]:
     """Return both headings with which an intruder comes from a bearing; NaN where there is none.
 
-    Parameters
-    ----------
-    own_heading_rad, own_speed, intruder_speed : (n,)
-    bearing_rad : (n,)
-        From the ownship's nose, clockwise, of the line on which the intruder closes in.
-
-    Notes
-    -----
-    The relative velocity has the opposite direction u of that line and a size V > 0 for which
-    |v₁ + V u| is the intruder's speed: V² + 2 V v₁·u + v₁² - v₂² = 0. A slower intruder may have
-    two, the larger first: it comes against the ownship, or is overtaken by it.
+    The bearing is that of the line on which it closes in, clockwise from the ownship's nose, rad.
     """
     along = -own_speed * np.cos(bearing_rad)
     with np.errstate(invalid="ignore"):
@@ -85,12 +75,8 @@ def intruder_heading(
 def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Return where the intruders are at the closest approach, and which can be there.
 
-    Returns
-    -------
-    lat_deg, lon_deg, altitude_m : (n,)
-    possible : (n,)
-        False where an intruder climbs or sinks too fast past so small a distance to be closest
-        there, or does not move against the ownship.
+    One that climbs or sinks too fast past so small a distance, or does not move against the
+    ownship, cannot be closest there.
     """
     a = approach
     north, east = (
@@ -166,14 +152,7 @@ def _closing(a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
 def flown(
     approach: Approach, closest_s: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return both flights over time, shape (2, n, instants), and which encounters there are.
-
-    Parameters
-    ----------
-    approach : Approach
-    closest_s : (n,)
-    time_s : (instants,)
-    """
+    """Return both flights over time, shape (2, n, instants), and which encounters there are."""
     a = approach
     lat, lon, altitude, possible = solve(a)
     paths = []

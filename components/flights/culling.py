@@ -54,18 +54,9 @@ class NearIntervals:
         return int(np.count_nonzero((self.start_s <= first_s) & (self.end_s >= last_s)))
 
     def at_each(self, columns: IntArray, first_s: FloatArray, last_s: FloatArray) -> BoolArray:
-        """Return which targets may be near at some time of each of several looks.
+        """Return which targets may be near at some time of each of several looks, (rows, targets).
 
-        Parameters
-        ----------
-        columns : (targets,) of int
-            Ascending; all that are near at any time of the looks.
-        first_s, last_s : (rows,)
-            When each look starts and ends, both in order.
-
-        Returns
-        -------
-        (rows, targets) of bool
+        Looks are in order; `columns` holds, ascending, all that are near in any of them.
         """
         met = (self.start_s <= last_s[-1]) & (self.end_s >= first_s[0])
         column = np.searchsorted(columns, self.target[met])
@@ -77,14 +68,7 @@ class NearIntervals:
         return near
 
     def holds(self, target: IntArray, time_s: FloatArray, until_s: FloatArray) -> BoolArray:
-        """Return whether each of some targets (n,) may be near at some time of its own (n,) look.
-
-        Parameters
-        ----------
-        target : (n,) of int
-        time_s, until_s : (n,)
-            When each look starts and ends.
-        """
+        """Return whether each of some targets (n,) may be near at some time of its own look."""
         first = np.searchsorted(self.target, target)
         count = np.searchsorted(self.target, target, side="right") - first
         inside: BoolArray = np.zeros(len(target), dtype=bool)
@@ -113,26 +97,10 @@ def near_intervals(
 ) -> NearIntervals:
     """Find when targets may be within a range of the ownship, between time 0 and an end.
 
-    Parameters
-    ----------
-    range_at : callable
-        Range from the ownship in m of targets (n,) of int, each at a time (n,) of its own.
-    closing_speed_mps : (targets,)
-        Largest speed of the target plus that of the ownship.
-    present_s : two (targets,)
-        First and last time at which both are there.
-    reach_m : float
-    end_s : float
-        Above 0.
-    of_run : int, optional
-        Where the targets are those of many runs: how many each of them has. All in one by default.
-
-    Returns
-    -------
-    NearIntervals
-        Every time at which a target is within `reach_m` lies in one of its intervals; they
-        exceed the true ones by `FINEST_S` or less at each end (more only for a target that
-        stays for long within a few metres of the edge).
+    Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
+    true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
+    few metres of the edge). Where targets are those of many runs, `of_run` says how many each run
+    has.
     """
     closing = closing_speed_mps * _SPEED_MARGIN
     target = np.arange(len(closing))
@@ -172,16 +140,7 @@ def range_between(
     target: IntArray,
     time_s: FloatArray,
 ) -> FloatArray:
-    """Return the range from an ownship to targets (n,), each at a time (n,) of its own, m.
-
-    Parameters
-    ----------
-    own_at : callable
-        State of the ownship at times (m,).
-    targets_at : callable
-        States of targets (n,) of int at times (n,).
-    target, time_s : (n,)
-    """
+    """Return the range from an ownship to targets (n,), each at a time (n,) of its own, m."""
     times, which = np.unique(time_s, return_inverse=True)
     own, other = own_at(times), targets_at(target, time_s)
     _, _, range_m = line_of_sight(
@@ -208,18 +167,6 @@ class Culling:
 
     The intervals are found once, for all targets together; which targets a window needs is then
     a look at them, so the answer for an instant does not depend on how instants are grouped.
-
-    Parameters
-    ----------
-    own, targets : objects with `at(time_s)`, `max_speed_mps` and `interval_present()`
-    fleet : object with `each(aircraft, time_s)` and `subset(columns)`
-        All targets.
-    reach_m : float
-        Farthest range at which any sensor looks.
-    end_s : float
-        Length of the run.
-    lasts_s : float
-        How long a look lasts: a sweeping beam sees targets where they are later in the scan.
     """
 
     def __init__(
@@ -245,31 +192,14 @@ class Culling:
         self._last: tuple[IntArray, Any] | None = None
 
     def active(self, first_s: float, last_s: float) -> tuple[IntArray, Any]:
-        """Return the targets that may come in reach between two times, and a fleet of them.
-
-        Parameters
-        ----------
-        first_s, last_s : float
-            Both included.
-
-        Returns
-        -------
-        columns : ndarray of int
-            Indices into the targets, ascending.
-        fleet : object with `at(time_s)`
-        """
+        """Return the targets that may come in reach between two times, and a fleet of them."""
         columns = self.intervals.during(first_s, last_s + self.lasts_s)
         if self._last is None or not np.array_equal(columns, self._last[0]):
             self._last = columns, self._fleet.subset(columns)
         return self._last
 
     def cut(self, time_s: FloatArray) -> tuple[IntArray, Any, BoolArray]:
-        """Return the targets that may come in reach, a fleet of them, and at which times (rows, n).
-
-        Parameters
-        ----------
-        time_s : (rows,)
-        """
+        """Return the targets that may come in reach, a fleet of them, and when (rows, n)."""
         columns, fleet = self.active(float(time_s.min()), float(time_s.max()))
         return columns, fleet, self.near(columns, time_s)
 
@@ -278,16 +208,6 @@ class Culling:
 
         A window holds targets that are near at some of its instants; this says at which, so that
         what is counted does not depend on the window.
-
-        Parameters
-        ----------
-        columns : (targets,) of int
-            As from `active`.
-        time_s : (rows,)
-
-        Returns
-        -------
-        (rows, targets) of bool
         """
         last_s = float(time_s.max())
         if self.intervals.throughout(float(time_s.min()) + self.lasts_s, last_s) == len(columns):
@@ -327,18 +247,7 @@ def within_of(closing_mps: FloatArray, reach_m: float, epoch_s: Any) -> FloatArr
 
 
 class SteeredCulling:
-    """The targets near an ownship that is steered, by epochs of time.
-
-    Parameters
-    ----------
-    own_speed_mps : float
-        Largest speed of the ownship before it is steered.
-    targets : sequence of objects with `max_speed_mps`
-    fleet : object with `at(time_s)` and `subset(columns)`
-        All targets.
-    reach_m : float
-        Farthest range at which any sensor looks.
-    """
+    """The targets near an ownship that is steered, by epochs of time."""
 
     def __init__(
         self, own_speed_mps: float, targets: Sequence[Any], fleet: Any, reach_m: float
@@ -356,25 +265,7 @@ class SteeredCulling:
         self._last: tuple[IntArray, Any] = np.arange(len(targets)), fleet
 
     def cut(self, own: Any, time_s: FloatArray) -> tuple[Any, IntArray, Any, BoolArray]:
-        """Return the targets that may be in reach at some of the times.
-
-        Parameters
-        ----------
-        own : SteeredFlight
-            The path of the ownship as it is now; another object after every manoeuvre.
-        time_s : (rows,)
-
-        Returns
-        -------
-        state : TrajectoryState
-            The ownship at the times.
-        columns : (n,) of int
-            Indices into the targets, ascending.
-        fleet : object with `at(time_s)`
-            Those targets.
-        near : (rows, n) of bool
-            At which times they may be.
-        """
+        """Return the ownship's states, the targets that may be in reach, their fleet, and when."""
         if own is not self._own:
             self._own, self._range_m = own, {}
         # By a row's own instant the ownship may have been told to fly faster.

@@ -23,13 +23,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class LegTable:
-    """All legs of many flights, found by flight and time.
-
-    Parameters
-    ----------
-    trajectories : sequence of ScriptedTrajectory
-        At least one.
-    """
+    """All legs of many flights, found by flight and time."""
 
     def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
         segments = [segment for t in trajectories for segment in t.segments]
@@ -115,11 +109,6 @@ class ScriptedFleet:
 
     All aircraft with a single straight leg are one array expression, all that stand still
     another; those with several legs are looked up leg by leg.
-
-    Parameters
-    ----------
-    trajectories : sequence of ScriptedTrajectory
-        Any number.
     """
 
     def __init__(self, trajectories: Sequence[ScriptedTrajectory]) -> None:
@@ -154,13 +143,7 @@ class ScriptedFleet:
         return [trajectory.name for trajectory in self.trajectories]
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
-        """Return the fleet of some aircraft, without preparing them anew.
-
-        Parameters
-        ----------
-        columns : ndarray of int, shape (n,)
-            Indices into the aircraft, ascending.
-        """
+        """Return the fleet of some aircraft, without preparing them anew."""
         fleet = copy(self)
         fleet._columns = self._columns[columns]
         parts = [group.subset(columns) for group in self._groups]
@@ -171,18 +154,7 @@ class ScriptedFleet:
         return fleet
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give every aircraft's state at some times.
-
-        Parameters
-        ----------
-        time_s : array_like, shape (S,)
-            Seconds.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of shape (S, T), aircraft in the order given.
-        """
+        """Give every aircraft's state at some times."""
         times = _times(time_s)
         state = _empty_state(len(times), len(self._columns))
         for group in self._groups:
@@ -307,11 +279,6 @@ class SampledFleet:
     """Sampled aircraft evaluated together, bit for bit as each would be alone.
 
     Aircraft with the same sample times are looked up once for all of them.
-
-    Parameters
-    ----------
-    trajectories : sequence of SampledTrajectory
-        Any number.
     """
 
     def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
@@ -339,19 +306,7 @@ class SampledFleet:
         return SampledFleet([self.trajectories[i] for i in columns.tolist()])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give every aircraft's state at some times.
-
-        Parameters
-        ----------
-        time_s : array_like, shape (S,)
-            Seconds.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of shape (S, T), aircraft in the order given; `present` is False outside an
-            aircraft's samples.
-        """
+        """Give every aircraft's state at some times."""
         times = _times(time_s)
         count = len(self.trajectories)
         state = _empty_state(len(times), count)

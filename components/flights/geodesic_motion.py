@@ -49,22 +49,6 @@ def geodesic_parameters(
 ) -> FloatArray:
     """Prepare a straight leg: everything that does not depend on time.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m : float
-        Where the leg starts.
-    azimuth_rad : float
-        Heading at the start, clockwise from north.
-    speed_mps, climb_mps : float
-        Ground speed (at the flight's altitude) and rate of climb.
-
-    Returns
-    -------
-    ndarray, shape (20,)
-        For `geodesic_state`.
-
-    Notes
-    -----
     The series are those of C. F. F. Karney, "Algorithms for geodesics", Journal of Geodesy 87
     (2013), eqs 15-18, 21, 24 and 25, to the fifth order: below 4 nm on WGS-84.
     """
@@ -119,15 +103,6 @@ def geodesic_parameter_table(
 
     Sums and products are taken over arrays. Functions whose last bit may differ between libraries
     are those of `math`, one value at a time.
-
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m, azimuth_rad, speed_mps, climb_mps : (n,)
-        As for `geodesic_parameters`.
-
-    Returns
-    -------
-    ndarray, shape (20, n)
     """
     n = FLATTENING / (2.0 - FLATTENING)
     semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
@@ -199,24 +174,7 @@ def _added(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
 def flight_time_s(
     distance_m: float, speed_mps: float, alt_m: float, end_alt_m: float, radius_m: float
 ) -> float:
-    """Find how long a straight leg over a distance on the ellipsoid takes at an altitude.
-
-    Parameters
-    ----------
-    distance_m : float
-        Geodesic distance on the ellipsoid.
-    speed_mps : float
-        Ground speed at altitude.
-    alt_m, end_alt_m : float
-        Altitudes at the two ends.
-    radius_m : float
-        The leg's radius of curvature, from `leg_radius_m`.
-
-    Returns
-    -------
-    float
-        Seconds.
-    """
+    """Find how long a straight leg over a distance on the ellipsoid takes at an altitude."""
     return distance_m * (radius_m + 0.5 * (alt_m + end_alt_m)) / (speed_mps * radius_m)
 
 
@@ -228,20 +186,7 @@ def leg_radius_m(parameters: FloatArray) -> float:
 def geodesic_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate straight legs.
-
-    Parameters
-    ----------
-    table : ndarray, shape (20, …)
-        Parameters, broadcasting against `elapsed` after the first axis.
-    elapsed : ndarray
-        Seconds since the start of the leg.
-
-    Returns
-    -------
-    lat_deg, lon_deg, alt_m, yaw_rad : ndarray
-        Yaw is the geodesic's azimuth there, in [0, 2 pi).
-    """
+    """Evaluate straight legs."""
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
     climbed = table[_CLIMB] * elapsed
     # Ground speed is flown at altitude: over the ellipsoid it is slower by R / (R + h), with h

@@ -223,29 +223,6 @@ def turn_parameters(
 ) -> FloatArray:
     """Prepare a turn: everything that does not depend on time.
 
-    Parameters
-    ----------
-    lat_deg, lon_deg, alt_m : float
-        Where the turn starts.
-    azimuth_rad : float
-        Heading there, clockwise from north.
-    speed_mps, climb_mps : float
-        Ground speed at altitude and rate of climb.
-    rate_rad_s : float
-        Rate of turn, positive to the right, not zero.
-
-    Returns
-    -------
-    ndarray, shape (16,)
-        For `turn_state`.
-
-    Raises
-    ------
-    ValueError
-        The radius, speed over rate, exceeds 200 km.
-
-    Notes
-    -----
     The circle lies around its own centre in the chart (east, north) -> (angle about the centre's
     prime-vertical and meridian radii), so it is round in metres although the ellipsoid's two
     radii differ by up to 0.7 %, and it returns to where it began.
@@ -288,20 +265,7 @@ def turn_parameters(
 def turn_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate turns.
-
-    Parameters
-    ----------
-    table : ndarray, shape (16, …)
-        Parameters, broadcasting against `elapsed` after the first axis.
-    elapsed : ndarray
-        Seconds since the start of the turn.
-
-    Returns
-    -------
-    lat_deg, lon_deg, alt_m, yaw_rad : ndarray
-        Yaw is the true track there, in [0, 2 pi): it includes the convergence of the meridians.
-    """
+    """Evaluate turns."""
     angle = table[_PHASE] + table[_RATE] * elapsed
     sine, cosine = np.sin(angle), np.cos(angle)
     # Offsets from the centre as angles, and their derivatives by `angle`.
@@ -384,38 +348,14 @@ FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
 
 
 def segment_state(segment: Segment, elapsed: FloatArray) -> tuple[FloatArray, ...]:
-    """Evaluate one segment at times since its start.
-
-    Parameters
-    ----------
-    segment : Segment
-        Which.
-    elapsed : ndarray, shape (m,)
-        Seconds.
-
-    Returns
-    -------
-    lat_deg, lon_deg, alt_m, yaw_rad, pitch_rad, roll_rad : ndarray, shape (m,)
-    """
+    """Evaluate one segment at times since its start."""
     state = FORMULAS[segment.kind](segment.parameters[:, np.newaxis], elapsed)
     pitch, roll = (np.full_like(elapsed, a) for a in (segment.pitch_rad, segment.roll_rad))
     return (*state, pitch, roll)
 
 
 class LegBuilder:
-    """Flies the script once, leg by leg, noting where each leg starts.
-
-    Parameters
-    ----------
-    name : str
-        The aircraft, for messages.
-    start : tuple of three float
-        Latitude, longitude (degrees) and altitude (metres).
-    heading_rad, speed_mps, climb_mps : float
-        At the start.
-    reference : tuple of three float
-        Where offsets of waypoints are measured from.
-    """
+    """Flies the script once, leg by leg, noting where each leg starts."""
 
     def __init__(
         self,

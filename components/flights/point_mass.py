@@ -59,16 +59,6 @@ def fly_euler(
 ) -> FlownTracks:
     """Fly by steps of 1 s that take the values of the second before on their right.
 
-    Parameters
-    ----------
-    altitude_ft, speed_ft_s : (tracks,)
-        At time 0.
-    acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
-        Commands, held for a second; the last row commands nothing any more.
-    start_heading_rad : (tracks,), optional
-
-    Notes
-    -----
     h += ḣ; N, E += v (cos ψ, sin ψ); v += a; ψ += ψ̇. The path over the ground is that of the
     airspeed, as in the published tracks.
     """
@@ -109,16 +99,6 @@ def fly_point_mass(
 ) -> FlownTracks:
     """Fly a point mass by Euler steps of 0.1 s, from commands that are held for a second.
 
-    Parameters
-    ----------
-    altitude_ft, speed_ft_s : (tracks,)
-        At time 0, when pitch and bank are those of a steady climbing turn.
-    acceleration_ft_s2, climb_ft_s, turn_rad_s : (seconds + 1, tracks)
-        The last row commands nothing any more.
-    start_heading_rad : (tracks,), optional
-
-    Notes
-    -----
     The equations of the programs of the published encounter models (em-core): rates of turn about
     body axes q and r follow from the commanded climb and the bank, roll rate p from what is missing
     of the commanded turn; |q| ≤ 3°/s, |p| ≤ 0.524 rad/s, |bank| ≤ 75°, speed 1.7 to 1116 ft/s.

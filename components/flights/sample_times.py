@@ -13,13 +13,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 
 class PieceSearch:
-    """The pieces of many paths, laid end to end.
-
-    Parameters
-    ----------
-    starts_s : sequence of ndarray
-        For each aircraft the times at which its pieces start, strictly increasing, at least one.
-    """
+    """The pieces of many paths, laid end to end."""
 
     def __init__(self, starts_s: list[FloatArray]) -> None:
         lengths = np.array([len(starts) for starts in starts_s], dtype=np.int64)
@@ -48,19 +42,7 @@ class PieceSearch:
         return search
 
     def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
-        """Return the last piece that starts at or before a time, the first piece before them all.
-
-        Parameters
-        ----------
-        aircraft : (n,) of int
-        time_s : (n,)
-            On the clock of `starts_s`.
-
-        Returns
-        -------
-        (n,) of int
-            Index into all pieces.
-        """
+        """Return the last piece that starts at or before a time, or the first one."""
         low, high = self.first[aircraft], self.last[aircraft]
         for _ in range(self._steps):
             middle = (low + high + 1) // 2
@@ -77,11 +59,6 @@ def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
     """Return the times of some places of a regular grid that starts at 0, s.
 
     They are rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
-
-    Parameters
-    ----------
-    step_s : float
-    number : (n,) of int
     """
     return np.round(number * step_s, _DIGITS)
 
@@ -165,13 +142,7 @@ class SharedTimes:
 
 
 class OwnTimes:
-    """Every target has times of its own.
-
-    Parameters
-    ----------
-    times_s : sequence of ndarray
-        Of each target, strictly increasing, at least one.
-    """
+    """Every target has times of its own."""
 
     def __init__(self, times_s: Sequence[FloatArray]) -> None:
         self._find = PieceSearch(list(times_s))

@@ -28,25 +28,7 @@ _LIMITS = {
 
 
 def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, FloatArray]:
-    """Return the given columns as contiguous arrays of one length.
-
-    Parameters
-    ----------
-    name : str
-        The aircraft, for messages.
-    **columns : array_like or None
-        `time_s` and others; None is left out.
-
-    Returns
-    -------
-    dict
-        The columns that were given, float64, shape (n,).
-
-    Raises
-    ------
-    ValueError
-        Naming the column, the first bad value and what is allowed.
-    """
+    """Return the given columns as contiguous arrays of one length."""
     checked: dict[str, FloatArray] = {}
     for column, values in columns.items():
         if values is None:
@@ -104,21 +86,9 @@ def fit_segments(
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_enu_mps: Vector | None = None,
 ) -> FloatArray:
-    """Tabulate each segment's polynomials; the last sample is a segment of its own.
+    """Tabulate each segment's polynomials, (25, n), or (25, n, aircraft) at the same times.
 
-    Parameters
-    ----------
-    time_s : (n,)
-    place : three of (n,) or (n, aircraft)
-        Latitude and longitude (deg), altitude (m): of one aircraft, or of several that have the
-        same times.
-    attitude_rad : three of the same shape
-        Yaw, pitch and roll.
-    velocity_enu_mps : three of the same shape, optional
-
-    Returns
-    -------
-    (25, n) or (25, n, aircraft)
+    The last sample is a segment of its own; place is latitude, longitude (deg) and altitude (m).
     """
     lat_deg, lon_deg, alt_m = place
     yaw_rad, pitch_rad, roll_rad = attitude_rad
@@ -185,23 +155,9 @@ def _bent_segments(
 def locate(
     sample_times: FloatArray, times: FloatArray
 ) -> tuple[npt.NDArray[np.intp], FloatArray, npt.NDArray[np.bool_]]:
-    """Find each time's segment and the time elapsed in it.
+    """Return each time's segment, the time elapsed in it (s), and whether it is within the samples.
 
-    Parameters
-    ----------
-    sample_times : ndarray, shape (n,)
-        Strictly increasing.
-    times : ndarray, shape (m,)
-        Any order.
-
-    Returns
-    -------
-    segment : ndarray of int
-        0 … n - 1; times outside are moved to the nearest sample.
-    elapsed_s : ndarray
-        Since the segment's sample.
-    present : ndarray of bool
-        Within the first and last samples, both included.
+    Times outside are moved to the nearest sample.
     """
     present = (times >= sample_times[0]) & (times <= sample_times[-1])
     inside = np.where(times > sample_times[0], times, sample_times[0])
@@ -213,20 +169,7 @@ def locate(
 def evaluate_segments(
     table: FloatArray, elapsed: FloatArray, present: npt.NDArray[np.bool_]
 ) -> TrajectoryState:
-    """Evaluate gathered segments, element by element.
-
-    Parameters
-    ----------
-    table : ndarray, shape (25, m)
-        Columns of `fit_segments`, one per element.
-    elapsed, present : ndarray, shape (m,)
-        From `locate`.
-
-    Returns
-    -------
-    TrajectoryState
-        Arrays of shape (m,).
-    """
+    """Evaluate gathered segments, element by element."""
     x, y, z, alt = (
         ((table[r + 3] * elapsed + table[r + 2]) * elapsed + table[r + 1]) * elapsed + table[r]
         for r in (0, 4, 8, _ALT)
@@ -355,14 +298,7 @@ class SampledTrajectory:
         lon_deg: FloatArray,
         alt_m: FloatArray,
     ) -> list[SampledTrajectory]:
-        """Return aircraft that are known at the same times, as each would be made alone.
-
-        Parameters
-        ----------
-        names : sequence of str
-        time_s : (n,)
-        lat_deg, lon_deg, alt_m : (n, aircraft)
-        """
+        """Return aircraft that are known at the same times, as each would be made alone."""
         found: list[SampledTrajectory] = []
         width = max(1, CELLS_AT_ONCE // max(1, len(time_s)))
         for first in range(0, len(names), width):
@@ -422,18 +358,7 @@ class SampledTrajectory:
         )
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give the aircraft's state at some times.
-
-        Parameters
-        ----------
-        time_s : array_like
-            Seconds, any shape. The same time gives the same bits whatever it is asked with.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of that shape; `present` is False before the first and after the last sample.
-        """
+        """Give the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
         segment, elapsed, present = locate(self.sample_times_s, flat)

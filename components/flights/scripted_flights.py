@@ -135,18 +135,7 @@ class ScriptedTrajectory:
         start_time_s: float,
         end_time_s: float,
     ) -> ScriptedTrajectory:
-        """Return a flight whose segments are known already.
-
-        Parameters
-        ----------
-        name : str
-        segments : list of Segment
-            At least one.
-        fixed_attitude_rad : tuple of three float or None
-            Yaw in [0, 2 pi), pitch and roll; None follows the path.
-        start_time_s, end_time_s : float
-            The end may be infinite.
-        """
+        """Return a flight whose segments are known already."""
         flight = cls.__new__(cls)
         flight.name = name
         flight.start_time_s, flight.end_time_s = start_time_s, end_time_s
@@ -204,18 +193,7 @@ class ScriptedTrajectory:
         )
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give the aircraft's state at some times.
-
-        Parameters
-        ----------
-        time_s : array_like
-            Seconds, any shape. The same time gives the same bits whatever it is asked with.
-
-        Returns
-        -------
-        TrajectoryState
-            Arrays of that shape; `present` is False outside the start and end times.
-        """
+        """Give the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
         if len(flat) > CELLS_AT_ONCE:
@@ -292,13 +270,7 @@ class Starts:
         return np.full(len(self), default) if given is None else given
 
     def flight(self, number: int) -> ScriptedTrajectory:
-        """Return one of the flights, made by itself.
-
-        Raises
-        ------
-        ValueError
-            A value that is not allowed.
-        """
+        """Return one of the flights, made by itself."""
         fixed = (np.nan,) * 3 if self.fixed_deg is None else self.fixed_deg[:, number].tolist()
         yaw, pitch, roll = (None if isnan(angle) else angle for angle in fixed)
         end_s = float(self.column("end_time_s", inf)[number])
@@ -319,13 +291,7 @@ class Starts:
 
 
 class StraightFlights(Sequence[ScriptedTrajectory]):
-    """Flights without legs; an item is made when it is asked for.
-
-    Parameters
-    ----------
-    starts : Starts
-        As `are_plain` says they may be.
-    """
+    """Flights without legs; an item is made when it is asked for."""
 
     def __init__(self, starts: Starts) -> None:
         self.names = starts.names
@@ -392,13 +358,7 @@ class StraightFlights(Sequence[ScriptedTrajectory]):
 
 
 def flights_of(starts: Starts) -> Sequence[ScriptedTrajectory]:
-    """Return flights without legs, together where that can be, else each by itself.
-
-    Raises
-    ------
-    ValueError
-        A value that `ScriptedTrajectory` refuses.
-    """
+    """Return flights without legs, together where that can be, else each by itself."""
     if are_plain(starts):
         return StraightFlights(starts)
     return [starts.flight(number) for number in range(len(starts))]

@@ -81,13 +81,6 @@ class SteeredFlight:
     climb. The flight's own script ends with the first one.
 
     It never changes: `steered` returns another one, so that a run can go back to the flight it had.
-
-    Parameters
-    ----------
-    flight : object with `name` and `at(time_s)`
-        What is flown until the first manoeuvre.
-    parts : tuple of (start in s, SteeredPart)
-        What is flown from then on.
     """
 
     def __init__(
@@ -109,13 +102,8 @@ class SteeredFlight:
     def steered(self, time_s: float, told: Manoeuvre) -> SteeredFlight:
         """Return the flight that does as it is told from a time on, beside what it still does.
 
-        Parameters
-        ----------
-        time_s : float
-            Not before an earlier manoeuvre.
-        told : Manoeuvre
-            A turn or a change of altitude begins and ends at once: without a change of speed along
-            the path's projection, and without acceleration upward. Speeds change steadily.
+        A turn or a change of altitude begins and ends at once, without a change of speed along the
+        path's projection and without acceleration upward; speeds change steadily.
         """
         around = self.at(time_s + AROUND_S).reshaped((1, len(AROUND_S)))
         before = self.parts[-1][1] if self.parts else None
@@ -254,16 +242,8 @@ def flown_from(
 ) -> list[SteeredPart]:
     """Return what aircraft fly from a manoeuvre on.
 
-    Parameters
-    ----------
-    name : str
-        Of all of them.
-    around : TrajectoryState
-        Arrays (n, 3): where each would be without it, `AROUND_S` of its time.
-    time_s : (n,)
-    told : sequence of n Manoeuvre
-    before : sequence of n SteeredPart or None
-        What each flies after an earlier manoeuvre; the parts of it that are not told anew go on.
+    `around` says where each would be without it, (n, 3), `AROUND_S` of its time. Parts of an
+    earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     middle = [part[:, 1:2] for part in (around.lat_deg, around.lon_deg, around.alt_m)]
     # Ends of the chord seen from its middle, so that the track is the one there.
@@ -332,12 +312,6 @@ class OwnFlights:
     """What every ownship flies: its own flight, and after manoeuvres what each of them led to.
 
     As many `components.flights.steered_flights.SteeredFlight`, to the bit.
-
-    Parameters
-    ----------
-    flights : EachFlight
-        What each of them flies until its first manoeuvre.
-    count : int
     """
 
     def __init__(self, flights: EachFlight, count: int) -> None:
@@ -352,14 +326,7 @@ class OwnFlights:
 
     @classmethod
     def of(cls, steered: Sequence[SteeredFlight], flights: EachFlight) -> OwnFlights:
-        """Return flights that were steered before.
-
-        Parameters
-        ----------
-        steered : sequence of SteeredFlight
-        flights : EachFlight
-            What each of them flew until its first manoeuvre.
-        """
+        """Return flights that were steered before."""
         made = cls(flights, len(steered))
         parts = [flight.parts for flight in steered]
         made.count[:] = [len(of_one) for of_one in parts]
@@ -385,12 +352,7 @@ class OwnFlights:
     ) -> TrajectoryState:
         """Return the states of ownships (n,), each at a time (n,) of its own, in s.
 
-        Parameters
-        ----------
-        ownship : (n,) of int
-        time_s : (n,)
-        known : (n,) of int, optional
-            How many of the ownship's manoeuvres are known; all by default.
+        `known` says how many of the ownship's manoeuvres count; all by default.
         """
         if self._parts is None:
             return self._flights.each(ownship, time_s)
@@ -421,16 +383,7 @@ class OwnFlights:
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
     def steer(self, ownship: IntArray, time_s: FloatArray, told: Sequence[Manoeuvre]) -> None:
-        """Let ownships fly manoeuvres from times on.
-
-        Parameters
-        ----------
-        ownship : (n,) of int
-            Each once.
-        time_s : (n,)
-            Not before earlier manoeuvres of the same one.
-        told : sequence of n Manoeuvre
-        """
+        """Let ownships (each once) fly manoeuvres from times on, none before an earlier one."""
         around = self.each(
             np.repeat(ownship, len(AROUND_S)), (time_s[:, np.newaxis] + AROUND_S).reshape(-1)
         ).reshaped((len(ownship), len(AROUND_S)))
@@ -456,10 +409,6 @@ class ManyFlights:
     """Many flights, to the bit as each would be alone.
 
     Those of a kind that can be put into one table are; others are asked one by one.
-
-    Parameters
-    ----------
-    flights : sequence of objects with `at(time_s)`
     """
 
     def __init__(self, flights: Sequence[Any]) -> None:

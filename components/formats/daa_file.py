@@ -140,24 +140,10 @@ def read_daa(
 def read_daa_samples(
     path: str | PathLike[str], extra: Sequence[str] = ()
 ) -> dict[str, dict[str, FloatArray]]:
-    """Read the samples of a `.daa` or `.xyz` file as they stand there.
+    """Return the samples of a `.daa` or `.xyz` file by aircraft, in its order.
 
-    Parameters
-    ----------
-    path : path-like
-    extra : sequence of str
-        Quantities of `EXTRA_HEADERS` that are wanted too where the file has them.
-
-    Returns
-    -------
-    dict
-        Columns by aircraft, the first one of the file first: time in s as in the file; lat, lon
-        in degrees and alt in m, or sx, sy, sz in m; ve, vn, vu in m/s where velocities are given.
-
-    Raises
-    ------
-    TrafficFileError
-        With all problems of the file.
+    They are time (s), lat, lon (deg) and alt or sx, sy, sz (m), ve, vn, vu (m/s) where there are
+    velocities, and `extra` of its columns.
     """
     table, _ = _table(path, extra)
     return {

@@ -76,12 +76,7 @@ class EncounterSet:
         return len(self.numbers)
 
     def place(self, number: int) -> int:
-        """Return where an encounter stands.
-
-        Raises
-        ------
-        NoSuchEncounter
-        """
+        """Return where an encounter stands."""
         at = int(np.searchsorted(self.numbers, number))
         if at < len(self) and self.numbers[at] == number:
             return at
@@ -115,16 +110,8 @@ def flown_events(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Fly initial states and events of several aircraft, as each would be flown alone.
 
-    Parameters
-    ----------
-    aircraft : sequence of (set of events, row)
-        All of as many `EncounterSet.seconds`.
-    dynamics : {"euler", "point_mass"}
-
-    Returns
-    -------
-    time_s : (instants,)
-    north_m, east_m, altitude_m : (instants, aircraft)
+    All have as many `EncounterSet.seconds`; returns times (instants,) in s, and north, east and
+    altitude (instants, aircraft) in m.
     """
     whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
     state = {name: np.array([s.state[name][row] for s, row in aircraft]) for name in STATE}

@@ -57,20 +57,7 @@ def set_of_tracks(
 
 
 def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int, str]]:
-    """Read a file of waypoints.
-
-    Returns
-    -------
-    encounters : list
-        Names and tracks of all, those damaged too.
-    damaged : dict
-        Place of an encounter → what is wrong with it.
-
-    Raises
-    ------
-    EncounterSetError
-        If the file is cut short, or is none.
-    """
+    """Return the tracks of all encounters of a file of waypoints, and what is wrong with which."""
     try:
         content = read_input_bytes(path)
     except InputFileError as error:
@@ -122,13 +109,7 @@ def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int,
 
 
 def waypoints_of(found: EncounterSet, dynamics: str = "euler") -> bytes:
-    """Return a set as a file of waypoints.
-
-    Raises
-    ------
-    EncounterSetError
-        If its encounters have different numbers of aircraft, or a track too many samples.
-    """
+    """Return a set as a file of waypoints."""
     counts = np.unique(np.diff(found.first_rows))
     if len(counts) > 1:
         raise EncounterSetError(
@@ -164,20 +145,8 @@ def read_encounters(
 ) -> EncounterSet:
     """Return what is in one set, in one file of waypoints, or in files of tracks.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        Files of tracks are one encounter each; those of one aircraft each make an encounter two by
-        two, the ownship's first.
-    at : (latitude, longitude), optional
-        Where the origin is put.
-    skip_damaged : bool
-        Whether damaged encounters are left out and counted.
-
-    Raises
-    ------
-    UsageError, EncounterSetError
-        With what is wrong, naming file and encounter.
+    Files of tracks are one encounter each; those of one aircraft each make an encounter two by two,
+    the ownship's first.
     """
     kinds = {path.suffix.lower() for path in paths}
     if kinds == {SET} and len(paths) == 1:

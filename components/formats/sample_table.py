@@ -107,19 +107,8 @@ def unit_factor(
 class SampleTable:
     """Collects samples row by row and turns them into trajectories.
 
-    Parameters
-    ----------
-    problems : Problems
-        Told about every cell and aircraft that is wrong.
-    name_column : int
-        Which cell names the aircraft.
-    columns : dict of str to SampleColumn
-        The quantities to read.
-    parse_time : callable, optional
-        Turns a time cell into seconds where a plain number will not do.
-    optional : collection of str
-        Quantities whose bad cells are no error: an aircraft that has one goes without the whole
-        column, and a note says so.
+    A bad cell of an `optional` quantity is no error: the aircraft goes without the whole column,
+    and a note says so. `parse_time` reads a time cell where a plain number will not do.
     """
 
     def __init__(
@@ -157,24 +146,7 @@ class SampleTable:
             rows.values.setdefault(quantity, []).append(value or 0.0)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
-        """Check each aircraft's samples and make the trajectories.
-
-        Parameters
-        ----------
-        ownship : str or None
-            Its name; None is the first aircraft in the file.
-        to_geodetic : callable
-            Turns the columns of one aircraft into lat, lon, alt (and velocity, attitude).
-
-        Returns
-        -------
-        TrafficFile
-
-        Raises
-        ------
-        TrafficFileError
-            With all problems of the file.
-        """
+        """Check each aircraft's samples and make the trajectories."""
         samples = self.samples(ownship)
         own = next(iter(samples))
         start = min(float(columns["time"][0]) for columns in samples.values())
@@ -193,23 +165,7 @@ class SampleTable:
         return TrafficFile(made[own], intruders, start, self.notes)
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
-        """Check each aircraft's samples and return them as columns, in the order of time.
-
-        Parameters
-        ----------
-        ownship : str or None
-            Its name; None is the first aircraft in the file.
-
-        Returns
-        -------
-        dict
-            Columns by aircraft, the ownship first; times are those of the file.
-
-        Raises
-        ------
-        TrafficFileError
-            With all problems of the file.
-        """
+        """Check each aircraft's samples and return them as columns, in the order of time."""
         names = list(self._aircraft)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
@@ -366,18 +322,6 @@ def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
     325374.3 - 325374.2 is 0.0999999999767 in doubles. The difference is rounded to the digits
     that the readings can hold (at most nanoseconds), so that a tenth of a second is the double
     0.1 and a scan at 0.1 s meets the sample itself.
-
-    Parameters
-    ----------
-    time_s : ndarray
-        Clock readings, strictly increasing.
-    start_s : float
-        The reading that becomes 0.
-
-    Returns
-    -------
-    ndarray
-        Seconds, strictly increasing.
     """
     elapsed = time_s - start_s
     resolution = float(np.spacing(max(abs(start_s), float(np.abs(time_s).max()))))
@@ -387,18 +331,7 @@ def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
 
 
 def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Give east, north, up velocity from vx vy vz or trk gs vs; nothing if neither is complete.
-
-    Parameters
-    ----------
-    columns : dict
-        Quantities in m/s and degrees.
-
-    Returns
-    -------
-    dict
-        ve, vn, vu in m/s, or empty.
-    """
+    """Give east, north, up velocity from vx vy vz or trk gs vs; nothing if neither is complete."""
     if {"vx", "vy", "vz"} <= columns.keys():
         return {"ve": columns["vx"], "vn": columns["vy"], "vu": columns["vz"]}
     if {"trk", "gs", "vs"} <= columns.keys():

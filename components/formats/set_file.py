@@ -33,13 +33,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def streamed(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write to; nothing is left behind where the block does not end well.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Give a file to write to; nothing is left behind where the block does not end well."""
     temporary = temporary_beside(path)
     try:
         with open(temporary, "xb") as file:
@@ -82,19 +76,7 @@ class EncounterSetError(ValueError):
 
 
 def read_set(path: Path, skip_damaged: bool = False) -> EncounterSet:
-    """Read a set of encounters.
-
-    Parameters
-    ----------
-    path : Path
-    skip_damaged : bool
-        Whether damaged encounters are left out and counted; otherwise they are an error.
-
-    Raises
-    ------
-    EncounterSetError
-        With everything that is wrong, encounter by encounter.
-    """
+    """Read a set of encounters."""
     try:
         state = status_of(path, _LARGEST_BYTES)
     except InputFileError as error:
@@ -321,14 +303,7 @@ def without(found: EncounterSet, places: list[int]) -> EncounterSet:
 
 @contextmanager
 def set_writer(path: Path, about: dict[str, Any]) -> Iterator["SetWriter"]:
-    """Give a writer of a set; the file takes its name when the block ends well.
-
-    Parameters
-    ----------
-    path : Path
-    about : dict
-        What is kept with the file: where it came from, and ``reference_deg``.
-    """
+    """Give a writer of a set; the file takes its name when the block ends well."""
     with streamed(path) as file:
         writer = SetWriter(file, about)
         try:

@@ -84,15 +84,7 @@ MOST_OF_A_CELL = 24
 
 
 class TrafficFileError(ValueError):
-    """A traffic file cannot be used; `problems` says everything that is wrong with it.
-
-    Parameters
-    ----------
-    path : str
-        The file.
-    problems : list of str
-        Each with line, column, value and what is allowed, as far as they apply.
-    """
+    """A traffic file cannot be used; `problems` says everything that is wrong with it."""
 
     def __init__(self, path: str, problems: Iterable[str]) -> None:
         self.path = str(path)
@@ -135,13 +127,7 @@ class TrafficFile:
 
 
 class Problems:
-    """Collects what is wrong with one file, to be reported at once.
-
-    Parameters
-    ----------
-    path : str
-        The file.
-    """
+    """Collects what is wrong with one file, to be reported at once."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -200,22 +186,10 @@ _ROWS = "a row of column names and rows of samples"
 def read_lines(
     path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
 ) -> list[tuple[int, str]]:
-    """Read a file's lines that hold something, with their numbers.
+    """Return a file's lines that hold something but comments, with their numbers from 1.
 
-    Parameters
-    ----------
-    path : Path
-        The file. UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may
-        end in LF, CR LF or CR.
-    problems : Problems
-        Told when there is no such file, when it is a directory, binary or empty.
-    needed, holds : str
-        For the messages of a binary and of an empty file: which file is needed, and what in it.
-
-    Returns
-    -------
-    list of (int, str)
-        Line number from 1 and the stripped text; blank lines and lines starting with # left out.
+    It may be UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1; lines may end in
+    LF, CR LF or CR. `needed` and `holds` are for the messages of a binary and of an empty file.
     """
     try:
         data = read_input_bytes(path)
@@ -264,25 +238,11 @@ def tokens(line: str) -> list[str]:
 
 
 def cells(line: str, count: int, name_column: int) -> list[str] | None:
-    """Split a row of values into as many cells as there are columns.
+    """Split a row of values into as many cells as there are columns; None where that cannot be.
 
     Commas (or semicolons, or tabs where there are neither) separate first; a cell that holds
     blanks is split further until the count fits, the aircraft's name last of all, so that names
     with blanks survive in comma-separated rows.
-
-    Parameters
-    ----------
-    line : str
-        The row.
-    count : int
-        Number of columns in the header.
-    name_column : int
-        Which of them is the aircraft's name.
-
-    Returns
-    -------
-    list of str or None
-        None if the row cannot be split into that many cells.
     """
     pattern = _SEPARATORS if _SEPARATORS.search(line) else re.compile(r"\t")
     parts = [part.strip() for part in pattern.split(line)]

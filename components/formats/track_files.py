@@ -39,19 +39,7 @@ Tracks = tuple[list[Track], tuple[float, float] | None]
 
 
 def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
-    """Read the tracks of a CSV table; one for each ``ID``, in order of their first rows.
-
-    Parameters
-    ----------
-    path : Path
-    at : (latitude, longitude), optional
-        Where the plane of a table of latitudes touches; by default where its first track begins.
-
-    Raises
-    ------
-    EncounterSetError
-        Naming file and line.
-    """
+    """Read the tracks of a CSV table; one for each ``ID``, in order of their first rows."""
     try:
         text = read_input_text(path)
     except InputFileError as error:
@@ -109,13 +97,7 @@ def _in_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
 
 
 def _whole(file: bytes) -> None:
-    """Refuse a file of level 5 whose elements are cut off: SciPy reads on beyond their ends.
-
-    Raises
-    ------
-    ValueError, zlib.error
-        If one is, or is not as long as it says.
-    """
+    """Refuse a file of level 5 whose elements are cut off: SciPy reads on beyond their ends."""
     order = {b"IM": "<", b"MI": ">"}.get(file[126:128])
     start = 128
     while order is not None and start + 8 <= len(file):
@@ -133,13 +115,7 @@ def _whole(file: bytes) -> None:
 
 
 def read_track_matrices(path: Path) -> Tracks:
-    """Read the tracks of a MATLAB file: every matrix of 7 rows in it, in order of their names.
-
-    Raises
-    ------
-    EncounterSetError
-        If it cannot be read, or holds none.
-    """
+    """Read the tracks of a MATLAB file: every matrix of 7 rows in it, in order of their names."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatlabObject, MatlabOpaque
 
@@ -223,13 +199,7 @@ def encounter_of(tracks: list[Track]) -> list[tuple[str, Track]]:
 
 
 def read_paired_text(path: Path) -> list[tuple[str, Track]]:
-    """Read one encounter of paired tracks.
-
-    Raises
-    ------
-    EncounterSetError
-        Naming file and line.
-    """
+    """Read one encounter of paired tracks."""
 
     def fail(message: str, line: int | None = None) -> EncounterSetError:
         where = f"{path}: " if line is None else f"{path}: line {line}: "

@@ -34,14 +34,7 @@ _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 
 def suspicions(content: TrafficFile, duration_s: float) -> list[str]:
-    """Return what is suspicious about the flights of a file, one sentence for each kind.
-
-    Parameters
-    ----------
-    content : TrafficFile
-    duration_s : float
-        Of the run.
-    """
+    """Return what is suspicious about the flights of a file, one sentence for each kind."""
     found: dict[str, list[str]] = {}
     for craft in content.aircraft:
         for what, hint in _of_one(craft):
@@ -139,18 +132,7 @@ def _coverage(content: TrafficFile, duration_s: float) -> list[str]:
 
 
 def derived_attitude(content: TrafficFile) -> dict[str, Any]:
-    """Say whose attitude was derived from the path, and how wrong that is known to be.
-
-    Parameters
-    ----------
-    content : TrafficFile
-
-    Returns
-    -------
-    dict
-        ``yaw``, ``pitch`` and ``roll``, each the names of aircraft without it in the file, and
-        ``median_azimuth_error_deg`` where yaw is among them; empty where all was measured.
-    """
+    """Return whose attitude was derived from the path, and how wrong that is known to be."""
     names: dict[str, Any] = {}
     for angle in ("yaw", "pitch", "roll"):
         of = [craft.name for craft in content.aircraft if angle in craft.derived_attitude]

@@ -40,16 +40,8 @@ from dsa_des.block.wake import Wake
 class RowFlights:
     """The flights of all aircraft as each row of a message knows them, for the truth.
 
-    As `components.messages.known_flights.KnownFlights` of `TrueFlights`.
-
-    Parameters
-    ----------
-    own : OwnFlights
-    targets : Fleet
-    width : int
-        Targets of each replica.
-    replica, known : (rows,) of int
-        Each row's replica, and how many manoeuvres of its ownship it knows.
+    As `components.messages.known_flights.KnownFlights` of `TrueFlights`: `known` says how many
+    manoeuvres of its replica's ownship each row knows.
     """
 
     def __init__(
@@ -90,16 +82,9 @@ class RowFlights:
 class AskedFlights(RowFlights):
     """The same for who must know other instants, each aircraft at a time of its own.
 
-    As `components.messages.known_flights.KnownFlights` of a traffic source's flights.
-
-    Parameters
-    ----------
-    own, targets, width, replica, known
-        As for `RowFlights`.
-    intervals : NearIntervals or None
-        When targets may matter; they are not there otherwise.
-    rates_hz : (replicas,) or None
-        As often each replica's positions are published, if not always.
+    As `components.messages.known_flights.KnownFlights` of a traffic source's flights: targets are
+    there while they are near, and positions are those of the last publication where there is a
+    rate.
     """
 
     def __init__(
@@ -159,19 +144,7 @@ _TOLD = Manoeuvre._fields
 
 
 class AllFlown:
-    """The flights of all replicas, as arrays.
-
-    Parameters
-    ----------
-    own, targets : Fleet
-        The ownship of each replica, and all targets of the first one, of the second, and so on.
-    own_speed_mps, target_speed_mps : (replicas,) and (replicas * targets,)
-        Largest speeds.
-    own_present_s, target_present_s : (replicas, 2) and (replicas * targets, 2)
-        First and last time at which each may be there.
-    roster : Roster
-        What the targets are.
-    """
+    """The flights of all replicas, as arrays."""
 
     def __init__(
         self,
@@ -189,16 +162,7 @@ class AllFlown:
 
 
 class FlownTogether:
-    """Handles the wakes of a traffic source for all replicas.
-
-    Parameters
-    ----------
-    face : TrafficSource
-        The source as the first replica has it, set up.
-    flown : AllFlown
-    rates_hz : (replicas,) or None
-        As often positions are published, if not always.
-    """
+    """Handles the wakes of a traffic source for all replicas."""
 
     def __init__(self, face: Any, flown: AllFlown, rates_hz: FloatArray | None) -> None:
         self._flown, self._roster = flown, flown.roster
@@ -296,13 +260,7 @@ class FlownTogether:
         )  # fmt: skip
 
     def _steer(self, wake: Wake, replica: IntArray) -> IntArray:
-        """Let ownships fly what has come for them.
-
-        Returns
-        -------
-        (rows,) of int
-            How many manoeuvres of its ownship each row knows.
-        """
+        """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))
             self._told += zip(new.tick.tolist(), manoeuvres, strict=True)
@@ -346,15 +304,7 @@ def _later(replica: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray
 
 
 class _Epochs:
-    """Who may come in reach of an ownship that is steered; see `SteeredCulling`.
-
-    Parameters
-    ----------
-    flights : FlownTogether
-    flown : AllFlown
-    width : int
-    reach_m : float
-    """
+    """Who may come in reach of an ownship that is steered; see `SteeredCulling`."""
 
     def __init__(self, flights: FlownTogether, flown: AllFlown, width: int, reach_m: float) -> None:
         self._flights, self._width = flights, width
@@ -393,14 +343,7 @@ class _Epochs:
 
 
 def flown_by(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
-    """Return the flights of all replicas, or None where they cannot be put together.
-
-    Parameters
-    ----------
-    face : TrafficSource
-        As the first replica has it.
-    replicas : ReplicaRuns
-    """
+    """Return the flights of all replicas, or None where they cannot be put together."""
     type(face).prepare(replicas.parameters)
     parameters = getattr(face, "flown_of", None)
     found: AllFlown | None = None if parameters is None else parameters(replicas.parameters)
@@ -431,14 +374,7 @@ def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
 
 
 def flown(own_fleet: Any, target_fleet: Any, own: Any, targets: Any, roster: Roster) -> AllFlown:
-    """Return flights with how fast they are and when they are there.
-
-    Parameters
-    ----------
-    own_fleet, target_fleet : Fleet
-    own, targets : sequence of flights
-    roster : Roster
-    """
+    """Return flights with how fast they are and when they are there."""
     return AllFlown(
         own_fleet, target_fleet,
         np.asarray(max_speeds_mps(own)), np.asarray(max_speeds_mps(targets)),

@@ -216,13 +216,7 @@ class ScriptedTraffic(TrafficSource):
 
 
 def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
-    """Return a flight's ground speed at its start, given or from its airspeed and the wind.
-
-    Raises
-    ------
-    ValueError
-        If no heading keeps its track in this wind, naming the aircraft.
-    """
+    """Return a flight's ground speed at its start, given or from its airspeed and the wind."""
     if flight.airspeed_mps is None:
         return flight.speed_mps
     if wind is None:
@@ -268,13 +262,7 @@ def _intruders(
 
 
 def _known(crafts: Sequence[Intruder], references: FloatArray) -> list[tuple[float, float, float]]:
-    """Return where intruders start, each with its offset from a reference (n, 3) of its own.
-
-    Raises
-    ------
-    ValueError
-        If a start is given in part only, or twice.
-    """
+    """Return where intruders start, each with its offset from a reference (n, 3) of its own."""
     starts: list[tuple[float, float, float] | None] = []
     offsets: list[tuple[float, float, float]] = []
     for craft in crafts:

@@ -284,13 +284,7 @@ class TrafficSource(SteeredOwnship):
 def roster_of(
     names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
 ) -> Roster:
-    """Return the roster of named targets: `others` by name, `default` for the rest.
-
-    Raises
-    ------
-    ValueError
-        If `others` names an aircraft that is not a target.
-    """
+    """Return the roster of named targets: `others` by name, `default` for the rest."""
     for name in others:
         if name not in names:
             raise ValueError(f"aircraft.{name}: {what} has no such intruder"

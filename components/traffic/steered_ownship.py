@@ -29,13 +29,6 @@ def truth_is_recorded(context: Context, targets: int) -> bool:
     Where tables are chosen, as a study chooses those that its metrics read, that one is among them
     or it is not made.
 
-    Parameters
-    ----------
-    context : Context
-    targets : int
-
-    Notes
-    -----
     How often sensors look does not count: replicas whose clocks differ record the same tables.
     """
     record = context.sections.get("record")
@@ -49,15 +42,7 @@ def truth_is_recorded(context: Context, targets: int) -> bool:
 
 
 class TrueFlights:
-    """The ownship's flight, as far as it is known, and those of all targets.
-
-    Parameters
-    ----------
-    own, fleet
-        As a traffic source has them.
-    crabbing : sequence
-        What turns noses into the wind.
-    """
+    """The ownship's flight, as far as it is known, and those of all targets."""
 
     def __init__(self, own: Any, fleet: Any, crabbing: Sequence[Any]) -> None:
         self._own, self._fleet, self._crabbing = own, fleet, crabbing
@@ -133,20 +118,8 @@ class SteeredOwnship(Component):
     ) -> tuple[TrajectoryState, TrajectoryState]:
         """Return the states of the ownship and of some targets, each at a time of its own.
 
-        Parameters
-        ----------
-        own : Trajectory
-            The ownship's flight, as far as it is known.
-        columns : (targets,) of int
-        time_s : (rows, targets)
-            With an ``update_rate_hz``, the last publication up to then counts.
-        ahead_s : (rows, targets)
-            They are wanted so much later than that.
-
-        Returns
-        -------
-        own, others : TrajectoryState
-            Arrays (rows, targets).
+        With an ``update_rate_hz`` the last publication up to that time counts; they are wanted
+        `ahead_s` later.
         """
         if self.p.update_rate_hz is not None:
             rate = float(self.p.update_rate_hz)
@@ -164,14 +137,10 @@ class SteeredOwnship(Component):
         return seen, others
 
     def _steer(self, wake: Wake) -> tuple[KnownFlights | None, KnownFlights | None]:
-        """Steer the ownship at the times at which manoeuvres have come.
+        """Steer the ownship at the times at which manoeuvres have come; return flights and truth.
 
-        Returns
-        -------
-        flights, truth : KnownFlights or None
-            The flights as they are known at each row, where a block asks for them and where the
-            truth is recorded: a row knows the manoeuvres that have come by its own instant,
-            whatever came later in this wake.
+        A row knows the manoeuvres that have come by its own instant, whatever came later in this
+        wake; None stands for what no block asks for.
         """
         for new in wake.arrivals("manoeuvres"):
             manoeuvres = map(Manoeuvre, *(getattr(new.message, name).tolist() for name in _TOLD))

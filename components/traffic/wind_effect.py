@@ -44,14 +44,7 @@ class CrabAngles(Effect):
 
 
 class Crabbing:
-    """Turns attitudes that follow from paths over the ground into those in wind.
-
-    Parameters
-    ----------
-    wind : Wind
-    targets : sequence of flights
-        All on the roster.
-    """
+    """Turns attitudes that follow from paths over the ground into those in wind."""
 
     def __init__(self, wind: Wind, targets: Sequence[Any]) -> None:
         self._wind, self._targets = wind, targets
