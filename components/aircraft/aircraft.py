@@ -30,7 +30,7 @@ class TableFile:
     ----------
     path : Path
     table : object
-        `components.aircraft.rcs_table.RcsTable`, or that of `silhouette_table`.
+        `components.aircraft.aspect_tables.RcsTable`, or `SilhouetteTable`.
     """
 
     path: Path
@@ -38,13 +38,13 @@ class TableFile:
 
 
 def _rcs(path: Path) -> Any:
-    from components.aircraft.rcs_table import RcsTable
+    from components.aircraft.aspect_tables import RcsTable
 
     return RcsTable.from_csv(path)
 
 
 def _silhouette(path: Path) -> Any:
-    from components.aircraft.silhouette_table import read_aspect_table
+    from components.aircraft.aspect_tables import read_aspect_table
 
     return read_aspect_table(path)
 

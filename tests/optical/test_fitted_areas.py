@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.aircraft.silhouette_table import read_aspect_table, table_from_nodes
+from components.aircraft.aspect_tables import read_aspect_table, table_from_nodes
 from components.evidence.silhouettes.comparison_command import main
 from components.evidence.silhouettes.fitted_areas import fitted_areas
 from components.evidence.silhouettes.fitted_areas import main as fit

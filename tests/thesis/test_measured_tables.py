@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from components.aircraft.silhouette_table import read_aspect_table
+from components.aircraft.aspect_tables import read_aspect_table
 from components.evidence.silhouettes.comparison import AXES, compare_silhouettes
 from components.evidence.thesis.measured_tables import ERRORS, MEASURED_ON, TABLES
 from components.evidence.thesis.project_files import aircraft

@@ -108,7 +108,7 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
         models[name] = _silhouette(model=name, **areas)
     references: dict[str, Silhouette] = {}
     if options.reference is not None:
-        from components.aircraft.silhouette_table import read_aspect_table
+        from components.aircraft.aspect_tables import read_aspect_table
 
         try:
             table = read_aspect_table(options.reference)

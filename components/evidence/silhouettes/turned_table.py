@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from components.aircraft.silhouette_table import SilhouetteTable
+from components.aircraft.aspect_tables import SilhouetteTable
 
 # Light aircraft show up to a fifth more from the nose than abeam, or less: only what is clearly the
 # other way round than the model is spoken of.

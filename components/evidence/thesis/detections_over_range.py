@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.map_axes import draw_map, mark
 from components.evidence.thesis.plotting import BLUE, ORANGE, legend_below, panels

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.evidence.thesis.basis import Basis, calibrated, predicted
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels

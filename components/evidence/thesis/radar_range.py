@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.evidence.thesis.made import Made, Picture
 from components.evidence.thesis.plotting import BLUE, GREY, ORANGE, panels
 from components.evidence.thesis.printed import printed

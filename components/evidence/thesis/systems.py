@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.rcs_table import dbsm_to_m2
+from components.aircraft.aspect_tables import dbsm_to_m2
 from components.evidence.thesis import eo_ranges, tecvol
 from components.evidence.thesis.basis import Basis, configured, predicted
 from components.evidence.thesis.made import Made, Picture
