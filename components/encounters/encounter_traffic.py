@@ -1,7 +1,8 @@
 """Traffic of encounters: one of a set (``traffic.encounters``), or one that a model makes.
 
 Which one it is is a parameter, so that a study has one encounter per replica. An encounter is a
-function of its number: the same in every scene and condition."""
+function of its number: the same in every scene and condition.
+"""
 
 from collections import OrderedDict
 from collections.abc import Iterable, Sequence

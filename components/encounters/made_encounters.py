@@ -14,13 +14,7 @@ from typing import Any
 import numpy as np
 
 from components.encounters.sampling import EncounterDraws
-from components.flights.closest_geometry import (
-    SENSES,
-    Approach,
-    flown,
-    in_plane,
-    intruder_heading,
-)
+from components.flights.closest_geometry import SENSES, Approach, flown, in_plane, intruder_heading
 from components.formats.encounter_set import (
     LARGEST_WEIGHT,
     NAMES,

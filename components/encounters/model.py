@@ -1,7 +1,8 @@
 """An encounter model: where aircraft start, and how they fly on from second to second.
 
 Described in M. J. Kochenderfer, L. P. Espindle, J. K. Kuchar, J. D. Griffith, "Uncorrelated
-encounter model of the National Airspace System", MIT Lincoln Laboratory, ATC-345, 2008."""
+encounter model of the National Airspace System", MIT Lincoln Laboratory, ATC-345, 2008.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -24,11 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from components.encounters.model import EncounterModel
-from components.encounters.pair_densities import (
-    REFERENCE_FT,
-    PairingRules,
-    speeds_over_directions,
-)
+from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
 from components.encounters.sampling import EncounterDraws, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
 from components.flights.point_mass import fly_euler, summed

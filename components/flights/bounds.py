@@ -1,22 +1,19 @@
 """Bounds of flights over a run: speeds, times, lines of sight, and height above the terrain.
 
 Nothing moves farther than its largest speed times half the spacing of the samples from where a
-sample saw it. What holds at the samples, widened by that, holds all the time."""
+sample saw it. What holds at the samples, widened by that, holds all the time.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory, StraightFlights
-from components.geometry.ellipsoid import (
-    ECCENTRICITY_SQUARED,
-    SEMI_MAJOR_AXIS_M,
-    line_of_sight,
-)
+from components.geometry.ellipsoid import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS_M, line_of_sight
 from components.geometry.state import TrajectoryState
 from components.geometry.wrapping import wrap_by_sines
 from components.messages.reach import REACH_MARGIN
@@ -44,10 +41,14 @@ def intervals_present_s(flights: Sequence[Any]) -> FloatArray:
 
 
 Interval = tuple[float, float]
+#: States of a flight at times (n,).
+FlightAt = Callable[[FloatArray], TrajectoryState]
 
 # Two per second where there are few aircraft, and a tenth of a second's work where there are many.
 _SPACING_S = 0.5
 _MOST_CELLS = 200_000
+#: Instants, one a second, at which a flight is compared with the terrain.
+_MOST_SAMPLES = 100_000
 # As in `culling`: speeds of turns and long legs hold to 2e-4, positions to less than a metre.
 _SPEED_MARGIN = 1.001
 _POSITION_MARGIN_M = 1.0
@@ -144,33 +145,11 @@ def _moves_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
 
 
-_MOST_SAMPLES = 100_000
-
-
-class OwnshipFlight(Protocol):
-    """The flight of the ownship."""
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return its state at some times."""
-
-
-class FlightOf:
-    """One flight of many that are evaluated together."""
-
-    def __init__(self, fleet: Any, aircraft: int) -> None:
-        self._fleet, self._aircraft = fleet, aircraft
-
-    def at(self, time_s: Any) -> TrajectoryState:
-        """Return its state at times (n,)."""
-        state: TrajectoryState = self._fleet.each(np.full(len(time_s), self._aircraft), time_s)
-        return state
-
-
-def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float) -> None:
+def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
     """Refuse terrain that the ownship does not fly above."""
     count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
     times = np.linspace(0.0, duration_s, count)
-    state = own.at(times)
+    state = own_at(times)
     hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
     if len(hit):
         first = hit[0]
@@ -181,12 +160,12 @@ def check_above_terrain(own: OwnshipFlight, terrain_m: float, duration_s: float)
 
 
 def check_on_raster(
-    own: OwnshipFlight, raster: ElevationRaster, offset_m: float, duration_s: float
+    own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
     """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
     count = min(math.ceil(duration_s), _MOST_SAMPLES) + 1
     times = np.linspace(0.0, duration_s, count)
-    state = own.at(times)
+    state = own_at(times)
     there = np.flatnonzero(state.present)
     ground, inside = raster.height(state.lat_deg[there], state.lon_deg[there])
     if len(there) and not inside.any():

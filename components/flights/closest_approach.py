@@ -116,22 +116,6 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
     best.time_s[target[one]] = time_s[one]
 
 
-def looked_at_one_by_one(
-    own: Any, targets: Sequence[Any], times_of: Callable[[Any], FloatArray], end_s: float
-) -> Approaches:
-    """Find closest approaches by looking at every time of every target."""
-    best = Approaches.none(len(targets))
-    for number, target in enumerate(targets):
-        times = times_of(target)
-        times = times[(times >= 0) & (times <= end_s)]
-        for start in range(0, len(times), MOST_AT_ONCE):
-            some = times[start : start + MOST_AT_ONCE]
-            which = np.full(len(some), number)
-            range_m, there = _apart(own.at(some), target.at(some))
-            _improve(best, which[there], some[there], range_m[there])
-    return best
-
-
 def censored_approaches(source: Any, time_s: FloatArray, end_s: float) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
     present_s = np.array(present_together_s(source.own, source.targets, end_s))
@@ -168,14 +152,7 @@ def _looked_at_s(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last sample (targets,) in [begin_s, end_s]; NaN without any."""
     first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
-    every: list[SampleTimes] = source.sample_times()
-    if not every:
-        for number, target in enumerate(source.targets):
-            times = source.sample_times_s(target)
-            times = times[(times >= begin_s[number]) & (times <= end_s[number])]
-            if len(times):
-                first[number], last[number] = times.min(), times.max()
-    for times in every:
+    for times in source.sample_times():
         targets = np.arange(len(begin_s))
         low, high = times.between(targets, begin_s, end_s)
         some = np.flatnonzero(high >= low)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from components.flights.geodesic_motion import geodesic_state
-from components.flights.legs import FORMULAS, hold_state
+from components.flights.leg_motion import FORMULAS, hold_state
 from components.flights.sample_times import PieceSearch
 from components.flights.sampled_flight import (
     CELLS_AT_ONCE,
@@ -346,6 +347,14 @@ class SampledFleet:
         return evaluate_segments(
             self._table.take(segment, axis=1), inside - samples[segment], present
         )
+
+
+def fleet_of(flights: Sequence[Any]) -> ScriptedFleet | SampledFleet | None:
+    """Return flights as a fleet, or None where they are not all scripted or all sampled."""
+    kinds = {type(flight) for flight in flights}
+    if kinds <= {ScriptedTrajectory}:
+        return ScriptedFleet(flights)
+    return SampledFleet(flights) if kinds == {SampledTrajectory} else None
 
 
 def _in_blocks(

@@ -1,7 +1,8 @@
 """The times at which distances are compared: a regular grid, or the times of recorded samples.
 
 Neither is ever laid out in full: a flight of a month on a grid of tenths of a second has 26
-million of them."""
+million of them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

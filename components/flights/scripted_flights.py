@@ -12,13 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.flights.geodesic_motion import geodesic_parameter_table
-from components.flights.legs import (
-    AnyLeg,
-    LegBuilder,
-    Segment,
-    require,
-    segment_state,
-)
+from components.flights.leg_motion import Segment, segment_state
+from components.flights.legs import AnyLeg, LegBuilder, require
 from components.flights.sampled_flight import CELLS_AT_ONCE, TrajectoryState
 from components.geometry.enu import enu_to_geodetic
 from components.geometry.normals import FloatArray

@@ -204,3 +204,16 @@ def _time_parser(column: SampleColumn) -> Callable[[str], float]:
             return instant.timestamp()
 
     return parse
+
+
+def csv_columns() -> list[tuple[str, ...]]:
+    """Return quantity, accepted names, unit by default, and whether it is needed."""
+    return [
+        (
+            quantity,
+            ", ".join(names),
+            DEFAULT_UNITS.get(quantity, "" if quantity == "id" else "deg"),
+            "yes" if quantity in REQUIRED else "",
+        )
+        for quantity, names in HEADERS.items()
+    ]

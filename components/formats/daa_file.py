@@ -299,3 +299,11 @@ def _geodetic(
     # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
     alt = samples["sz"] + reference[2]
     return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity, **attitude}
+
+
+def daa_columns() -> list[tuple[str, ...]]:
+    """Return quantity, accepted names, and unit by default."""
+    return [
+        (quantity, ", ".join(names), DEFAULT_UNITS.get(quantity, ""))
+        for quantity, names in (*HEADERS.items(), ("yaw", EXTRA_HEADERS["yaw"]))
+    ]

@@ -1,7 +1,8 @@
 """Sets of encounters in Parquet files: written batch by batch, read strictly.
 
 What is wrong with an encounter is said with the file and the encounter's number; a damaged one can
-be left out and counted instead."""
+be left out and counted instead.
+"""
 
 import json
 import os

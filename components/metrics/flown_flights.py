@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.steered_flights import ManyFlights, OwnFlights, SteeredFlight
+from components.flights.many_flights import ManyFlights, OwnFlights
+from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 from components.metrics.separation import RelativeFlight, separations, traffic_block
 from dsa_des.arrays.types import FloatArray

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from components.flights.closest_approach import Approaches, closest_approaches, end_of_look
+from components.flights.many_flights import ManyFlights
 from components.flights.sample_times import OwnTimes, RegularTimes, SampleTimes
 from components.flights.sampled_flight import CELLS_AT_ONCE
-from components.flights.steered_flights import ManyFlights
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.geometry.state import TrajectoryState
 from components.metrics.separation import (

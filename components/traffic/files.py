@@ -14,7 +14,6 @@ from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.fleet import SampledFleet
 from components.flights.sample_times import OwnTimes, SampleTimes, SharedTimes
 from components.flights.sampled_flight import SampledTrajectory
-from components.flights.steered_flights import Trajectory
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.text_rows import TrafficFile
@@ -214,12 +213,6 @@ class RecordedTraffic(TrafficSource):
         last = max(craft.interval_present()[1] for craft in self.content.aircraft)
         # Zero-length recordings still have their one instant.
         return max(Fraction(repr(float(last))), Fraction(1, 10**9))
-
-    def sample_times_s(self, target: Trajectory) -> FloatArray:
-        """Return the file's own sample times of the target and the ownship."""
-        own: FloatArray = self.content.ownship.sample_times_s
-        other: FloatArray = target.sample_times_s  # type: ignore[attr-defined]
-        return np.union1d(own, other)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return the sample times of the ownship, and those of each target."""

@@ -1,14 +1,15 @@
 """Traffic of many replicas whose flights differ, flown together: every row asks for its own.
 
 What each row holds is what a run of its own replica would give, to the bit. Targets are numbered
-through: those of the first replica, then those of the second, and so on."""
+through: those of the first replica, then those of the second, and so on.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Self, cast
 
 import numpy as np
@@ -22,10 +23,8 @@ from components.flights.culling import (
     near_intervals,
     within_of,
 )
-from components.flights.fleet import SampledFleet, ScriptedFleet
-from components.flights.sampled_flight import SampledTrajectory
-from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flights import OwnFlights
+from components.flights.fleet import fleet_of
+from components.flights.many_flights import Fleet, OwnFlights
 from components.geometry.ellipsoid import line_of_sight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import flat
@@ -143,22 +142,28 @@ class AskedFlights(RowFlights):
 _TOLD = Manoeuvre._fields
 
 
+@dataclass(frozen=True)
 class AllFlown:
-    """The flights of all replicas, as arrays."""
+    """The flights of all replicas: an ownship each, and the targets of all one after the other."""
 
-    def __init__(
-        self,
-        own: Any,
-        targets: Any,
-        own_speed_mps: FloatArray,
-        target_speed_mps: FloatArray,
-        own_present_s: FloatArray,
-        target_present_s: FloatArray,
-        roster: Roster,
-    ) -> None:
-        self.own, self.targets, self.roster = own, targets, roster
-        self.own_speed_mps, self.target_speed_mps = own_speed_mps, target_speed_mps
-        self.own_present_s, self.target_present_s = own_present_s, target_present_s
+    own: Fleet
+    targets: Fleet
+    own_speed_mps: FloatArray
+    target_speed_mps: FloatArray
+    own_present_s: FloatArray
+    target_present_s: FloatArray
+    roster: Roster
+
+    @classmethod
+    def of(
+        cls, fleets: Sequence[Fleet], flights: Sequence[Sequence[Any]], roster: Roster
+    ) -> AllFlown:
+        """Return ownships and targets, as fleets and one by one, with their speeds and times."""
+        (own_fleet, target_fleet), (own, targets) = fleets, flights
+        return cls(
+            own_fleet, target_fleet, max_speeds_mps(own), max_speeds_mps(targets),
+            intervals_present_s(own), intervals_present_s(targets), roster,
+        )  # fmt: skip
 
 
 class FlownTogether:
@@ -361,22 +366,10 @@ def _made_one_by_one(face: Any, replicas: ReplicaRuns) -> AllFlown | None:
     roster = joint_roster(face.roster, aircraft)
     if roster is None:
         return None
-    fleets: list[Any] = []
+    fleets: list[Fleet] = []
     for flights in (own, targets):
-        kinds = {type(flight) for flight in flights}
-        if kinds <= {ScriptedTrajectory}:
-            fleets.append(ScriptedFleet(flights))
-        elif kinds == {SampledTrajectory}:
-            fleets.append(SampledFleet(flights))
-        else:
+        fleet = fleet_of(flights)
+        if fleet is None:
             return None
-    return flown(fleets[0], fleets[1], own, targets, roster)
-
-
-def flown(own_fleet: Any, target_fleet: Any, own: Any, targets: Any, roster: Roster) -> AllFlown:
-    """Return flights with how fast they are and when they are there."""
-    return AllFlown(
-        own_fleet, target_fleet,
-        np.asarray(max_speeds_mps(own)), np.asarray(max_speeds_mps(targets)),
-        intervals_present_s(own), intervals_present_s(targets), roster,
-    )  # fmt: skip
+        fleets.append(fleet)
+    return AllFlown.of(fleets, (own, targets), roster)

@@ -12,16 +12,10 @@ from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.flights import legs
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.fleet import ScriptedFleet
-from components.flights.sample_times import (
-    RegularTimes,
-    SampleTimes,
-    regular_count,
-    regular_times_s,
-)
+from components.flights.sample_times import RegularTimes, SampleTimes
 from components.flights.scripted_flights import ScriptedTrajectory, Starts, flights_of
-from components.flights.steered_flights import Trajectory
 from components.geometry.enu import enu_to_geodetic
-from components.traffic.flown_together import AllFlown, flown
+from components.traffic.flown_together import AllFlown
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
@@ -203,12 +197,8 @@ class ScriptedTraffic(TrafficSource):
         references = np.repeat(np.array(places, dtype=np.float64), width, axis=0)
         ownships = flights_of(_starts(own, places, None))
         targets = flights_of(_starts(crafts, _known(crafts, references), None)) if crafts else []
-        return flown(ScriptedFleet(ownships), ScriptedFleet(targets), ownships, targets, roster)
-
-    def sample_times_s(self, target: Trajectory) -> FloatArray:
-        """Return a regular grid over the run."""
-        step_s, end_s = self.p.sample_interval_s, float(self.context.duration_s)
-        return regular_times_s(step_s, np.arange(regular_count(step_s, end_s)))
+        fleets = ScriptedFleet(ownships), ScriptedFleet(targets)
+        return AllFlown.of(fleets, (ownships, targets), roster)
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

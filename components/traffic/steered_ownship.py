@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from components.flights.culling import Culling
-from components.flights.steered_flights import Fleet, SteeredFlight, Trajectory
+from components.flights.many_flights import Fleet
+from components.flights.steered_flight import SteeredFlight, Trajectory
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import Flights, KnownFlights
 from components.messages.steering import Manoeuvre, Manoeuvres
@@ -84,8 +85,8 @@ class SteeredOwnship(Component):
     _crabbing: list[Any]
     _culling: Culling | None = None
     #: Whether blocks ask for flights at other instants, and whether the truth is recorded.
-    _flights_asked_for = False
-    _says_truth = False
+    flights_asked_for = False
+    says_truth = False
 
     def serves_replicas(self) -> bool:
         """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
@@ -157,16 +158,16 @@ class SteeredOwnship(Component):
             known.append(partial(self.flights, self.own))
             true.append(self._true_flights())
         self._flights_now, self._truth_now = known[-1], true[-1]
-        if not self._flights_asked_for and self._truth_now is None:
+        if not self.flights_asked_for and self._truth_now is None:
             return None, None
         # A manoeuvre has come before anything runs at its instant.
         came = np.array([tick for tick, _ in told], dtype=np.int64)
         of_row = np.searchsorted(came, wake.ticks, side="right")
         return (
-            KnownFlights(known, of_row) if self._flights_asked_for else None,
+            KnownFlights(known, of_row) if self.flights_asked_for else None,
             None if self._truth_now is None else KnownFlights(cast(Any, true), of_row),
         )
 
     def _true_flights(self) -> TrueFlights | None:
         """Return all flights as they are known now, if the truth is recorded."""
-        return TrueFlights(self.own, self.fleet, self._crabbing) if self._says_truth else None
+        return TrueFlights(self.own, self.fleet, self._crabbing) if self.says_truth else None

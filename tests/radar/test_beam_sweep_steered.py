@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.flights.steered_flights import SteeredFlight
+from components.flights.steered_flight import SteeredFlight
 from components.geometry.state import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.steering import Manoeuvre

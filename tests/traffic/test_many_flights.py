@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from components.flights.legs import Straight, Turn
+from components.flights.many_flights import ManyFlights
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flights import ManyFlights, SteeredFlight
+from components.flights.steered_flight import SteeredFlight
 from components.messages.steering import Manoeuvre
 
 TIMES = np.arange(0.0, 41.0)

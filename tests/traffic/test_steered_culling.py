@@ -8,7 +8,7 @@ import pytest
 from components.flights.culling import SHORTEST_EPOCH_S, SteeredCulling
 from components.flights.fleet import ScriptedFleet
 from components.flights.scripted_flights import ScriptedTrajectory
-from components.flights.steered_flights import SteeredFlight
+from components.flights.steered_flight import SteeredFlight
 from components.geometry.ellipsoid import line_of_sight
 from components.messages.steering import Manoeuvre
 from components.messages.targets import TrafficStates
